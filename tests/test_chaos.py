@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.chaos.arena import Arena
+from tests.chaos.sandbox import Sandbox
 from tests.chaos.tally import Tally
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -36,7 +36,7 @@ def test_a_round_of_chaos_ends_as_it_must() -> None:
 
 
 def test_what_is_half_written_under_a_final_name_is_seen(tmp_path: Path) -> None:
-    arena = Arena(tmp_path, "toy", [("toy", "first")], {"toy": {}})
+    arena = Sandbox(tmp_path, "toy", [("toy", "first")], {"toy": {}})
     (arena.work / "toy/first/records").mkdir(parents=True)
     for name in ("a.tar", "b.tar", "c.tar"):
         (arena.work / "toy/first" / name).write_bytes(b"whole")

@@ -38,7 +38,7 @@ from pipeline.config import load_config
 from pipeline.paths import Places
 from pipeline.registry import find_stages
 from pipeline.run import run_stage
-from stages.package.verify import main
+from stages.verification.verify import main
 
 config, out = Path(sys.argv[1]), Path(sys.argv[2])
 stages = find_stages()

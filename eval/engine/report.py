@@ -24,8 +24,8 @@ from eval.engine.chart import NUM_COLORS, chart_svg
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import TableResult
 from eval.engine.table import cell_text
-from stages.package.made_with import code_version, library_versions
 from stages.package.manifest import config_sections
+from stages.package.versions import code_version, library_versions
 
 TEMPLATE = Path(__file__).with_suffix(".html")
 

@@ -20,7 +20,7 @@ from eval.engine.table import Table
 from pipeline.code import code_digest, transitive_imports
 from pipeline.paths import file_digest, write_file
 from pipeline.shards import json_bytes
-from stages.package.made_with import library_versions
+from stages.package.versions import library_versions
 
 Said = TypeVar("Said")
 

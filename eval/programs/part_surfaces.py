@@ -14,7 +14,7 @@ from torch import Tensor, nn
 from eval.engine.evaluation import Figure
 from eval.engine.pictures import cloud_portrait
 from eval.programs.figures import drawn, sheet_of
-from stages.abstraction.hierarchy import WORTH_TURNING
+from stages.abstraction.hierarchy import MIN_TURN_GAIN
 from stages.programs.program import find_program
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import box_corners, nearest_axes
@@ -61,7 +61,7 @@ def curve_parts(program: str, shapes: int, rng: np.random.Generator) -> PartClou
     points, places = [], []
     for shape in islice(random_shapes(find_program(program), TRAIN_INTERVAL, rng), shapes):
         meshes = [part.mesh for part in shape.parts]
-        boxes = [nearest_axes(minimum_box(mesh.vertices, WORTH_TURNING), np.eye(3)) for mesh in meshes]
+        boxes = [nearest_axes(minimum_box(mesh.vertices, MIN_TURN_GAIN), np.eye(3)) for mesh in meshes]
         for mesh, box in zip(meshes, boxes, strict=True):
             local = (even_points(mesh.vertices, mesh.triangles, POINTS) - box.center) @ box.axes.T
             points.append(local / np.maximum(box.size, 1e-6))

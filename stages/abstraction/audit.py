@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stages.abstraction.members import FOUND, PROGRAM
+from stages.abstraction.members import PROGRAM, PROGRAM_FOUND
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
 from stages.shape.geometry.bounds import shape_bounds
@@ -14,7 +14,7 @@ from stages.shapeassembly.execution.interpreter import execute
 from stages.shapeassembly.syntax.errors import ProgramError
 from stages.shapeassembly.syntax.parser import parse
 
-AROUND = 0.35
+MAX_CORNER_SHARE = 0.35
 """By how much of the sample's diagonal a corner of the box around a program may miss that of the sample: it was let
 through by its surface, and its parts may reach out a little."""
 
@@ -23,7 +23,7 @@ def _faults(sample: Packaged) -> Iterator[str]:
     if PROGRAM not in sample.members:
         return
     said, text = sample.record["program"], sample.members[PROGRAM].decode()
-    if bool(text) != (said["refused"] == FOUND):
+    if bool(text) != (said["refused"] == PROGRAM_FOUND):
         yield "it has a ShapeAssembly program and a reason why it has none, or neither"
         return
     if not text:
@@ -38,7 +38,7 @@ def _faults(sample: Packaged) -> Iterator[str]:
         yield "its ShapeAssembly program has another number of lines than its json says"
     bounds = shape_bounds(sample.shape)
     placed = np.array(said["centre"]) + said["scale"] * np.stack([corners.min(axis=0), corners.max(axis=0)])
-    if np.abs(placed - bounds).max() > AROUND * np.linalg.norm(bounds[1] - bounds[0]):
+    if np.abs(placed - bounds).max() > MAX_CORNER_SHARE * np.linalg.norm(bounds[1] - bounds[0]):
         yield "its ShapeAssembly program stands elsewhere than its mesh"
 
 

@@ -13,10 +13,10 @@ from stages.shapeassembly.extraction.boxes import bounding_box, box_corners, box
 from stages.shapeassembly.extraction.hierarchy import Box, PartHierarchy, PartNode, check_limits
 from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
 
-NEAR = 0.01
+SAME_SHARE = 0.01
 """Up to which boxes count as touching, as a share of the diagonal of the shape."""
 
-WORTH_TURNING = 0.5
+MIN_TURN_GAIN = 0.5
 """A part stands along its own axes unless a turned box has less than this share of the volume: leaning posts are far
 below it, roofs and bent armrests, which look no better in a turned box, above."""
 
@@ -30,7 +30,7 @@ class Boxes:
     def of(self, mesh: PartMesh, pose: FloatArray) -> Box:
         """The box of a part of this mesh at a rigid pose (4, 4)."""
         if mesh not in self._known:
-            self._known[mesh] = minimum_box(mesh.vertices, WORTH_TURNING)
+            self._known[mesh] = minimum_box(mesh.vertices, MIN_TURN_GAIN)
         box = self._known[mesh]
         return Box(pose[:3, :3] @ box.center + pose[:3, 3], box.size, box.axes @ pose[:3, :3].T)
 
@@ -47,7 +47,7 @@ def hierarchy_of(shape: Shape, children: int, boxes: Boxes) -> PartHierarchy:
         for kind, pose in zip(assembly.types.tolist(), assembly.poses, strict=True)
     ]
     corners = np.stack([box_corners(leaf.box) for leaf in leaves])
-    reach = NEAR * float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
+    reach = SAME_SHARE * float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
     label = max(leaves, key=lambda leaf: float(np.prod(leaf.box.size))).label
     check_limits(PartNode(label, leaves[0].box, tuple(leaves)), "a sample")
     return PartHierarchy("sample", _node(label, leaves, corners, children, reach))

@@ -10,7 +10,7 @@ from stages.abstraction.settings import AbstractionConfig
 from stages.shape.collection.members import Field, Member, Members
 
 PROGRAM = "program.txt"
-FOUND = "not refused"
+PROGRAM_FOUND = "not refused"
 """What a record says of a sample that has a program."""
 
 
@@ -24,7 +24,11 @@ def _fields(config: Config) -> Mapping[str, Field]:
     if not config.section(AbstractionConfig).programs:
         return {}
     properties = {
-        "refused": {"type": "string", "minLength": 1, "description": f"why it has none; {FOUND!r} where it has one"},
+        "refused": {
+            "type": "string",
+            "minLength": 1,
+            "description": f"why it has none; {PROGRAM_FOUND!r} where it has one",
+        },
         "f_score": {
             "type": "number",
             "minimum": 0,

@@ -9,7 +9,7 @@ from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.abstraction.hierarchy import Boxes, hierarchy_of
-from stages.abstraction.members import FOUND, PROGRAM, figures
+from stages.abstraction.members import PROGRAM, PROGRAM_FOUND, figures
 from stages.abstraction.settings import AbstractionConfig
 from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
@@ -18,7 +18,7 @@ from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES
 from stages.shapeassembly.extraction.extract import ExtractedProgram, extract
 from stages.shapeassembly.syntax.printer import print_program
 
-BYTES_A_SAMPLE = 4096
+BYTES_PER_SAMPLE = 4096
 
 
 def plan(plan: Plan) -> list[Shard]:
@@ -52,7 +52,7 @@ def run_shard(task: Task) -> Outcome:
 
 def _fields(found: ExtractedProgram) -> dict[str, Any]:
     return {
-        "refused": FOUND,
+        "refused": PROGRAM_FOUND,
         "f_score": round(found.f_score, 3),
         "lines": sum(1 + len(block.lines) for block in found.program.blocks),
         "leaves": found.leaves,
@@ -73,7 +73,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 
 def _bytes(plan: Plan) -> int:
-    return BYTES_A_SAMPLE * sample_count(plan) if plan.config.section(AbstractionConfig).programs else 0
+    return BYTES_PER_SAMPLE * sample_count(plan) if plan.config.section(AbstractionConfig).programs else 0
 
 
 STAGE = Stage(

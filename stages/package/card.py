@@ -12,7 +12,7 @@ from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEM
 from stages.package.sources import SourceTally
 from stages.package.tables import class_table, member_table, origin_table, reject_table, source_table, split_table
 
-SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
+SIZE_CATEGORIES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
 USES = (
     "For training and measuring models that generate, complete, segment or reconstruct shapes made of parts, and for "
@@ -59,7 +59,7 @@ def citation(facts: Mapping[str, Any]) -> str:
 
 def size_category(samples: int) -> str:
     """Hugging Face's name for a dataset of this size."""
-    return next((name for limit, name in SIZES if samples < limit), "n>1M")
+    return next((name for limit, name in SIZE_CATEGORIES if samples < limit), "n>1M")
 
 
 def card(

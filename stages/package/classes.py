@@ -12,7 +12,7 @@ import numpy as np
 from stages.shape.collection.classes import Classes
 from stages.shape.shape import Shape
 
-UNSEEN = (160, 160, 160)
+UNSEEN_COLOR = (160, 160, 160)
 """The colour of a class that has none of its own and of which there is no part."""
 
 
@@ -42,7 +42,7 @@ class ClassTally:
         }
 
 
-def counted_classes(
+def count_classes(
     classes: Classes, tallies: Iterable[tuple[str, Mapping[str, Mapping[str, Any]]]]
 ) -> list[dict[str, Any]]:
     """What `classes.json` says: the classes in the order of their ids, also those of which there is no part.
@@ -63,7 +63,7 @@ def counted_classes(
     table = []
     for each in classes.all:
         number = str(each.id)
-        red, green, blue = each.color or seen.get(number, UNSEEN)
+        red, green, blue = each.color or seen.get(number, UNSEEN_COLOR)
         table.append(
             {
                 "id": each.id,

@@ -10,7 +10,7 @@ from typing import Any, BinaryIO, cast
 from pipeline.paths import file_digest
 from pipeline.stage import Outcome, Task
 from stages.package.card import Story, card, citation
-from stages.package.classes import counted_classes, table_bytes
+from stages.package.classes import count_classes, table_bytes
 from stages.package.croissant import croissant
 from stages.package.hashing import HashingStream
 from stages.package.index import column_kinds, read_rows, write_index
@@ -44,7 +44,7 @@ def compose_dataset(task: Task) -> Outcome:
     }
     known = language_of(params["producer"]).speaker(task).sources
     of_shards = ((shard["split"], _read(task, f"{shard['name']}.classes.json")) for shard in shards)
-    classes = counted_classes(Classes.of(known), of_shards)
+    classes = count_classes(Classes.of(known), of_shards)
     listed = table_bytes(classes)
     counted = {"path": CLASSES, "count": len(classes), "sha256": hashlib.sha256(listed).hexdigest()}
     sources = {name: each.sentence for name, each in known.items() if name in tallies}

@@ -11,7 +11,7 @@ from typing import Any, BinaryIO
 from stages.shape.collection.declared import members
 from stages.shape.collection.members import Column
 
-COLUMNS = {
+RECORD_COLUMNS = {
     "key": Column("string", ("key",)),
     "split": Column("string", ("split",)),
     "kit": Column("string", ("kit",)),
@@ -26,22 +26,22 @@ COLUMNS = {
 }
 """What the index takes from a record, beside the columns that stages declare."""
 
-PLACE = {"shard": "string", "offset": "int64", "bytes": "int64"}
+LOCATION_COLUMNS = {"shard": "string", "offset": "int64", "bytes": "int64"}
 """Where a sample stands: `shard` is relative to the dataset's folder; the `bytes` bytes at `offset` of that file are
 the sample's members as a tar."""
 
-GROUP = 65_536
+ROWS_PER_GROUP = 65_536
 """Rows of a row group."""
 
 
 def columns() -> dict[str, Column]:
     """All columns that come from a record, by name."""
-    return COLUMNS | {name: column for each in members().values() for name, column in each.columns.items()}
+    return RECORD_COLUMNS | {name: column for each in members().values() for name, column in each.columns.items()}
 
 
 def column_kinds() -> dict[str, str]:
     """The Arrow type of every column of the index, by name."""
-    return {name: column.kind for name, column in columns().items()} | PLACE
+    return {name: column.kind for name, column in columns().items()} | LOCATION_COLUMNS
 
 
 def index_row(record: Mapping[str, Any], path: str, offset: int, size: int) -> dict[str, Any]:
@@ -76,7 +76,7 @@ def write_index(rows: Iterable[Mapping[str, Any]], stream: BinaryIO) -> None:
     schema = pa.schema([(name, pa.type_for_alias(kind)) for name, kind in kinds.items()])
     rest = iter(rows)
     with pq.ParquetWriter(stream, schema, compression="zstd") as writer:
-        while group := list(islice(rest, GROUP)):
+        while group := list(islice(rest, ROWS_PER_GROUP)):
             columns = {name: pa.array([row[name] for row in group], schema.field(name).type) for name in kinds}
             group.clear()  # before the next is read
-            writer.write_table(pa.table(columns), row_group_size=GROUP)
+            writer.write_table(pa.table(columns), row_group_size=ROWS_PER_GROUP)

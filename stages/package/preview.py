@@ -23,13 +23,13 @@ from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.sketches.settings import SketchesConfig
 
-COLUMNS = 8
-CELL = 232
-MARK = 12
+PREVIEW_COLUMNS = 8
+CELL_PIXELS = 232
+EXEMPLAR_MARK_PIXELS = 12
 """What differs from the background by more than so many levels is something shown."""
-PAD = 0.02
+CELL_PAD_SHARE = 0.02
 """Height of the strip left above and below what a row shows, as a share of the pictures' height."""
-CHOSEN_FROM = 512
+MAX_PREVIEW_CANDIDATES = 512
 """At most so many shapes, evenly spread over the samples, are looked at to choose those that are shown."""
 ABOVE = Camera(azimuth=-40.0, elevation=25.0)
 BELOW = replace(ABOVE, elevation=-ABOVE.elevation)
@@ -51,20 +51,22 @@ def draw_preview(task: Task) -> Outcome:
     made = {stage: _members(task, stage, shards) for stage in params["rows"]}
     samples = [each for shard in shards for each in collection.samples(shard)]
     whole = [each for each in samples if all(each.key in added for added in made.values())]
-    whole = whole[:: -(-len(whole) // CHOSEN_FROM)]
+    whole = whole[:: -(-len(whole) // MAX_PREVIEW_CANDIDATES)]
     shown = varied([(each, collection.shape(each)) for each in whole], config.previewed)
     variants = [Cell(_picture(shape, camera, backend), part_count(shape)) for _, shape in shown]
     sections = [Section("Shapes", _rows(variants), f"what comes out: {len(shown)} of {params['of']:,}")]
-    going_in = [Cell(_picture(shape, ABOVE, backend), said) for said, shape in collection.speaker.shown(COLUMNS)]
+    going_in = [
+        Cell(_picture(shape, ABOVE, backend), said) for said, shape in collection.speaker.shown(PREVIEW_COLUMNS)
+    ]
     if going_in:
         sections.insert(0, Section("Exemplars", _rows(going_in), "what goes in"))
     for stage, added in made.items():
         row = members()[stage].row
         if row is not None:
-            cells = [Cell(row.draw(added[sample.key], camera, CELL)) for sample, _ in shown[:COLUMNS]]
+            cells = [Cell(row.draw(added[sample.key], camera, CELL_PIXELS)) for sample, _ in shown[:PREVIEW_COLUMNS]]
             sections.append(Section(row.title, _rows(cells), row.caption(task.config)))
     with task.output(f"{task.shard.name}.png") as stream:
-        stream.write(picture_png(contact_sheet(sections, params["title"], CELL)))
+        stream.write(picture_png(contact_sheet(sections, params["title"], CELL_PIXELS)))
     return Outcome(samples=0, summary={"backend": backend, "renderer": drawn_by(backend)})
 
 
@@ -94,12 +96,12 @@ def _members(task: Task, stage: str, shards: Sequence[str]) -> dict[str, dict[st
 
 
 def _picture(shape: Shape, camera: Camera, backend: Backend) -> ByteArray:
-    return portrait(scene_of(upright(shape)), camera, (CELL, CELL), part_paint(shape), backend)
+    return portrait(scene_of(upright(shape)), camera, (CELL_PIXELS, CELL_PIXELS), part_paint(shape), backend)
 
 
 def _rows(cells: Sequence[Cell]) -> list[list[Cell]]:
     """The cells in rows, each row without the empty strips above and below its pictures."""
-    return [_trimmed(cells[start : start + COLUMNS]) for start in range(0, len(cells), COLUMNS)]
+    return [_trimmed(cells[start : start + PREVIEW_COLUMNS]) for start in range(0, len(cells), PREVIEW_COLUMNS)]
 
 
 def _trimmed(row: Sequence[Cell]) -> list[Cell]:
@@ -107,11 +109,15 @@ def _trimmed(row: Sequence[Cell]) -> list[Cell]:
     tops, ends = [], []
     for cell in row:
         height = len(cell.picture)
-        marked = (np.abs(cell.picture.astype(np.int16) - cell.picture[0, 0]) > MARK).reshape(height, -1).any(axis=1)
+        marked = (
+            (np.abs(cell.picture.astype(np.int16) - cell.picture[0, 0]) > EXEMPLAR_MARK_PIXELS)
+            .reshape(height, -1)
+            .any(axis=1)
+        )
         shown = np.flatnonzero(marked)
         tops.append(shown[0] / height if len(shown) else 0.5)
         ends.append((shown[-1] + 1) / height if len(shown) else 0.5)
-    top, end = max(min(tops) - PAD, 0.0), min(max(ends) + PAD, 1.0)
+    top, end = max(min(tops) - CELL_PAD_SHARE, 0.0), min(max(ends) + CELL_PAD_SHARE, 1.0)
     return [
         Cell(cell.picture[round(top * len(cell.picture)) : round(end * len(cell.picture))], cell.caption)
         for cell in row

@@ -17,8 +17,8 @@ from stages.shape.collection.declared import language_of, members, producers
 if TYPE_CHECKING:
     from jsonschema.protocols import Validator
 
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
-LISTED_FAULTS = 5
+SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
+MAX_FAULTS_LISTED = 5
 
 
 def record_schema(config: Config, producer: str, stages: Iterable[str]) -> dict[str, Any]:
@@ -32,7 +32,7 @@ def record_schema(config: Config, producer: str, stages: Iterable[str]) -> dict[
         "lineage": _lineage({name: field.schema for name, field in producers()[producer].lineage(config).items()}),
     }
     return {
-        "$schema": DIALECT,
+        "$schema": SCHEMA_DIALECT,
         "title": f"{config.name}: the record of a sample",
         "description": "What <key>.json holds. Every sample has every field; nothing is null, and nothing is empty.",
         **_object({**own, **added}),
@@ -51,7 +51,7 @@ def validator_of(schema: str) -> Validator:
 
 def schema_faults(validator: Validator, record: Any) -> Iterator[str]:
     """What of a record is not as the schema says, a sentence each, a few at most."""
-    for _, error in zip(range(LISTED_FAULTS), validator.iter_errors(record), strict=False):
+    for _, error in zip(range(MAX_FAULTS_LISTED), validator.iter_errors(record), strict=False):
         place = error.json_path.removeprefix("$").removeprefix(".")
         yield f"its json is not as schema.json says: {place or 'the whole'}: {error.message[:200]}"
 

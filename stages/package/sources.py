@@ -8,21 +8,21 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-SPANS = ("parts", "contacts", "cycles")
+RANGES = ("parts", "contacts", "cycles")
 """The columns of the index of which a card tells least, median and most."""
 
 
 class SourceTally:
     """Rows of the index of one kit or program, counted.
 
-    samples; rooted, stable: so many of them are; spans: how often each number stands in each of the columns `SPANS`.
+    samples; rooted, stable: so many of them are; spans: how often each number stands in each of the columns `RANGES`.
     """
 
     def __init__(self) -> None:
         self.samples = 0
         self.rooted = 0
         self.stable = 0
-        self.spans: dict[str, Counter[int]] = {name: Counter() for name in SPANS}
+        self.spans: dict[str, Counter[int]] = {name: Counter() for name in RANGES}
         self._graphs = array("Q")
 
     def add(self, row: Mapping[str, Any]) -> None:
@@ -44,7 +44,7 @@ class SourceTally:
         return len(np.unique(np.frombuffer(self._graphs, dtype=np.uint64))) if self._graphs else 0
 
     def span(self, name: str) -> str:
-        """`least / median / most` of a column of `SPANS`, or `-` where there is no row."""
+        """`least / median / most` of a column of `RANGES`, or `-` where there is no row."""
         counts = sorted(self.spans[name].items())
         if not counts:
             return "-"

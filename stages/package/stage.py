@@ -10,14 +10,14 @@ from typing import Any
 from pipeline.config import Config
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.package.compose import compose_dataset
-from stages.package.described import described_members
 from stages.package.layout import CARD, CHECKSUMS, CLASSES, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
-from stages.package.made_with import code_version, library_versions
 from stages.package.manifest import config_sections
+from stages.package.member_descriptions import describe_members
 from stages.package.merge import merge_shard
 from stages.package.preview import draw_preview
 from stages.package.schema import record_schema
 from stages.package.settings import PackageConfig
+from stages.package.versions import code_version, library_versions
 from stages.shape.collection.declared import language_of, member_modules, members, producers
 from stages.shape.collection.origin import unstated
 from stages.shape.collection.shards import (
@@ -31,9 +31,9 @@ from stages.shape.collection.shards import (
 from stages.shape.views.probe import check_backend
 from stages.sketches.settings import SketchesConfig
 
-WHOLE = "dataset"
-PICTURE = "preview"
-PICTURE_SHARDS = 8
+DATASET_SHARD = "dataset"
+PREVIEW_SHARD = "preview"
+MAX_PREVIEW_SHARDS = 8
 """The preview picture chooses from the samples of at most so many shards."""
 
 
@@ -51,7 +51,7 @@ def plan(plan: Plan) -> list[Shard]:
     if not filled:
         return merged
     read = language_of(producer).reads(plan)
-    shown = [shard["name"] for shard in filled[:PICTURE_SHARDS]]
+    shown = [shard["name"] for shard in filled[:MAX_PREVIEW_SHARDS]]
     rows = [stage for stage, each in members().items() if each.row and shown[0] in plan.shards(stage)]
     pictured = {
         "producer": producer,
@@ -61,7 +61,7 @@ def plan(plan: Plan) -> list[Shard]:
         "rows": rows,
     }
     drawn = (*read, *(f"{stage}/{name}" for name in shown for stage in (producer, *rows)))
-    picture = Shard(PICTURE, pictured, drawn, member_modules())
+    picture = Shard(PREVIEW_SHARD, pictured, drawn, member_modules())
     declared, language = producers()[producer], language_of(producer)
     origins = declared.origins(plan)
     params = {
@@ -69,7 +69,7 @@ def plan(plan: Plan) -> list[Shard]:
         "producer": producer,
         "sections": config_sections(plan.config),
         "shards": filled,
-        "members": described_members(plan.config, filled[0]["members"], language),
+        "members": describe_members(plan.config, filled[0]["members"], language),
         "schema": record_schema(plan.config, producer, merged[0].params["stages"]),
         "apart": declared.apart,
         "story": {
@@ -83,12 +83,12 @@ def plan(plan: Plan) -> list[Shard]:
             "unstated": unstated(origins),
         },
         "measures": dict(declared.measures(plan)),
-        "preview": PICTURE,
+        "preview": PREVIEW_SHARD,
         "made_with": {"shapemill": code_version(), "libraries": library_versions()},
         "origins": [asdict(each) for each in origins],
     }
-    inputs = (*read, *(f"package/{shard['name']}" for shard in filled), f"package/{PICTURE}")
-    return [*merged, picture, Shard(WHOLE, params, inputs, member_modules())]
+    inputs = (*read, *(f"package/{shard['name']}" for shard in filled), f"package/{PREVIEW_SHARD}")
+    return [*merged, picture, Shard(DATASET_SHARD, params, inputs, member_modules())]
 
 
 def _merged(plan: Plan) -> list[Shard]:
@@ -105,9 +105,9 @@ def _merged(plan: Plan) -> list[Shard]:
 
 def run_shard(task: Task) -> Outcome:
     """Make one shard of the plan."""
-    if task.shard.name == WHOLE:
+    if task.shard.name == DATASET_SHARD:
         return compose_dataset(task)
-    if task.shard.name == PICTURE:
+    if task.shard.name == PREVIEW_SHARD:
         return draw_preview(task)
     return merge_shard(task)
 
@@ -115,11 +115,13 @@ def run_shard(task: Task) -> Outcome:
 def publish(plan: Plan) -> Mapping[str, str]:
     """The dataset's folder and the index beside it, by the files of the shards; nothing where no sample is left."""
     name = plan.config.name
-    if WHOLE not in plan.shards("package"):
+    if DATASET_SHARD not in plan.shards("package"):
         return {}
-    files = {f"{name}/{file}": f"{WHOLE}.{file}" for file in (CARD, CROISSANT, SCHEMA, CLASSES, MANIFEST, CHECKSUMS)}
-    files[f"{name}/{PREVIEW}"] = f"{PICTURE}.png"
-    files[index_path(plan.config)] = f"{WHOLE}.parquet"
+    files = {
+        f"{name}/{file}": f"{DATASET_SHARD}.{file}" for file in (CARD, CROISSANT, SCHEMA, CLASSES, MANIFEST, CHECKSUMS)
+    }
+    files[f"{name}/{PREVIEW}"] = f"{PREVIEW_SHARD}.png"
+    files[index_path(plan.config)] = f"{DATASET_SHARD}.parquet"
     for shard in plan.shards("package"):
         summary = plan.summary("package", shard)
         if summary is not None and summary.get("path") and summary["samples"]:
@@ -129,8 +131,8 @@ def publish(plan: Plan) -> Mapping[str, str]:
 
 def report(plan: Plan) -> Sequence[str]:
     """What the finished dataset holds."""
-    drawn = plan.summary("package", PICTURE)
-    if drawn is None or plan.summary("package", WHOLE) is None:
+    drawn = plan.summary("package", PREVIEW_SHARD)
+    if drawn is None or plan.summary("package", DATASET_SHARD) is None:
         return []
     summaries = [plan.summary("package", shard) or {} for shard in plan.shards("package")]
     shards = [summary for summary in summaries if summary.get("path")]
@@ -141,7 +143,7 @@ def report(plan: Plan) -> Sequence[str]:
     ]
 
 
-def check_machine(config: Config) -> None:
+def check_environment(config: Config) -> None:
     """Raises ConfigError where the backend that draws sketches and preview cannot draw."""
     check_backend(config.section(SketchesConfig).backend, f"{config.path}: sketches.backend")
 
@@ -186,5 +188,5 @@ STAGE = Stage(
     report=report,
     publish=publish,
     check=check_producers,
-    check_environment=check_machine,
+    check_environment=check_environment,
 )

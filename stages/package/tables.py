@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from stages.package.layout import CLASSES
-from stages.package.sources import SPANS, SourceTally
+from stages.package.sources import RANGES, SourceTally
 
-LISTED_CLASSES = 60
+MAX_CLASSES_LISTED = 60
 """So many classes at most stand in the card."""
 
 
@@ -30,10 +30,10 @@ def class_table(classes: Sequence[Mapping[str, Any]], splits: Sequence[str]) -> 
         "| class | label | of | color | shapes | parts |",
         "| ---: | --- | --- | --- | ---: | ---: |",
     ]
-    for each in classes[:LISTED_CLASSES]:
+    for each in classes[:MAX_CLASSES_LISTED]:
         counts = (" / ".join(f"{each[what][split]:,}" for split in splits) for what in ("shapes", "parts"))
         lines.append(f"| {each['id']} | {each['name']} | {each['kit']} | `{each['color']}` | {' | '.join(counts)} |")
-    more = len(classes) - LISTED_CLASSES
+    more = len(classes) - MAX_CLASSES_LISTED
     return "\n".join([*lines, *([f"\nAnd {more:,} more."] if more > 0 else [])])
 
 
@@ -45,7 +45,7 @@ def source_table(sources: Mapping[str, str], tallies: Mapping[str, SourceTally])
     ]
     for name, described in sources.items():
         own = tallies[name]
-        spans = " | ".join(own.span(each) for each in SPANS)
+        spans = " | ".join(own.span(each) for each in RANGES)
         title = f"{name} ({described})" if described else name
         shares = " | ".join(f"{count / own.samples:.1%}" for count in (own.rooted, own.stable))
         lines.append(f"| {title} | {own.samples:,} | {own.structures:,} | {spans} | {shares} |")

@@ -21,10 +21,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.chaos.arena import Arena
-from tests.chaos.arenas import ARENAS, arena_in
-from tests.chaos.blows import BLOWS
+from tests.chaos.faults import BLOWS
 from tests.chaos.rounds import play
+from tests.chaos.sandbox import Sandbox
+from tests.chaos.sandboxes import ARENAS, sandbox_in
 from tests.chaos.tally import Tally
 
 DISK = "96m"
@@ -74,14 +74,14 @@ def _rounds(said: argparse.Namespace, below: Path, small_disk: bool) -> int:
     kinds = {name: BLOWS[name] for name in said.only if small_disk or not BLOWS[name].needs_disk}
     for name in sorted({*said.only} - {*kinds}):
         print(f"without the blow '{name}': this machine lets nobody mount a small disk", flush=True)
-    arenas: dict[str, Arena] = {}
+    arenas: dict[str, Sandbox] = {}
     tally = Tally()
     for number in range(said.first, said.first + said.rounds):
         rng = np.random.default_rng((said.seed, number))
         place, name = said.arena[rng.integers(len(said.arena))], sorted(kinds)[rng.integers(len(kinds))]
         start = time.monotonic()
         if place not in arenas:
-            arenas[place] = arena_in(below / place, place)
+            arenas[place] = sandbox_in(below / place, place)
             _say(f"{place}: {len(arenas[place].calm)} files, undisturbed", start)
             start = time.monotonic()
         try:

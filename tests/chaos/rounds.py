@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.chaos.arena import Arena, Step
-from tests.chaos.arenas import damaged
-from tests.chaos.blows import Blow, Struck
+from tests.chaos.faults import Fault, InjectedFault
 from tests.chaos.running import Run
+from tests.chaos.sandbox import Sandbox, Step
+from tests.chaos.sandboxes import damaged
 
 _EARLY = 0.08
 """Share of the blows that come while the run still starts."""
@@ -33,7 +33,7 @@ class Ended:
     words: str
 
 
-def play(arena: Arena, blow: Blow, rng: np.random.Generator) -> Ended:
+def play(arena: Sandbox, blow: Fault, rng: np.random.Generator) -> Ended:
     """One round. Raises AssertionError where it did not go as it must."""
     first, taken = _take_away(arena, rng)
     steps = arena.steps[arena.steps.index(first) :]
@@ -43,7 +43,7 @@ def play(arena: Arena, blow: Blow, rng: np.random.Generator) -> Ended:
     before = arena.written()
     run = arena.start(steps, *blow.options, prepare=blow.prepare)
     in_time = _moment_comes(arena, run, before, taken, blow, rng)
-    struck = blow.strike(arena, run, rng) if in_time else Struck("the run was over before", hit=False)
+    struck = blow.strike(arena, run, rng) if in_time else InjectedFault("the run was over before", hit=False)
     try:
         code = run.end()
     finally:
@@ -56,7 +56,7 @@ def play(arena: Arena, blow: Blow, rng: np.random.Generator) -> Ended:
     return Ended(how, code, words)
 
 
-def _take_away(arena: Arena, rng: np.random.Generator) -> tuple[Step, int]:
+def _take_away(arena: Sandbox, rng: np.random.Generator) -> tuple[Step, int]:
     """Take away some shards of a random stage and of one after it, now and then everything; the stage from which on
     there is work, and how many shards are gone."""
     if rng.random() < _ANEW or not all(arena.shards(step) for step in arena.steps):
@@ -73,7 +73,7 @@ def _take_away(arena: Arena, rng: np.random.Generator) -> tuple[Step, int]:
 
 
 def _moment_comes(
-    arena: Arena, run: Run, before: Mapping[Path, int], taken: int, blow: Blow, rng: np.random.Generator
+    arena: Sandbox, run: Run, before: Mapping[Path, int], taken: int, blow: Fault, rng: np.random.Generator
 ) -> bool:
     """Wait until the blow is to come: while the run starts, or when so many of the `taken` shards have records again
     and the next is in the making. False where the run was over before."""
@@ -91,7 +91,7 @@ def _moment_comes(
     return run.wait(lambda: time.monotonic() >= moment)
 
 
-def _check(run: Run, struck: Struck, code: int, blow: Blow, arena: Arena) -> None:
+def _check(run: Run, struck: InjectedFault, code: int, blow: Fault, arena: Sandbox) -> None:
     said = run.said()
     assert code in blow.codes or _set_aside(blow, code, said), f"{struck.words}: ended with {code}: {said[-2000:]}"
     _check_words(struck, said)
@@ -106,17 +106,17 @@ def _check(run: Run, struck: Struck, code: int, blow: Blow, arena: Arena) -> Non
         assert not half, f"{struck.words}: half written under a final name: {half[:5]}"
 
 
-def _set_aside(blow: Blow, code: int, said: str) -> bool:
+def _set_aside(blow: Fault, code: int, said: str) -> bool:
     """Whether a shard was set aside for want of progress: on a busy machine others are too slow as well."""
     return code == 1 and bool(blow.options) and "it made no progress" in said
 
 
-def _check_words(struck: Struck, said: str) -> None:
+def _check_words(struck: InjectedFault, said: str) -> None:
     traced = "Traceback" in said and "KeyboardInterrupt" not in said
     assert not traced, f"{struck.words}: a traceback: {said[-3000:]}"
 
 
-def _check_next(arena: Arena, struck: Struck) -> None:
+def _check_next(arena: Sandbox, struck: InjectedFault) -> None:
     """The next run must make what an undisturbed one has made. A spoilt file that no stage reads again is found by
     `make verify` alone, after which the next run mends it."""
     again = arena.start(arena.steps)

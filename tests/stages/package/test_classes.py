@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from stages.package.classes import ClassTally, counted_classes, table_bytes
-from stages.package.tables import LISTED_CLASSES, class_table
+from stages.package.classes import ClassTally, count_classes, table_bytes
+from stages.package.tables import MAX_CLASSES_LISTED, class_table
 from stages.shape.collection.classes import Classes
 from stages.shape.collection.language import Source
 from stages.shape.kit import Assembly, PartMesh
@@ -36,7 +36,7 @@ def tally(*legs: int) -> dict[str, dict[str, Any]]:
 
 
 def test_shapes_and_parts_are_added_up_by_split() -> None:
-    table = counted_classes(CLASSES, [("train", tally(3, 4)), ("train", tally(3)), ("test", tally(5))])
+    table = count_classes(CLASSES, [("train", tally(3, 4)), ("train", tally(3)), ("test", tally(5))])
     assert [(each["shapes"], each["parts"]) for each in table] == [
         ({"train": 3, "test": 1}, {"train": 10, "test": 5}),
         ({"train": 3, "test": 1}, {"train": 3, "test": 1}),
@@ -46,12 +46,12 @@ def test_shapes_and_parts_are_added_up_by_split() -> None:
 
 
 def test_a_class_has_the_colour_of_its_source_or_of_its_first_part() -> None:
-    table = counted_classes(CLASSES, [("train", tally(3))])
+    table = count_classes(CLASSES, [("train", tally(3))])
     assert [each["color"] for each in table] == ["#966432", "#00c800", "#a0a0a0", "#0102ff"]
 
 
 def test_the_table_is_json_with_a_line_for_each_class() -> None:
-    table = counted_classes(CLASSES, [("train", tally(3))])
+    table = count_classes(CLASSES, [("train", tally(3))])
     content = table_bytes(table)
     assert json.loads(content) == table
     assert len(content.splitlines()) == len(table)
@@ -59,7 +59,7 @@ def test_the_table_is_json_with_a_line_for_each_class() -> None:
 
 def test_a_card_lists_the_first_of_very_many_classes_and_counts_the_others() -> None:
     many = Classes.of({"words": Source(tuple(f"word{number}" for number in range(1500)))})
-    text = class_table(counted_classes(many, [("train", {})]), ["train"])
-    assert f"| {LISTED_CLASSES - 1} | word{LISTED_CLASSES - 1} |" in text
-    assert f"word{LISTED_CLASSES} " not in text
+    text = class_table(count_classes(many, [("train", {})]), ["train"])
+    assert f"| {MAX_CLASSES_LISTED - 1} | word{MAX_CLASSES_LISTED - 1} |" in text
+    assert f"word{MAX_CLASSES_LISTED} " not in text
     assert "And 1,440 more." in text

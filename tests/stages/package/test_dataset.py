@@ -19,9 +19,9 @@ import yaml
 from pipeline.paths import DatasetPaths, file_digest
 from pipeline.run import run_stage
 from pipeline.shards import bytes_array, read_shard
-from stages.package.verify_samples import empty_values
 from stages.shape.collection.pairs import pairs_of
 from stages.shape.geometry.pose import invert, transform_points
+from stages.verification.samples import empty_values
 from tests.stages.package.toy import (
     REFUSED,
     SPLITS,

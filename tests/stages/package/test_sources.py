@@ -9,7 +9,7 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
-from stages.package.index import GROUP, column_kinds, write_index
+from stages.package.index import ROWS_PER_GROUP, column_kinds, write_index
 from stages.package.sources import SourceTally
 
 
@@ -40,15 +40,15 @@ def test_the_index_holds_a_group_of_rows_at_a_time() -> None:
 
     def rows() -> Iterator[Row]:
         nonlocal most
-        for number in range(2 * GROUP + 2):
+        for number in range(2 * ROWS_PER_GROUP + 2):
             alive[number] = fresh = row(number)
             most = max(most, len(alive) if number % 1000 == 0 else 0)
             yield fresh
 
     written, tallies = io.BytesIO(), dict[str, SourceTally]()
     write_index(SourceTally.tallied(rows(), tallies), written)
-    assert most <= GROUP + 2
+    assert most <= ROWS_PER_GROUP + 2
     read = pq.ParquetFile(written)
-    assert [read.metadata.row_group(group).num_rows for group in range(3)] == [GROUP, GROUP, 2]
-    assert read.read(["key"])["key"].to_pylist() == [f"k{number}" for number in range(2 * GROUP + 2)]
-    assert tallies["toy"].samples == 2 * GROUP + 2
+    assert [read.metadata.row_group(group).num_rows for group in range(3)] == [ROWS_PER_GROUP, ROWS_PER_GROUP, 2]
+    assert read.read(["key"])["key"].to_pylist() == [f"k{number}" for number in range(2 * ROWS_PER_GROUP + 2)]
+    assert tallies["toy"].samples == 2 * ROWS_PER_GROUP + 2

@@ -15,10 +15,10 @@ import yaml
 
 from pipeline.paths import DatasetPaths
 from pipeline.shards import bytes_array
-from stages.package.verify_samples import read_packaged, read_record, sample_faults
-from stages.package.verify_shard import shard_samples
 from stages.programs.language import LANGUAGE
 from stages.shapeassembly import execute, parse
+from stages.verification.samples import read_packaged, read_record, sample_faults
+from stages.verification.shard import shard_samples
 from tests.command import shapemill
 from tests.stated import stated
 

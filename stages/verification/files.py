@@ -13,13 +13,13 @@ from jsonschema.exceptions import best_match
 
 from pipeline.paths import file_digest
 from stages.package.croissant import INDEX
-from stages.package.findings import Findings
 from stages.package.layout import CHECKSUMS, CLASSES, CROISSANT, MANIFEST, SCHEMA
+from stages.verification.findings import Findings
 
-Row = tuple[str, str, str, str, str]
+SampleRow = tuple[str, str, str, str, str]
 """Key, shard, split, kit and graph of a sample."""
 
-Tally = Counter[tuple[str, str, str]]
+ClassCounts = Counter[tuple[str, str, str]]
 """How many `shapes` and `parts` of a split have a class, by these three."""
 
 _COUNTS = {"type": "object", "additionalProperties": {"type": "integer", "minimum": 0}}
@@ -32,7 +32,7 @@ def _object(properties: Mapping[str, Any]) -> dict[str, Any]:
     return {"type": "object", "properties": dict(properties), "required": list(properties)}
 
 
-NEEDED = _object(
+MANIFEST_SCHEMA = _object(
     {
         "samples": {"type": "integer", "minimum": 1},
         "splits": _COUNTS,
@@ -55,7 +55,7 @@ def check_files(folder: Path, findings: Findings) -> tuple[dict[str, Any], set[s
     manifest = read_document(folder / MANIFEST, findings)
     if manifest is None:
         return None
-    error = best_match(Draft202012Validator(NEEDED).iter_errors(manifest))
+    error = best_match(Draft202012Validator(MANIFEST_SCHEMA).iter_errors(manifest))
     if error is not None:
         findings.fault("manifest", MANIFEST, f"cannot be meant: {error.json_path}: {error.message}")
         return None
@@ -91,7 +91,7 @@ def read_schema(folder: Path, findings: Findings) -> str:
     return json.dumps(document)
 
 
-def check_splits(manifest: Mapping[str, Any], rows: Sequence[Row], findings: Findings) -> None:
+def check_splits(manifest: Mapping[str, Any], rows: Sequence[SampleRow], findings: Findings) -> None:
     """Keys stand once, graphs in one split where the dataset says so, and the counts of the splits are right. `rows`:
     what `check_shard` answers for each sample of each whole shard."""
     seen: dict[str, str] = {}
@@ -111,7 +111,7 @@ def check_splits(manifest: Mapping[str, Any], rows: Sequence[Row], findings: Fin
             findings.fault("splits", MANIFEST, f"counts {samples} samples of {split}, the shards have {found}")
 
 
-def check_classes(folder: Path, tally: Tally, findings: Findings) -> None:
+def check_classes(folder: Path, tally: ClassCounts, findings: Findings) -> None:
     """`classes.json` counts as many shapes and parts of each class in each split as the samples have."""
     try:
         listed = json.loads((folder / CLASSES).read_bytes())

@@ -10,7 +10,7 @@ from stages.shape.collection.declared import members
 from stages.shape.collection.language import Language
 from stages.shape.collection.members import TEXT, Member
 
-OWN = (
+OWN_MEMBERS = (
     Member(
         "glb",
         "The mesh: glTF 2.0, one node a part, named by its label (`tower.000`), equal parts sharing one mesh. Node "
@@ -24,13 +24,13 @@ OWN = (
 )
 
 
-def described_members(config: Config, names: Sequence[str], language: Language) -> list[dict[str, Any]]:
+def describe_members(config: Config, names: Sequence[str], language: Language) -> list[dict[str, Any]]:
     """Name, sentence, dtype and shape of each member that samples in `language` have, as JSON.
 
     Raises ValueError for a member that nobody declares.
     """
     declared = {each.name: each for stage in members().values() for each in stage.of(config)}
-    declared |= {each.name: each for each in OWN}
+    declared |= {each.name: each for each in OWN_MEMBERS}
     if not language.graphs:
         declared[TEXT] = Member(TEXT, language.text)
     unknown = [name for name in names if name not in declared]

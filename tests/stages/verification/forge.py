@@ -1,6 +1,6 @@
 """A forger: changes one thing in a finished dataset and makes every checksum, offset and count anew.
 
-    python -m tests.stages.package.forge datasets/castle --count 30 --seed 0
+    python -m tests.stages.verification.forge datasets/castle --count 30 --seed 0
 
 copies the dataset beside what `make verify` needs of the mill's folder, applies each forgery to a sample chosen at
 random, verifies the copy, and says what was found. `--with-work` leaves what all stages made beside the copy.
@@ -26,10 +26,10 @@ from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes
 from stages.package.croissant import INDEX
 from stages.package.index import index_row, tar_bytes, write_index
 from stages.package.manifest import checksums
-from stages.package.verify import verify_dataset
-from stages.package.verify_shard import shard_samples
 from stages.shape.collection.pairs import CONTACTS, pair_bytes, pairs_of
 from stages.shape.physics.stability import components
+from stages.verification.shard import shard_samples
+from stages.verification.verify import verify_dataset
 
 Members = dict[str, bytes]
 

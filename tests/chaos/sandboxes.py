@@ -11,7 +11,7 @@ from pipeline.config import load_config
 from pipeline.integrity import corrupted_shards
 from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
-from tests.chaos.arena import Arena, Step
+from tests.chaos.sandbox import Sandbox, Step
 from tests.stated import stated
 
 
@@ -146,11 +146,11 @@ ARENAS: dict[str, Datasets] = {
 }
 
 
-def arena_in(folder: Path, name: str) -> Arena:
+def sandbox_in(folder: Path, name: str) -> Sandbox:
     """The datasets of an arena made undisturbed in `folder`. Raises AssertionError where a stage has nothing to do."""
     wanted = ARENAS[name]
     steps: list[Step] = [(dataset, stage) for dataset, (stages, _) in wanted.made.items() for stage in stages]
-    arena = Arena(folder, name, steps, {dataset: sections for dataset, (_, sections) in wanted.made.items()})
+    arena = Sandbox(folder, name, steps, {dataset: sections for dataset, (_, sections) in wanted.made.items()})
     arena.edited = wanted.edited
     arena.settle()
     idle = [step for step in steps if not arena.shards(step)]
@@ -158,7 +158,7 @@ def arena_in(folder: Path, name: str) -> Arena:
     return arena
 
 
-def damaged(arena: Arena) -> list[str]:
+def damaged(arena: Sandbox) -> list[str]:
     """What the mill's part of `make verify` finds; it withdraws the records of what is damaged."""
     stages = find_stages()
     found = []

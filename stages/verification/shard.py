@@ -14,11 +14,14 @@ from typing import Any
 
 from pipeline.paths import DatasetPaths
 from pipeline.shards import read_shard
-from stages.package.findings import Findings
 from stages.package.index import index_row, tar_bytes
 from stages.package.schema import schema_faults, validator_of
-from stages.package.verify_files import Row, Tally
-from stages.package.verify_samples import (
+from stages.shape.collection.declared import audits, languages
+from stages.shape.collection.declared import members as declared_members
+from stages.shape.collection.packaged import Packaged
+from stages.verification.files import ClassCounts, SampleRow
+from stages.verification.findings import Findings
+from stages.verification.samples import (
     SampleError,
     array_faults,
     read_packaged,
@@ -26,9 +29,6 @@ from stages.package.verify_samples import (
     record_faults,
     sample_faults,
 )
-from stages.shape.collection.declared import audits, languages
-from stages.shape.collection.declared import members as declared_members
-from stages.shape.collection.packaged import Packaged
 
 
 def check_shard(
@@ -38,13 +38,13 @@ def check_shard(
     schema: str,
     index: Path | None,
     anew: Collection[int],
-) -> tuple[Findings, list[Row], Tally]:
+) -> tuple[Findings, list[SampleRow], ClassCounts]:
     """What is found in one whole shard of the dataset in `folder`, and what all its samples together are held against.
 
     shard: its entry in the manifest; schema: of the records, as JSON; index: the index, if it can be read; anew: the
     places of the samples that are held against what they were made from by other means, which takes long.
     """
-    findings, rows, tally, path = Findings(), list[Row](), Tally(), str(shard["path"])
+    findings, rows, tally, path = Findings(), list[SampleRow](), ClassCounts(), str(shard["path"])
     places = DatasetPaths(folder.resolve().parent, folder.resolve().name)
     spoken = {name: each.anew(places) for name, each in languages().items()}
     validator = validator_of(schema)
@@ -122,7 +122,7 @@ def _faults(sample: Packaged, manifest: Mapping[str, Any], places: DatasetPaths 
         yield "samples", f"its json cannot be meant: {type(error).__name__}: {error}"
 
 
-def _classes_of(record: Mapping[str, Any], split: str) -> Tally:
+def _classes_of(record: Mapping[str, Any], split: str) -> ClassCounts:
     """How many parts of each class a record lists, and that it is one shape with them."""
     parts = record.get("parts")
     listed = [each["class"] for each in parts if isinstance(each, dict) and "class" in each] if parts else []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-LISTED = 20
+MAX_FAULTS_PRINTED = 20
 """So many faults of one check are printed."""
 
 
@@ -47,7 +47,7 @@ class Findings:
             lines.append(f"  {check:<15}{self.checked.get(check, 0):>9,} looked at   {verdict}")
         lines += [f"  not looked at: {count:,} samples: {why}" for why, count in self.skipped.items()]
         for check, faults in self.faults.items():
-            lines += [f"{check}: {fault}" for fault in faults[:LISTED]]
-            if len(faults) > LISTED:
-                lines.append(f"{check}: and {len(faults) - LISTED} more")
+            lines += [f"{check}: {fault}" for fault in faults[:MAX_FAULTS_PRINTED]]
+            if len(faults) > MAX_FAULTS_PRINTED:
+                lines.append(f"{check}: and {len(faults) - MAX_FAULTS_PRINTED} more")
         return lines

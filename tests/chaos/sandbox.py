@@ -28,7 +28,7 @@ _DIFFERS = {"seconds", "peak_bytes"}
 
 
 @dataclass
-class Arena:
+class Sandbox:
     """Datasets in `folder`, from the configs that their `sections` say, whose `steps` are run in order, with two
     workers.
 

@@ -11,15 +11,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.records import read_record
-from tests.chaos.arena import Arena
 from tests.chaos.running import Run, seconds_of
+from tests.chaos.sandbox import Sandbox
 
-PATIENCE = "0.3"
+STALL_MINUTES = "0.3"
 """Minutes in the rounds where a worker is stopped."""
 
 
 @dataclass
-class Struck:
+class InjectedFault:
     """What a blow has done: in words; whether there was anything to strike; files that it has spoilt itself, below
     `out`; what has to be put right again when the run has ended; and the code and the words of another run that it has
     started."""
@@ -32,14 +32,14 @@ class Struck:
 
 
 @dataclass(frozen=True)
-class Blow:
+class Fault:
     """A kind of blow: how it strikes, with which codes the run may end, and which options and config it runs with.
 
     words: what the run must have said that ended with a code. needs_worker: it is about a worker, so it comes when
     there is one. needs_disk: `out` is on a small disk of its own.
     """
 
-    strike: Callable[[Arena, Run, np.random.Generator], Struck]
+    strike: Callable[[Sandbox, Run, np.random.Generator], InjectedFault]
     codes: frozenset[int]
     options: tuple[str, ...] = ()
     words: Mapping[int, str] = field(default_factory=lambda: {3: "stopped: "})
@@ -54,35 +54,35 @@ _BEGUN = 1.5
 promised before."""
 
 
-def _signal_worker(run: Run, rng: np.random.Generator, number: int, least: float = 0.0) -> Struck:
+def _signal_worker(run: Run, rng: np.random.Generator, number: int, least: float = 0.0) -> InjectedFault:
     workers = sorted(pid for pid in run.look() if seconds_of(pid) >= least)
     if not workers:
-        return Struck("no worker there", hit=False)
+        return InjectedFault("no worker there", hit=False)
     pid = workers[rng.integers(len(workers))]
     try:
         os.kill(pid, number)
     except ProcessLookupError:
-        return Struck("the worker was gone", hit=False)
-    return Struck(f"{signal.Signals(number).name} to a worker")
+        return InjectedFault("the worker was gone", hit=False)
+    return InjectedFault(f"{signal.Signals(number).name} to a worker")
 
 
-def kill_worker(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
+def kill_worker(_: Sandbox, run: Run, rng: np.random.Generator) -> InjectedFault:
     return _signal_worker(run, rng, signal.SIGKILL)
 
 
-def stop_worker(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
+def stop_worker(_: Sandbox, run: Run, rng: np.random.Generator) -> InjectedFault:
     return _signal_worker(run, rng, signal.SIGSTOP)
 
 
-def end_driver(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
+def end_driver(_: Sandbox, run: Run, rng: np.random.Generator) -> InjectedFault:
     """Every second time with a worker that was stopped before."""
     number = [signal.SIGKILL, signal.SIGTERM, signal.SIGINT][rng.integers(3)]
     words = _signal_worker(run, rng, signal.SIGSTOP, _BEGUN).words + ", " if rng.random() < 0.5 else ""
     run.process.send_signal(number)
-    return Struck(f"{words}{signal.Signals(number).name} to the driver")
+    return InjectedFault(f"{words}{signal.Signals(number).name} to the driver")
 
 
-def fill_disk(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
+def fill_disk(arena: Sandbox, _: Run, rng: np.random.Generator) -> InjectedFault:
     junk = arena.folder / "junk"
     left = int(rng.integers(0, 60_000))
     with open(junk, "wb") as stream:
@@ -91,14 +91,16 @@ def fill_disk(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
                 os.write(stream.fileno(), b"\0" * 65_536)
         except OSError:
             os.ftruncate(stream.fileno(), max(os.fstat(stream.fileno()).st_size - left, 0))
-    return Struck(f"disk filled but for {left // 1000} kB", put_right=lambda: junk.unlink(missing_ok=True))
+    return InjectedFault(f"disk filled but for {left // 1000} kB", put_right=lambda: junk.unlink(missing_ok=True))
 
 
-def take_rights(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
+def take_rights(arena: Sandbox, _: Run, rng: np.random.Generator) -> InjectedFault:
     folders = [arena.out, *(each for each in arena.out.rglob("*") if each.is_dir())]
     folder = sorted(folders)[rng.integers(len(folders))]
     folder.chmod(0o555)
-    return Struck(f"no right to write in {folder.relative_to(arena.folder)}", put_right=lambda: folder.chmod(0o755))
+    return InjectedFault(
+        f"no right to write in {folder.relative_to(arena.folder)}", put_right=lambda: folder.chmod(0o755)
+    )
 
 
 def _obey_permissions() -> None:
@@ -106,7 +108,7 @@ def _obey_permissions() -> None:
     ctypes.CDLL(None).prctl(24, 1)
 
 
-def spoil_shard(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
+def spoil_shard(arena: Sandbox, _: Run, rng: np.random.Generator) -> InjectedFault:
     """Turn a bit of a file of a finished shard."""
     files = []
     for noted in sorted(arena.written()):
@@ -114,7 +116,7 @@ def spoil_shard(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
         paths = [noted.parents[1] / file for file in sorted(record.files)] if record else []
         files += [path for path in paths if path.is_file() and path.stat().st_size]
     if not files:
-        return Struck("no shard there", hit=False)
+        return InjectedFault("no shard there", hit=False)
     path = files[rng.integers(len(files))]
     place = int(rng.integers(path.stat().st_size))
     with open(path, "r+b") as stream:
@@ -123,42 +125,44 @@ def spoil_shard(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
         stream.seek(place)
         stream.write(bytes([byte]))
     linked = [each for each in arena.out.rglob("*") if each.is_file() and each.samefile(path)]
-    return Struck(
+    return InjectedFault(
         f"a bit of {path.relative_to(arena.work)}", spoilt={str(each.relative_to(arena.out)) for each in linked}
     )
 
 
-def cut_record(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
+def cut_record(arena: Sandbox, _: Run, rng: np.random.Generator) -> InjectedFault:
     paths = sorted(arena.written())
     if not paths:
-        return Struck("no record there", hit=False)
+        return InjectedFault("no record there", hit=False)
     path = paths[rng.integers(len(paths))]
     size = int(rng.integers(path.stat().st_size))
     os.truncate(path, size)
-    return Struck(f"{path.relative_to(arena.work)} cut to {size} bytes", spoilt={str(path.relative_to(arena.out))})
+    return InjectedFault(
+        f"{path.relative_to(arena.work)} cut to {size} bytes", spoilt={str(path.relative_to(arena.out))}
+    )
 
 
-def edit_config(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
+def edit_config(_: Sandbox, run: Run, rng: np.random.Generator) -> InjectedFault:
     """The run is of an edited config already; it is killed, or comes to its end."""
     if rng.random() < 0.5:
         run.process.kill()
-    return Struck("a run with an edited config, then back")
+    return InjectedFault("a run with an edited config, then back")
 
 
-def second_run(arena: Arena, run: Run, _: np.random.Generator) -> Struck:
+def second_run(arena: Sandbox, run: Run, _: np.random.Generator) -> InjectedFault:
     other = arena.start(arena.steps)
-    return Struck("a second run", other=(other.end(), other.said()))
+    return InjectedFault("a second run", other=(other.end(), other.said()))
 
 
-BLOWS: dict[str, Blow] = {
-    "kill a worker": Blow(kill_worker, frozenset({0}), needs_worker=True),
-    "stop a worker": Blow(stop_worker, frozenset({0}), ("--patience", PATIENCE), needs_worker=True),
-    "end the driver": Blow(end_driver, frozenset({0, -9, -2, -15, 130, 143})),
-    "fill the disk": Blow(fill_disk, frozenset({0, 2, 3}), needs_disk=True),
-    "take rights": Blow(take_rights, frozenset({0, 3}), prepare=_obey_permissions),
-    "spoil a finished shard": Blow(spoil_shard, frozenset({0})),
+BLOWS: dict[str, Fault] = {
+    "kill a worker": Fault(kill_worker, frozenset({0}), needs_worker=True),
+    "stop a worker": Fault(stop_worker, frozenset({0}), ("--patience", STALL_MINUTES), needs_worker=True),
+    "end the driver": Fault(end_driver, frozenset({0, -9, -2, -15, 130, 143})),
+    "fill the disk": Fault(fill_disk, frozenset({0, 2, 3}), needs_disk=True),
+    "take rights": Fault(take_rights, frozenset({0, 3}), prepare=_obey_permissions),
+    "spoil a finished shard": Fault(spoil_shard, frozenset({0})),
     # cut after its own stage has looked at it and before the one that reads it begins
-    "cut a record": Blow(cut_record, frozenset({0, 2}), words={2: "shards are not made (the first is "}),
-    "edit the config": Blow(edit_config, frozenset({0, -9}), edited=True),
-    "a second run": Blow(second_run, frozenset({0, 2})),
+    "cut a record": Fault(cut_record, frozenset({0, 2}), words={2: "shards are not made (the first is "}),
+    "edit the config": Fault(edit_config, frozenset({0, -9}), edited=True),
+    "a second run": Fault(second_run, frozenset({0, 2})),
 }

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from stages.package.made_with import code_version, library_versions
+from stages.package.versions import code_version, library_versions
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -18,7 +18,7 @@ def test_the_code_version_is_a_function_of_the_code_alone(tmp_path: Path) -> Non
     for name in ("pipeline", "stages"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
-    ask = [sys.executable, "-c", "from stages.package.made_with import code_version; print(code_version(), end='')"]
+    ask = [sys.executable, "-c", "from stages.package.versions import code_version; print(code_version(), end='')"]
 
     def copied() -> str:
         return subprocess.run(ask, cwd=tmp_path, capture_output=True, text=True, check=True).stdout

@@ -1,7 +1,7 @@
 """`make verify`: is a finished dataset what it says it is?
 
     python -m pipeline verify --config configs/castle.yaml --out datasets
-    python -m stages.package.verify datasets/castle
+    python -m stages.verification.verify datasets/castle
 
 Files: checksums, listings, index, splits, foreign and missing files. Every sample: members, arrays, record, mesh and
 points against what its record says it is, and against what the stages made, where the mill's folder is still there.
@@ -21,10 +21,18 @@ import numpy as np
 
 from pipeline.randomness import decision_rng
 from pipeline.yaml_loader import read_yaml
-from stages.package.findings import Findings
 from stages.package.layout import MANIFEST
-from stages.package.verify_files import Row, Tally, check_classes, check_files, check_index, check_splits, read_schema
-from stages.package.verify_shard import check_shard
+from stages.verification.files import (
+    ClassCounts,
+    SampleRow,
+    check_classes,
+    check_files,
+    check_index,
+    check_splits,
+    read_schema,
+)
+from stages.verification.findings import Findings
+from stages.verification.shard import check_shard
 
 
 def main(argv: Sequence[str]) -> int:
@@ -60,8 +68,8 @@ def verify_dataset(folder: Path, samples: int | None, seed: int, workers: int = 
             anew = {each - first for each in chosen if first <= each < first + shard["samples"]}
             work.append((folder, shard, manifest, schema, index, anew))
         first += shard["samples"]
-    rows: list[Row] = []
-    tally: Tally = Tally()
+    rows: list[SampleRow] = []
+    tally: ClassCounts = ClassCounts()
     for found, of_shard, of_classes in _side_by_side(work, workers):
         findings.add(found)
         rows += of_shard
@@ -72,7 +80,9 @@ def verify_dataset(folder: Path, samples: int | None, seed: int, workers: int = 
     return findings
 
 
-def _side_by_side(work: Sequence[tuple[Any, ...]], workers: int) -> Iterator[tuple[Findings, list[Row], Tally]]:
+def _side_by_side(
+    work: Sequence[tuple[Any, ...]], workers: int
+) -> Iterator[tuple[Findings, list[SampleRow], ClassCounts]]:
     if workers <= 1:
         yield from (check_shard(*each) for each in work)
         return

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stages.package.verify import main, verify_dataset
-from tests.stages.package.forge import FOLDER_FORGERIES, FORGERIES, copy_dataset, forge
+from stages.verification.verify import main, verify_dataset
+from tests.stages.verification.forge import FOLDER_FORGERIES, FORGERIES, copy_dataset, forge
 
 SHARD = "data/val/toy-1_2_0-val-000002.tar"
 
@@ -193,8 +193,8 @@ def test_a_dataset_without_its_kits_says_what_it_could_not_look_at(
 @pytest.mark.parametrize(("moved", "same"), [(1e-7, True), (1e-4, False)])
 def test_last_digits_of_a_mesh_are_no_fault_and_more_is(toy_folder: Path, moved: float, same: bool) -> None:
     from pipeline.shards import read_shard
-    from stages.package.verify_samples import _same_mesh
-    from tests.stages.package.forge import glb_of, glb_parts
+    from stages.verification.samples import _same_mesh
+    from tests.stages.verification.forge import glb_of, glb_parts
 
     made = next(read_shard(toy_folder / SHARD))[1]["glb"]
     header, binary = glb_parts(made)

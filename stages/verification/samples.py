@@ -21,7 +21,7 @@ from stages.shape.geometry.pose import rounded
 from stages.shape.kit import Assembly
 from stages.shape.shape import Shape
 
-LAST_DIGITS = 1e-6
+ROUNDING_SHARE = 1e-6
 """As a share of the shape's size, so near are positions that are made anew on another processor."""
 
 
@@ -190,7 +190,7 @@ def _same_mesh(found: bytes, made: bytes, size: float) -> bool:
         one, two = (json.loads(each[20 : start - 8]) for each, start in zip((found, made), starts, strict=True))
     except ValueError:
         return False
-    if not _alike(one, two, LAST_DIGITS * size):
+    if not _alike(one, two, ROUNDING_SHARE * size):
         return False
     bodies = [each[start:] for each, start in zip((found, made), starts, strict=True)]
     placed = {accessor["bufferView"] for accessor in two["accessors"] if "min" in accessor}
@@ -201,7 +201,7 @@ def _same_mesh(found: bytes, made: bytes, size: float) -> bool:
             return False
         if number in placed:
             gap = np.frombuffer(stored, "<f4") - np.frombuffer(wanted, "<f4")
-            if not (np.abs(gap) <= LAST_DIGITS * size).all():
+            if not (np.abs(gap) <= ROUNDING_SHARE * size).all():
                 return False
     return True
 
