@@ -190,8 +190,8 @@ def report(plan: Plan) -> Sequence[str]:
         lines.append(f"{kit}: {count:,} of {config.samples_per_kit:,} shapes; refused: {why or 'none'}")
         if count < config.samples_per_kit:
             lines.append(
-                f"warning: {kit} has fewer shapes than wanted; set proportions.apart smaller, or proportions.tries or "
-                "spread larger"
+                f"warning: {kit} has fewer shapes than wanted; set proportions.apart smaller, or "
+                "proportions.tries or spread larger"
             )
     return [*lines, *(f"warning: {sentence}" for sentence in unstated(exemplar_origins(plan.config)))]
 

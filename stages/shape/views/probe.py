@@ -1,4 +1,4 @@
-"""Does a backend draw here? `python -m stages.shape.views.probe raster|egl` renders and checks one triangle."""
+"""Check a renderer: `python -m stages.shape.views.probe raster|egl` renders and checks one triangle."""
 
 from __future__ import annotations
 
