@@ -45,7 +45,7 @@ _NATIVE = {
 """Module to import, and the name under which its version is known."""
 
 _BACKENDS = ("raster", "egl")
-"""What `sketches.backend` may name: the default, which must work, and what a config may ask for."""
+"""What `sketches.renderer` may name: the default, which must work, and what a config may ask for."""
 
 # pyrender looks for NumPy names that are gone; the stages give them back before they import it.
 _PRELUDE = {"pyrender": "import numpy; numpy.infty = numpy.inf; "}
@@ -140,7 +140,7 @@ def _import(module: str) -> Finding:
 
 def _draw(backend: str) -> Finding:
     start = time.perf_counter()
-    code, said = _try([sys.executable, "-m", "stages.shape.views.probe", backend])
+    code, said = _try([sys.executable, "-m", "stages.shape.views.renderer_check", backend])
     if code == 0:
         return Finding(f"draw: {backend}", "ok", f"a triangle in {time.perf_counter() - start:.1f} s by {said}")
     if backend == _BACKENDS[0]:

@@ -20,7 +20,7 @@ settings.load_profile("shapemill")
 
 @cache
 def no_egl() -> str | None:
-    from stages.shape.views.probe import probe
+    from stages.shape.views.renderer_check import probe
 
     return probe("egl")
 

@@ -20,7 +20,7 @@ def shape_picture(shape: Shape) -> bytes:
 
 def shape_portrait(shape: Shape) -> ByteArray:
     """A portrait of a shape, uint8 (h, w, 3), its parts told by colour where its model tells them by none."""
-    from stages.shape.views.paint import part_paint
+    from stages.shape.views.part_colors import part_paint
     from stages.shape.views.portrait import portrait
     from stages.shape.views.scene import scene_of
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import Requirement
-from stages.shape.collection.declared import language_of, producers
+from stages.shape.collection.discovery import language_of, producers
 from stages.training.checkpoint import weights_of_kind
 
 

@@ -15,7 +15,7 @@ from eval.engine.table import Cell, ReferenceRow, Table
 from eval.generated.pose_clusters import Clusters
 from pipeline.errors import ConfigError
 from stages.shape.arrays import IntArray
-from stages.shape.collection.declared import producers
+from stages.shape.collection.discovery import producers
 from stages.shape.kit import Assembly, Kit
 from stages.shape.sample import read_samples
 from stages.strings.categories import CategorizedString, NoCategoryError

@@ -60,7 +60,7 @@ class Dream:
 def finished_shapes(folder: Path, places: DatasetPaths, splits: Sequence[str]) -> Iterator[tuple[str, Dream]]:
     """The kit's name and the shape of each sample of these splits of a finished dataset of kits in `folder`, whose
     mill's folders are `places`; of those whose parts are all as the kit has them."""
-    anew = LANGUAGE.anew(places)
+    anew = LANGUAGE.rebuild(places)
     for split in splits:
         for shard in sorted((folder / "data" / split).glob("*.tar")):
             for _key, members in read_shard(shard):

@@ -22,7 +22,7 @@ def _answer(subject: DatasetRun, _: Namespace) -> TableResult:
     from stages.shape.shape import Shape
     from stages.strings.compression import Codebook
 
-    anew, samples = LANGUAGE.anew(subject.paths), dict[str, list[Stored]]()
+    anew, samples = LANGUAGE.rebuild(subject.paths), dict[str, list[Stored]]()
     for shard in sorted((subject.folder / "data").glob("*/*.tar")):
         for _key, members in read_shard(shard):
             record = json.loads(members["json"])

@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.abstraction.members import PROGRAM, PROGRAM_FOUND
 from stages.shape.collection.audit import Audit
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.packaged import PackagedSample
 from stages.shape.geometry.bounds import shape_bounds
 from stages.shapeassembly.execution.interpreter import execute
 from stages.shapeassembly.syntax.errors import ProgramError
@@ -19,7 +19,7 @@ MAX_CORNER_SHARE = 0.35
 through by its surface, and its parts may reach out a little."""
 
 
-def _faults(sample: Packaged) -> Iterator[str]:
+def _faults(sample: PackagedSample) -> Iterator[str]:
     if PROGRAM not in sample.members:
         return
     said, text = sample.record["program"], sample.members[PROGRAM].decode()

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pipeline.config import Config
 from pipeline.stage import Plan
 from stages.abstraction.settings import AbstractionConfig
-from stages.shape.collection.members import Field, Member, Members
+from stages.shape.collection.members import Member, Members, RecordField
 
 PROGRAM = "program.txt"
 PROGRAM_FOUND = "not refused"
@@ -20,7 +20,7 @@ def _members(config: Config) -> tuple[Member, ...]:
     return (Member(PROGRAM, "A ShapeAssembly program of the boxes of its parts; empty where none was found."),)
 
 
-def _fields(config: Config) -> Mapping[str, Field]:
+def _fields(config: Config) -> Mapping[str, RecordField]:
     if not config.section(AbstractionConfig).programs:
         return {}
     properties = {
@@ -41,7 +41,7 @@ def _fields(config: Config) -> Mapping[str, Field]:
         "scale": {"type": "number", "minimum": 0, "description": "centre + scale * its coordinates are the mesh's"},
     }
     return {
-        "program": Field(
+        "program": RecordField(
             {
                 "description": "how its ShapeAssembly program was found",
                 "type": "object",

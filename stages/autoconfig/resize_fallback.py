@@ -12,13 +12,13 @@ from stages.autoconfig.resolved_kit import ResolvedKit
 from stages.autoconfig.yield_estimate import LOOK_FIRST, YieldEstimate, rounded_text
 from stages.exemplars.build import Observation
 from stages.inspection.config_text import MAX_SAMPLES_REQUESTED
-from stages.proportions.drawn import Drawn
-from stages.proportions.faults import warp_fault
+from stages.proportions.distinct_warps import DistinctWarps
 from stages.proportions.settings import ProportionsConfig
 from stages.proportions.stage import OVERSAMPLED
 from stages.proportions.warp import Lattice, lattice_of, warped
+from stages.proportions.warp_check import warp_fault
 from stages.shape.kit import Kit
-from stages.shape.physics.judge import unmet
+from stages.shape.physics.judge import unmet_requirement
 from stages.shape.physics.settings import Requirements
 from stages.shape.resolved_settings import FALLBACK_KEY, FALLBACK_STABLE_KEY
 from stages.shape.shape import Shape, kit_shape
@@ -104,9 +104,9 @@ def _unvaried(reading: ResolvedKit) -> Resolution:
 def _different(lattice: Lattice, config: ProportionsConfig, exemplar: int, most: int) -> int:
     """How many different shapes of an exemplar a run finds that wants `most`, if all of them hold together."""
     rng = decision_rng(0, "choices", "different", exemplar)
-    drawn = Drawn(lattice, config.apart)
-    for _ in range(config.tries * OVERSAMPLED * most):
-        warp = lattice.draw(rng, config.spread, config.most)
+    drawn = DistinctWarps(lattice, config.min_difference)
+    for _ in range(config.oversample * OVERSAMPLED * most):
+        warp = lattice.draw(rng, config.log_std, config.max_factor)
         if drawn.is_new(warp):
             drawn.add(warp)
         if len(drawn) == OVERSAMPLED * most:
@@ -118,20 +118,20 @@ def estimate_resizing(kit: Kit, shown: int) -> ResizeEstimate:
     """A probe of the exemplars of a kit, with all of their parts; what is random depends on the kit alone."""
     config = ProportionsConfig()
     stands = Requirements(stable=True)
-    stable = all(unmet(stands, kit_shape(kit, each.whole)) is None for each in kit.exemplars)
+    stable = all(unmet_requirement(stands, kit_shape(kit, each.whole)) is None for each in kit.exemplars)
     require = stands if stable else Requirements()
     tried = held = different = 0
     found: list[Shape] = []
     for number, exemplar in enumerate(kit.exemplars):
         lattice = lattice_of(kit, exemplar.whole)
         kept: list[Shape] = []
-        drawn = Drawn(lattice, config.apart)
+        drawn = DistinctWarps(lattice, config.min_difference)
         for place in range(-(-TRIES // len(kit.exemplars))):
             rng = decision_rng(0, "choices", "proportions", number, place)
-            warp = lattice.draw(rng, config.spread, config.most)
+            warp = lattice.draw(rng, config.log_std, config.max_factor)
             shape = warped(kit, exemplar.whole, lattice, warp)
             tried += 1
-            if warp_fault(kit, exemplar.whole, shape) is None and unmet(require, shape) is None:
+            if warp_fault(kit, exemplar.whole, shape) is None and unmet_requirement(require, shape) is None:
                 kept.append(shape)
                 drawn.add(warp)
         held += len(kept)

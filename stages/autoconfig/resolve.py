@@ -28,7 +28,7 @@ from stages.exemplars.identify import IdentifiedParts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.shape.kit import Assembly, Kit
-from stages.shape.physics.judge import unmet
+from stages.shape.physics.judge import unmet_requirement
 from stages.shape.physics.settings import Requirements
 from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY, REQUIRED_LABELS_KEY, STABLE_KEY
 from stages.shape.shape import kit_shape
@@ -169,11 +169,11 @@ def resolve_stable(kit: Kit, different: Sequence[Assembly]) -> tuple[bool, str]:
     """Whether what falls over is refused, and why: where the exemplars of a kit stand, some of the most different finds
     of a short search do not, and enough do."""
     standing = Requirements(stable=True)
-    if any(unmet(standing, kit_shape(kit, each.whole)) for each in kit.exemplars):
+    if any(unmet_requirement(standing, kit_shape(kit, each.whole)) for each in kit.exemplars):
         return False, "not even the exemplars stand"
     if not different:
         return False, "a short search finds nothing that could fall"
-    falls = sum(unmet(standing, kit_shape(kit, each)) is not None for each in different)
+    falls = sum(unmet_requirement(standing, kit_shape(kit, each)) is not None for each in different)
     told = f"of the {len(different)} most different finds of a short search"
     if not falls:
         return False, f"none {told} falls"

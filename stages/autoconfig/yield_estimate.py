@@ -12,7 +12,7 @@ from stages.autoconfig.lost_support import lost_support
 from stages.autoconfig.setting_search import MIN_USEFUL_GRAPHS, has_low_diversity
 from stages.autoconfig.trial_search import TrialResult, TrialSearch
 from stages.shape.geometry.contact_oracle import ContactOracle
-from stages.shape.graphs.patterns import observed_patterns, seen_once
+from stages.shape.graphs.patterns import observed_patterns, unique_pattern_share
 from stages.shape.kit import Kit
 from stages.variations.report.advice import another_model, what_keeps
 from stages.variations.search.search import DUPLICATE, Variant
@@ -41,7 +41,7 @@ class YieldEstimate:
     finds: TrialResult
     layouts: int | None
     parts: tuple[int, int]
-    seen_once: float
+    unique_pattern_share: float
     sentence: str
     variants: Sequence[Variant]
     lost_support: tuple[str, ...] = ()
@@ -71,7 +71,7 @@ def estimate_yield(
     layouts = _layouts(finds)
     sizes = [len(each.assembly) for each in probe.variants]
     parts = (min(sizes, default=0), max(sizes, default=0))
-    once = seen_once(observed_patterns(kit, answers.dockings, upright=True))
+    once = unique_pattern_share(observed_patterns(kit, answers.dockings, upright=True))
     broken = lost_support(kit, [probe.whole(place) for place in finds.most_different])
     said = _sentence(kit, finds, layouts, parts, broken)
     return YieldEstimate(finds, layouts, parts, once, said, probe.variants, broken)

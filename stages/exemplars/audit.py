@@ -8,13 +8,13 @@ from pipeline.paths import DatasetPaths
 from stages.exemplars.language import LANGUAGE, dataset_kits
 from stages.shape.assembly_faults import geometry_faults
 from stages.shape.collection.audit import Audit
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.packaged import PackagedSample
 
 
-def _anew(sample: Packaged, places: DatasetPaths) -> Iterator[str]:
+def _anew(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
     """Contacts, grammar and penetration, from the mesh as it stands in the file."""
     if sample.record["language"] == LANGUAGE.name:
         yield from geometry_faults(dataset_kits(places)[sample.record["kit"]], sample.members)
 
 
-AUDIT = Audit(anew=_anew)
+AUDIT = Audit(recheck=_anew)

@@ -20,7 +20,7 @@ from stages.exemplars.read import read_model
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.kit import NOTHING, Assembly, ContactKind, Exemplar, Kit
+from stages.shape.kit import EMPTY_ASSEMBLY, Assembly, ContactKind, Exemplar, Kit
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
     is_whole = all(len(keep) == len(each) for keep, each in zip(kept, touching, strict=True))
     if is_whole:
         grammar = observe_grammar(types, touching, contacts, counted)
-        assemblies, kinds, backdrops = contacts.counted, contacts.kinds, [NOTHING] * len(touching)
+        assemblies, kinds, backdrops = contacts.counted, contacts.kinds, [EMPTY_ASSEMBLY] * len(touching)
     else:
         # Classes of dockings, their order and their poses are those of the parts that are seen.
         backdrop = hubs if config.hubs.restore else ()

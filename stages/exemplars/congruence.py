@@ -36,7 +36,7 @@ class ComparableMesh:
 
 def comparable_mesh(vertices: FloatArray, faces: IntArray) -> ComparableMesh:
     """The mesh `vertices` (v, 3), `faces` (f, 3) made ready for `congruences`."""
-    from stages.shape.geometry.triangles import build_tree
+    from stages.shape.geometry.mesh_pairs import build_tree
 
     corners = vertices[faces]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
@@ -97,7 +97,7 @@ def _is_like_one(vertices: FloatArray, rotation: FloatArray, others: FloatArray,
 
 
 def _maps_onto(source: ComparableMesh, target: ComparableMesh, rotation: FloatArray, slack: float) -> bool:
-    from stages.shape.geometry.triangles import points_on_surface
+    from stages.shape.geometry.mesh_pairs import points_on_surface
 
     for probes, onto, by in ((source.probes, target, rotation), (target.probes, source, rotation.T)):
         if not points_on_surface(*onto.tree, np.ascontiguousarray(probes @ by.T), slack):
@@ -111,7 +111,7 @@ def _candidate_rotations(
     """Rotations that take two chosen corners of `source`, both relative to the centroid, to corners of `target`, and
     some more corners onto its surface. Round parts have tens of thousands that do the first alone, so those are turned
     all at once."""
-    from stages.shape.geometry.triangles import points_on_surface
+    from stages.shape.geometry.mesh_pairs import points_on_surface
 
     corners, others = source.vertices, target.vertices
     radius, target_radius = np.linalg.norm(corners, axis=1), np.linalg.norm(others, axis=1)

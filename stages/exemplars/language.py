@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan
 from stages.shape.arrays import IntArray
-from stages.shape.collection.language import Anew, Language, Source
+from stages.shape.collection.language import Language, RebuildShape, Source
 from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_files import load_kit
 from stages.shape.kit_input import input_kits
@@ -79,7 +79,7 @@ def dataset_kits(places: DatasetPaths) -> dict[str, Kit]:
     }
 
 
-def _anew(places: DatasetPaths) -> Anew:
+def _anew(places: DatasetPaths) -> RebuildShape:
     """The kit's meshes at the poses of the record."""
     kits = dataset_kits(places)
 
@@ -106,10 +106,10 @@ def _anew(places: DatasetPaths) -> Anew:
 LANGUAGE = Language(
     name="kit",
     reads=_reads,
-    speaker=lambda task: Kits(input_kits(task)),
+    decoder=lambda task: Kits(input_kits(task)),
     graphs=True,
     text="",
-    anew=_anew,
+    rebuild=_anew,
     coordinates="The unit is that of the model files. The origin of a mesh is the middle of the box around the part as "
     "its model file has it; the origin of a shape is that of the exemplar that most of it stands in, and may lie "
     "anywhere.",

@@ -10,7 +10,7 @@ from pipeline.paths import file_digest
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.collection.origin import unstated
+from stages.shape.collection.origin import missing_licenses
 
 BYTES_A_KIT = 8_000_000
 
@@ -81,7 +81,7 @@ def report(plan: Plan) -> Sequence[str]:
             )
             lines.extend(f"{name}: {kind} is also {', '.join(words)}" for kind, words in seen["aliases"].items())
             lines.extend(f"{name}: warning: {warning}" for warning in seen["warnings"])
-    lines.extend(f"warning: {sentence}" for sentence in unstated(exemplar_origins(plan.config)))
+    lines.extend(f"warning: {sentence}" for sentence in missing_licenses(exemplar_origins(plan.config)))
     return lines
 
 

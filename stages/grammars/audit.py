@@ -9,10 +9,10 @@ from stages.grammars.derivation_text import format_derivation, parse_derivation,
 from stages.grammars.files import load_grammars
 from stages.grammars.language import LANGUAGE
 from stages.shape.collection.audit import Audit
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.packaged import PackagedSample
 
 
-def _anew(sample: Packaged, places: DatasetPaths) -> Iterator[str]:
+def _anew(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
     """The text is read, and written again, and the surface that it makes is the one of which the record has a
     digest."""
     record = sample.record
@@ -26,4 +26,4 @@ def _anew(sample: Packaged, places: DatasetPaths) -> Iterator[str]:
         yield "its derivation makes another surface than its json names"
 
 
-AUDIT = Audit(anew=_anew)
+AUDIT = Audit(recheck=_anew)

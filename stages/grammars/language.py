@@ -15,7 +15,7 @@ from stages.grammars.files import load_grammar, load_grammars
 from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.settings import GrammarsConfig
 from stages.shape.arrays import IntArray
-from stages.shape.collection.language import Anew, Language, Source
+from stages.shape.collection.language import Language, RebuildShape, Source
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
 
@@ -67,7 +67,7 @@ def _reads(plan: Plan) -> tuple[str, ...]:
     return tuple(f"grammars/{name}" for name in grammar_shards(plan.config))
 
 
-def _anew(places: DatasetPaths) -> Anew:
+def _anew(places: DatasetPaths) -> RebuildShape:
     grammars = load_grammars(places)
 
     def shape(record: Mapping[str, Any], _: IntArray) -> Shape:
@@ -81,11 +81,11 @@ def _anew(places: DatasetPaths) -> Anew:
 LANGUAGE = Language(
     name="derivation",
     reads=_reads,
-    speaker=lambda task: Derivations(input_grammars(task)),
+    decoder=lambda task: Derivations(input_grammars(task)),
     graphs=False,
     text="Its derivation in the grammar: productions within productions, `S1(B1(B0))`, or a grid and its numbers of "
     "cells, `G1[5,4]`.",
-    anew=_anew,
+    rebuild=_anew,
     coordinates="The unit is that of the model file, and so is the origin. The origin of a mesh is the middle of the "
     "box around the terminal.",
 )

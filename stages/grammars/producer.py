@@ -18,5 +18,5 @@ PRODUCER = Producer(
         "Parts are terminals of the grammar: pieces between docking sites, which mean nothing.",
     ),
     splits="No two samples look alike, within a split or across splits: the radius of similarity counts as nothing.",
-    apart=True,
+    graphs_share_split=True,
 )

@@ -22,7 +22,7 @@ from stages.grammars.language import drawing_name, grammar_shards, input_grammar
 from stages.grammars.origins import mesh_origins
 from stages.grammars.settings import GrammarConfig, GrammarsConfig
 from stages.shape.collection.assignment import assign_splits, planned_collection, write_listed_samples, write_listings
-from stages.shape.collection.origin import unstated
+from stages.shape.collection.origin import missing_licenses
 
 BYTES_A_GRAMMAR = 20_000_000
 BYTES_A_SAMPLE = 4_000
@@ -170,7 +170,7 @@ def report(plan: Plan) -> Sequence[str]:
         for each in plan.config.section(GrammarsConfig).models:
             count = sum(made["shapes"][each.name].values())
             lines += [f"warning: {shortfall_message(each, count)}"] if count < each.instances + each.resized else []
-    lines += [f"warning: {sentence}" for sentence in unstated(mesh_origins(plan))]
+    lines += [f"warning: {sentence}" for sentence in missing_licenses(mesh_origins(plan))]
     return lines
 
 

@@ -115,7 +115,7 @@ def variations_section(
 def proportions_section(different: int, stable: bool, why: str, layouts: str) -> list[str]:
     """The lines of a dataset of other proportions. different: how many are to be had; stable: whether shapes must
     stand, and why; layouts: what is to be said of other layouts."""
-    more = "raise it for more" if different >= MAX_SAMPLES_REQUESTED else "that differ by proportions.apart"
+    more = "raise it for more" if different >= MAX_SAMPLES_REQUESTED else "that differ by proportions.min_difference"
     return [
         "variations:",
         _line(1, "samples_per_kit", 0, f"other layouts: {layouts}"),

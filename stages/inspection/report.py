@@ -18,7 +18,7 @@ from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig, ReadLimits
 from stages.inspection.sample_figure import MAX_SHAPES_SHOWN
 from stages.shape.geometry.contact_oracle import ContactOracle
-from stages.shape.physics.judge import unmet
+from stages.shape.physics.judge import unmet_requirement
 from stages.shape.physics.settings import Requirements
 from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY, STABLE_KEY
 from stages.shape.shape import Shape, kit_shape
@@ -77,7 +77,7 @@ class InspectionReport:
                 **self.yield_estimate.finds.as_json(),
                 "layouts": self.yield_estimate.layouts,
                 "variants_a_cpu_second": round(self.rate, 1),
-                "seen_once": round(self.yield_estimate.seen_once, 4),
+                "seen_once": round(self.yield_estimate.unique_pattern_share, 4),
             }
         if self.proportioned is not None:
             expected["proportions"] = {"holds": round(self.proportioned.holds, 4), "stable": self.proportioned.stable}
@@ -89,7 +89,7 @@ class InspectionReport:
         lines = [*chosen, ("yield_estimate", self.sentence)]
         if self.yield_estimate is not None:
             whole = f"half of the finds have {self.yield_estimate.finds.copied:.0%} or more in one piece of an exemplar"
-            once = f"{self.yield_estimate.seen_once:.0%} of the parts stand in a pattern that occurs once"
+            once = f"{self.yield_estimate.unique_pattern_share:.0%} of the parts stand in a pattern that occurs once"
             lines += [
                 ("search", f"{trial_text(self.yield_estimate.finds)}, {self.rate:.3g} variants a CPU second"),
                 ("copied", whole),
@@ -124,7 +124,7 @@ def inspect_models(
         backdrop = HubRestorer(answers, upright=True)
         asked = Requirements(stable=choices.values[STABLE_KEY])
         fitted = (backdrop.fit(each.assembly) for each in expected.chosen)
-        kept = (each for each in fitted if unmet(asked, kit_shape(built.kit, each)) is None)
+        kept = (each for each in fitted if unmet_requirement(asked, kit_shape(built.kit, each)) is None)
         facing = OrientationFix(built.kit)
         assemblies = [facing.turned_back(each, facing.turn(each)) for each in islice(kept, MAX_SHAPES_SHOWN)]
     shapes = [kit_shape(built.kit, each) for each in assemblies]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from stages.shape.kit import Kit
 from stages.shape.shape import Shape, kit_shape, part_count, upright
 from stages.shape.views.camera import Camera
-from stages.shape.views.paint import part_paint
+from stages.shape.views.part_colors import part_paint
 from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png

@@ -45,7 +45,7 @@ class Story:
     variety: Sequence[str]
     rejects: Mapping[str, int]
     origins: Sequence[Mapping[str, Any]]
-    unstated: Sequence[str]
+    missing_licenses: Sequence[str]
 
 
 def citation(facts: Mapping[str, Any]) -> str:
@@ -131,7 +131,7 @@ def card(
         "## Licence and citation",
         f"{facts['license']}.",
         *(["What it was made from, and whose that is:", origin_table(story.origins)] if story.origins else []),
-        *(["\n".join(f"- {each}" for each in story.unstated)] if story.unstated else []),
+        *(["\n".join(f"- {each}" for each in story.missing_licenses)] if story.missing_licenses else []),
         f"```bibtex\n{citation(facts)}\n```",
     ]
     front = yaml.safe_dump(header, sort_keys=False, allow_unicode=True, width=1000)

@@ -18,7 +18,7 @@ from stages.package.layout import CARD, CHECKSUMS, CLASSES, CROISSANT, MANIFEST,
 from stages.package.manifest import checksums, manifest
 from stages.package.sources import SourceTally
 from stages.shape.collection.classes import Classes
-from stages.shape.collection.declared import language_of
+from stages.shape.collection.discovery import language_of
 
 
 def compose_dataset(task: Task) -> Outcome:
@@ -42,7 +42,7 @@ def compose_dataset(task: Task) -> Outcome:
         "sha256": index.digest(),
         "columns": column_kinds(),
     }
-    known = language_of(params["producer"]).speaker(task).sources
+    known = language_of(params["producer"]).decoder(task).sources
     of_shards = ((shard["split"], _read(task, f"{shard['name']}.classes.json")) for shard in shards)
     classes = count_classes(Classes.of(known), of_shards)
     listed = table_bytes(classes)

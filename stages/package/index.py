@@ -8,21 +8,21 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from stages.shape.collection.declared import members
-from stages.shape.collection.members import Column
+from stages.shape.collection.discovery import members
+from stages.shape.collection.members import IndexColumn
 
 RECORD_COLUMNS = {
-    "key": Column("string", ("key",)),
-    "split": Column("string", ("split",)),
-    "kit": Column("string", ("kit",)),
-    "graph": Column("string", ("graph",)),
-    "producer": Column("string", ("producer",)),
-    "parts": Column("int32", ("counts", "parts")),
-    "contacts": Column("int32", ("counts", "contacts")),
-    "pieces": Column("int32", ("counts", "pieces")),
-    "cycles": Column("int32", ("counts", "cycles")),
-    "types": Column("int32", ("counts", "types")),
-    "text": Column("string", ("text",)),
+    "key": IndexColumn("string", ("key",)),
+    "split": IndexColumn("string", ("split",)),
+    "kit": IndexColumn("string", ("kit",)),
+    "graph": IndexColumn("string", ("graph",)),
+    "producer": IndexColumn("string", ("producer",)),
+    "parts": IndexColumn("int32", ("counts", "parts")),
+    "contacts": IndexColumn("int32", ("counts", "contacts")),
+    "pieces": IndexColumn("int32", ("counts", "pieces")),
+    "cycles": IndexColumn("int32", ("counts", "cycles")),
+    "types": IndexColumn("int32", ("counts", "types")),
+    "text": IndexColumn("string", ("text",)),
 }
 """What the index takes from a record, beside the columns that stages declare."""
 
@@ -34,7 +34,7 @@ ROWS_PER_GROUP = 65_536
 """Rows of a row group."""
 
 
-def columns() -> dict[str, Column]:
+def columns() -> dict[str, IndexColumn]:
     """All columns that come from a record, by name."""
     return RECORD_COLUMNS | {name: column for each in members().values() for name, column in each.columns.items()}
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from pipeline.config import Config
-from stages.shape.collection.declared import members
+from stages.shape.collection.discovery import members
 from stages.shape.collection.language import Language
 from stages.shape.collection.members import TEXT, Member
 

@@ -12,12 +12,12 @@ from pipeline.stage import Outcome, Task
 from stages.package.settings import PackageConfig
 from stages.shape.arrays import ByteArray
 from stages.shape.collection.collection import Collection
-from stages.shape.collection.declared import members
+from stages.shape.collection.discovery import members
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, part_count, upright
-from stages.shape.views.buffers import Backend, drawn_by
+from stages.shape.views.buffers import RendererName, renderer_version
 from stages.shape.views.camera import Camera
-from stages.shape.views.paint import part_paint
+from stages.shape.views.part_colors import part_paint
 from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
@@ -45,7 +45,7 @@ def draw_preview(task: Task) -> Outcome:
     """
     params, config = task.shard.params, task.config.section(PackageConfig)
     sketches = task.config.section(SketchesConfig)
-    backend = sketches.backend
+    backend = sketches.renderer
     camera = BELOW if sketches.views[0].elevation < 0 else ABOVE
     collection, shards = Collection(task), params["shards"]
     made = {stage: _members(task, stage, shards) for stage in params["rows"]}
@@ -56,7 +56,7 @@ def draw_preview(task: Task) -> Outcome:
     variants = [Cell(_picture(shape, camera, backend), part_count(shape)) for _, shape in shown]
     sections = [Section("Shapes", _rows(variants), f"what comes out: {len(shown)} of {params['of']:,}")]
     going_in = [
-        Cell(_picture(shape, ABOVE, backend), said) for said, shape in collection.speaker.shown(PREVIEW_COLUMNS)
+        Cell(_picture(shape, ABOVE, backend), said) for said, shape in collection.decoder.shown(PREVIEW_COLUMNS)
     ]
     if going_in:
         sections.insert(0, Section("Exemplars", _rows(going_in), "what goes in"))
@@ -67,7 +67,7 @@ def draw_preview(task: Task) -> Outcome:
             sections.append(Section(row.title, _rows(cells), row.caption(task.config)))
     with task.output(f"{task.shard.name}.png") as stream:
         stream.write(picture_png(contact_sheet(sections, params["title"], CELL_PIXELS)))
-    return Outcome(samples=0, summary={"backend": backend, "renderer": drawn_by(backend)})
+    return Outcome(samples=0, summary={"backend": backend, "renderer": renderer_version(backend)})
 
 
 def varied(samples: Sequence[tuple[Sample, Shape]], count: int) -> list[tuple[Sample, Shape]]:
@@ -95,7 +95,7 @@ def _members(task: Task, stage: str, shards: Sequence[str]) -> dict[str, dict[st
     return {key: members for shard in shards for key, members in read_shard(task.input(stage, f"{shard}.tar"))}
 
 
-def _picture(shape: Shape, camera: Camera, backend: Backend) -> ByteArray:
+def _picture(shape: Shape, camera: Camera, backend: RendererName) -> ByteArray:
     return portrait(scene_of(upright(shape)), camera, (CELL_PIXELS, CELL_PIXELS), part_paint(shape), backend)
 
 

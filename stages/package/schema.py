@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from pipeline.config import Config
-from stages.shape.collection.declared import language_of, members, producers
+from stages.shape.collection.discovery import language_of, members, producers
 
 if TYPE_CHECKING:
     from jsonschema.protocols import Validator

@@ -18,8 +18,8 @@ from stages.package.preview import draw_preview
 from stages.package.schema import record_schema
 from stages.package.settings import PackageConfig
 from stages.package.versions import code_version, library_versions
-from stages.shape.collection.declared import language_of, member_modules, members, producers
-from stages.shape.collection.origin import unstated
+from stages.shape.collection.discovery import language_of, member_modules, members, producers
+from stages.shape.collection.origin import missing_licenses
 from stages.shape.collection.shards import (
     MEMBERS,
     PRODUCERS,
@@ -28,7 +28,7 @@ from stages.shape.collection.shards import (
     planned_producer,
     sample_count,
 )
-from stages.shape.views.probe import check_backend
+from stages.shape.views.renderer_check import check_renderer
 from stages.sketches.settings import SketchesConfig
 
 DATASET_SHARD = "dataset"
@@ -71,7 +71,7 @@ def plan(plan: Plan) -> list[Shard]:
         "shards": filled,
         "members": describe_members(plan.config, filled[0]["members"], language),
         "schema": record_schema(plan.config, producer, merged[0].params["stages"]),
-        "apart": declared.apart,
+        "apart": declared.graphs_share_split,
         "story": {
             "made": declared.sentence,
             "splits": [declared.splits, *declared.nearness(plan)],
@@ -80,7 +80,7 @@ def plan(plan: Plan) -> list[Shard]:
             "paragraphs": [*declared.card(plan), *(said for each in members().values() for said in each.card(plan))],
             "variety": list(declared.variety(plan)),
             "rejects": _rejects(plan, producer),
-            "unstated": unstated(origins),
+            "missing_licenses": missing_licenses(origins),
         },
         "measures": dict(declared.measures(plan)),
         "preview": PREVIEW_SHARD,
@@ -145,7 +145,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 def check_environment(config: Config) -> None:
     """Raises ConfigError where the backend that draws sketches and preview cannot draw."""
-    check_backend(config.section(SketchesConfig).backend, f"{config.path}: sketches.backend")
+    check_renderer(config.section(SketchesConfig).renderer, f"{config.path}: sketches.renderer")
 
 
 def estimate_bytes(plan: Plan) -> int:

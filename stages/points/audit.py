@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stages.points.visibility import SHORTEST, view_directions
+from stages.points.visibility import MIN_HIT_DISTANCE_SHARE, view_directions
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.collection.audit import Audit
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.packaged import PackagedSample
 
 NEAR = 1e-5
 """Points are 32-bit numbers: as a share of the shape's size they lie as near to its surface as this."""
@@ -17,7 +17,7 @@ ALONG = 1e-3
 """As much the cosine of a normal and that of its triangle may differ from 1."""
 
 
-def point_faults(sample: Packaged) -> Iterator[str]:
+def point_faults(sample: PackagedSample) -> Iterator[str]:
     """A sentence for points that are not on the part that they name, and for normals that are not its own."""
     described = sample.record["points"]
     points = sample.arrays["points.npy"].astype(np.float64) / described["scale"] + described["centre"]
@@ -47,15 +47,15 @@ def point_faults(sample: Packaged) -> Iterator[str]:
 
 
 def _strangers(
-    sample: Packaged, points: FloatArray, normals: FloatArray, instances: IntArray, near: float
+    sample: PackagedSample, points: FloatArray, normals: FloatArray, instances: IntArray, near: float
 ) -> tuple[int, int]:
     """How many points are off the surface of their part, and how many of the others have a normal of no triangle there.
 
     The nearest triangle of all answers for nearly all points; the others, where parts meet or at edges, are held
     against each triangle of their part.
     """
-    corners, parts = sample.casting.triangles
-    nearest, distances = sample.casting.nearest(points)
+    corners, parts = sample.rays.triangles
+    nearest, distances = sample.rays.nearest(points)
     own = parts[nearest] == instances
     along = np.einsum("ij,ij->i", normals, _unit_normals(corners[nearest])) > 1.0 - ALONG
     doubtful = np.flatnonzero(~(own & along & (distances <= near)))
@@ -71,12 +71,14 @@ def _strangers(
     return off, turned
 
 
-def _unseen(sample: Packaged, points: FloatArray) -> int:
+def _unseen(sample: PackagedSample, points: FloatArray) -> int:
     """How many points nobody sees who looks at the shape from outside; they were found by looking outwards."""
     away = 2.0 * sample.size
     for view in view_directions():
         ways = np.broadcast_to(-view, points.shape)
-        points = points[sample.casting.hit(points + away * view, ways, most=away - 2.0 * SHORTEST * sample.size)]
+        points = points[
+            sample.rays.hit(points + away * view, ways, most=away - 2.0 * MIN_HIT_DISTANCE_SHARE * sample.size)
+        ]
         if not len(points):
             break
     return len(points)

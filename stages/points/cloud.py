@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from stages.points.area_sampling import SurfacePoints, sample_shape
-from stages.points.settings import Surface
+from stages.points.settings import SampledSurface
 from stages.points.visibility import seen_from_outside
-from stages.shape.geometry.casting import Casting
+from stages.shape.geometry.ray_casting import RayCaster
 from stages.shape.shape import Shape
 
 MOST_DRAWS = 1000
@@ -15,7 +15,7 @@ MOST_DRAWS = 1000
 
 
 def sample_cloud(
-    shape: Shape, uniform: int, farthest: int, pool: int, surface: Surface, rng: np.random.Generator
+    shape: Shape, uniform: int, farthest: int, pool: int, surface: SampledSurface, rng: np.random.Generator
 ) -> SurfacePoints:
     """`farthest` points picked out of `pool` uniform ones, in the order of picking, then `uniform` further points;
     all of them on the whole surface or on what is visible of it.
@@ -23,7 +23,7 @@ def sample_cloud(
     The two kinds have streams of their own: the uniform points are the same whatever `farthest` and `pool` are. At
     least one of the two counts is positive. Raises ValueError for a shape of which next to nothing is visible.
     """
-    casting = Casting(shape) if surface == "visible" else None
+    casting = RayCaster(shape) if surface == "visible" else None
     farthest_rng, uniform_rng = rng.spawn(2)
     if farthest == 0:
         return _drawn(shape, uniform, casting, uniform_rng)
@@ -32,7 +32,7 @@ def sample_cloud(
     return picked if uniform == 0 else picked.followed_by(_drawn(shape, uniform, casting, uniform_rng))
 
 
-def _drawn(shape: Shape, n: int, casting: Casting | None, rng: np.random.Generator) -> SurfacePoints:
+def _drawn(shape: Shape, n: int, casting: RayCaster | None, rng: np.random.Generator) -> SurfacePoints:
     """`n` points uniform by area, those that `casting` does not see left out."""
     if casting is None:
         return sample_shape(shape, n, rng)

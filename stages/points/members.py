@@ -10,7 +10,7 @@ from pipeline.config import Config
 from pipeline.shards import bytes_array
 from stages.points.settings import PointsConfig
 from stages.shape.arrays import ByteArray
-from stages.shape.collection.members import Field, Member, Members, Row
+from stages.shape.collection.members import Member, Members, PreviewRow, RecordField
 from stages.shape.views.camera import Camera
 
 POINTS = {"all": "Point cloud.", "visible": "Point cloud of what is seen from outside."}
@@ -27,10 +27,10 @@ def _members(config: Config) -> tuple[Member, ...]:
     )
 
 
-def _fields(_: Config) -> Mapping[str, Field]:
+def _fields(_: Config) -> Mapping[str, RecordField]:
     count = {"type": "integer", "minimum": 0}
     return {
-        "points": Field(
+        "points": RecordField(
             {
                 "description": "how the cloud was made: the first `farthest` points are picked farthest first, the "
                 "others drawn by area; of a `visible` surface only what is seen from outside; (coordinates of "
@@ -63,4 +63,4 @@ def _draw(members: Mapping[str, bytes], camera: Camera, size: int) -> ByteArray:
     return points_portrait(points.astype(np.float64), labels.astype(np.int32), camera, (size, size), "y")
 
 
-MEMBERS = Members(of=_members, fields=_fields, row=Row("Points", _caption, _draw))
+MEMBERS = Members(of=_members, fields=_fields, row=PreviewRow("Points", _caption, _draw))

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from pipeline.config import StrictModel
 
-Surface = Literal["all", "visible"]
+SampledSurface = Literal["all", "visible"]
 
 
 class PointsConfig(StrictModel):
@@ -24,7 +24,7 @@ class PointsConfig(StrictModel):
         description="points picked by farthest-point sampling out of `pool`; they stand before the uniform ones; "
         "unit: points (0: none of this kind)",
     )
-    surface: Surface = Field(
+    surface: SampledSurface = Field(
         "all",
         description="all: every surface, also what lies inside other parts; visible: what a scanner sees: points from "
         "which a way leads straight out of the shape in one of 64 directions",

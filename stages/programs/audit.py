@@ -8,10 +8,10 @@ from stages.programs.language import LANGUAGE
 from stages.programs.program import find_program
 from stages.programs.sampling import structure_digest
 from stages.shape.collection.audit import Audit
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.packaged import PackagedSample
 
 
-def _faults(sample: Packaged) -> Iterator[str]:
+def _faults(sample: PackagedSample) -> Iterator[str]:
     record = sample.record
     if record["language"] == LANGUAGE.name:
         program = find_program(record["kit"])

@@ -38,7 +38,7 @@ def meshes_intersect(a: QuadMesh, b: QuadMesh, distance: float = 0.0) -> bool:
 def _surfaces_meet(
     vertices: FloatArray, faces: np.ndarray, others: FloatArray, other_faces: np.ndarray, distance: float
 ) -> bool:
-    from stages.shape.geometry.triangles import build_tree, first_contact
+    from stages.shape.geometry.mesh_pairs import build_tree, first_contact
 
     return first_contact(build_tree(vertices, faces), build_tree(others, other_faces), np.eye(4), distance)
 

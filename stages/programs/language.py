@@ -8,7 +8,7 @@ from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan, Task
 from stages.programs.program import find_program, shape_from_text
 from stages.programs.settings import ProgramsConfig
-from stages.shape.collection.language import Anew, Language, Source
+from stages.shape.collection.language import Language, RebuildShape, Source
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
 
@@ -37,17 +37,17 @@ def _speaker(task: Task) -> Parameters:
     return Parameters(task.config.section(ProgramsConfig).program)
 
 
-def _anew(_: DatasetPaths) -> Anew:
+def _anew(_: DatasetPaths) -> RebuildShape:
     return lambda record, _: upright(shape_from_text(record["kit"], record["text"]))
 
 
 LANGUAGE = Language(
     name="program",
     reads=_reads,
-    speaker=_speaker,
+    decoder=_speaker,
     graphs=False,
     text="Its parameters as JSON.",
-    anew=_anew,
+    rebuild=_anew,
     coordinates="The unit is about a metre. Shapes stand on the plane y = 0 around the y axis with their front to +z; "
     "what hangs from a ceiling hangs from that plane. The origin of a mesh is the middle of the box around the part, "
     "and poses turn nothing.",

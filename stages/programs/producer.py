@@ -9,7 +9,7 @@ from pipeline.stage import Plan
 from stages.programs.description import program_markdown
 from stages.programs.program import find_program
 from stages.programs.settings import ProgramsConfig
-from stages.shape.collection.members import Field
+from stages.shape.collection.members import RecordField
 from stages.shape.collection.producer import Producer
 
 
@@ -17,15 +17,17 @@ def _recipe(plan: Plan) -> Sequence[str]:
     return [program_markdown(find_program(plan.config.section(ProgramsConfig).program)).rstrip()]
 
 
-def _lineage(config: Config) -> Mapping[str, Field]:
+def _lineage(config: Config) -> Mapping[str, RecordField]:
     if config.section(ProgramsConfig).mode == "random":
         kept = "what keeps the splits apart: `structure`, the discrete parameters, or `values`, all parameters together"
-        return {"apart": Field({"enum": ["structure", "values"], "description": kept})}
+        return {"apart": RecordField({"enum": ["structure", "values"], "description": kept})}
     return {
-        "parameter": Field(
+        "parameter": RecordField(
             {"type": "string", "minLength": 1, "description": "the parameter whose value was asked for"}
         ),
-        "class": Field({"type": "integer", "minimum": 0, "description": "place of that value among the parameter's"}),
+        "class": RecordField(
+            {"type": "integer", "minimum": 0, "description": "place of that value among the parameter's"}
+        ),
     }
 
 
@@ -38,7 +40,7 @@ PRODUCER = Producer(
     "their continuous parameters stand in one split, if their `lineage` says `apart: structure`; where it says "
     "`apart: values`, the program has fewer structures than splits, and shapes of one structure stand in all of them. "
     "Where every value of every parameter is sampled, all splits have all values, as published.",
-    apart=False,
+    graphs_share_split=False,
     lineage=_lineage,
     limits=("All shapes are values of the same parameters; what the program cannot say is not there.",),
     card=_recipe,

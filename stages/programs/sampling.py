@@ -16,7 +16,7 @@ from stages.programs.intersection import intersecting_labels
 from stages.programs.parameters import Value
 from stages.programs.program import BuildError, Program, shape_from_parts
 from stages.shape.arrays import FloatArray
-from stages.shape.physics.judge import unmet
+from stages.shape.physics.judge import unmet_requirement
 from stages.shape.physics.settings import Requirements
 
 MAX_DRAWS_PER_SHAPE = 2000
@@ -131,7 +131,7 @@ class Sampler:
         met = intersecting_labels(self.program, parts)
         if met is not None:
             return f"{met[0]} meets {met[1]}"
-        weak = unmet(self.require, shape_from_parts(self.program, parts))
+        weak = unmet_requirement(self.require, shape_from_parts(self.program, parts))
         if weak is not None:
             return weak
         self._known.add(text)

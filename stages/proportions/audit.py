@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 from pipeline.paths import DatasetPaths
 from stages.exemplars.language import dataset_kits
-from stages.proportions.faults import warp_fault
 from stages.proportions.language import LANGUAGE
 from stages.proportions.text import ProportionError, exemplar_of, proportion_text, read_proportions, shape_of_text
+from stages.proportions.warp_check import warp_fault
 from stages.shape.collection.audit import Audit
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.packaged import PackagedSample
 
 
-def _anew(sample: Packaged, places: DatasetPaths) -> Iterator[str]:
+def _anew(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
     """The text is read, and written again; the shape that it makes holds together as the exemplar does."""
     record = sample.record
     if record["language"] != LANGUAGE.name:
@@ -31,4 +31,4 @@ def _anew(sample: Packaged, places: DatasetPaths) -> Iterator[str]:
         yield f"beside its exemplar: {fault}"
 
 
-AUDIT = Audit(anew=_anew)
+AUDIT = Audit(recheck=_anew)

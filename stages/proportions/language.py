@@ -10,7 +10,7 @@ from pipeline.stage import Plan
 from stages.exemplars.language import Kits, dataset_kits
 from stages.proportions.text import shape_of_text
 from stages.shape.arrays import IntArray
-from stages.shape.collection.language import Anew, Language
+from stages.shape.collection.language import Language, RebuildShape
 from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kits
 from stages.shape.sample import Sample
@@ -38,7 +38,7 @@ def _reads(plan: Plan) -> tuple[str, ...]:
     return tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
 
 
-def _anew(places: DatasetPaths) -> Anew:
+def _anew(places: DatasetPaths) -> RebuildShape:
     kits = dataset_kits(places)
 
     def shape(record: Mapping[str, Any], _: IntArray) -> Shape:
@@ -52,11 +52,11 @@ def _anew(places: DatasetPaths) -> Anew:
 LANGUAGE = Language(
     name="proportions",
     reads=_reads,
-    speaker=lambda task: Proportions(input_kits(task)),
+    decoder=lambda task: Proportions(input_kits(task)),
     graphs=False,
     text="Its proportions as JSON: the exemplar, and for each axis the factors of the intervals between the ends of "
     "the exemplar's parts.",
-    anew=_anew,
+    rebuild=_anew,
     coordinates="The unit is that of the model files, and the lowest point is as high as in the exemplar's. The origin "
     "of a mesh is the middle of the box around the part, and poses turn nothing.",
 )

@@ -16,7 +16,7 @@ PRODUCER = Producer(
     "a shape's factors are its `txt`.",
     splits="No two samples are alike: at equal size some end of a part lies elsewhere. All splits have shapes of the "
     "same exemplars: they tell whether a model knows sizes that it has not seen, not layouts.",
-    apart=False,
+    graphs_share_split=False,
     origins=lambda plan: exemplar_origins(plan.config),
     card=resolved_table,
     limits=(

@@ -16,11 +16,11 @@ from pipeline.errors import ConfigError, ShardFailed
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
-from stages.proportions.drawn import Drawn
-from stages.proportions.faults import warp_fault
-from stages.proportions.settings import MOST, ProportionsConfig
+from stages.proportions.distinct_warps import DistinctWarps
+from stages.proportions.settings import MAX_SAMPLES_PER_KIT, ProportionsConfig
 from stages.proportions.text import proportion_text, read_proportions
 from stages.proportions.warp import lattice_of, warped
+from stages.proportions.warp_check import warp_fault
 from stages.shape.collection.assignment import (
     SplitConfig,
     assign_splits,
@@ -28,10 +28,10 @@ from stages.shape.collection.assignment import (
     write_listed_samples,
     write_listings,
 )
-from stages.shape.collection.origin import unstated
+from stages.shape.collection.origin import missing_licenses
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_input import input_kit
-from stages.shape.physics.judge import unmet
+from stages.shape.physics.judge import unmet_requirement
 from stages.shape.resolved_settings import FALLBACK_STABLE_KEY
 from stages.variations.fallback import resolved_fallback
 from stages.variations.settings import VariationsConfig
@@ -51,7 +51,7 @@ def plan(plan: Plan) -> list[Shard]:
     lanes = [
         Shard(f"{kit}-lane{lane:02}", {"job": "lane", "kit": kit, "lane": lane, "asked": asked}, (f"exemplars/{kit}",))
         for kit in plan.shards("exemplars")
-        for lane in range(config.lanes)
+        for lane in range(config.parallel_searches)
     ]
     inputs = (
         *(f"exemplars/{kit}" for kit in plan.shards("exemplars")),
@@ -76,7 +76,11 @@ def _wanted(plan: Plan) -> ProportionsConfig:
     stable = own.require.stable or chosen[FALLBACK_STABLE_KEY]
     require = own.require.model_copy(update={"stable": stable})
     return own.model_copy(
-        update={"samples_per_kit": min(layouts.samples_per_kit, MOST), "splits": shared, "require": require}
+        update={
+            "samples_per_kit": min(layouts.samples_per_kit, MAX_SAMPLES_PER_KIT),
+            "splits": shared,
+            "require": require,
+        }
     )
 
 
@@ -104,21 +108,21 @@ def run_lane(task: Task) -> Outcome:
     kit = input_kit(task, task.shard.params["kit"])
     exemplars = [each.whole for each in kit.exemplars]
     lattices = [lattice_of(kit, each) for each in exemplars]
-    drawn = [Drawn(each, config.apart) for each in lattices]
-    wanted = -(-OVERSAMPLED * config.samples_per_kit // config.lanes)
+    drawn = [DistinctWarps(each, config.min_difference) for each in lattices]
+    wanted = -(-OVERSAMPLED * config.samples_per_kit // config.parallel_searches)
     found: list[str] = []
     tries = 0
-    while len(found) < wanted and tries < config.tries * wanted:
+    while len(found) < wanted and tries < config.oversample * wanted:
         place = tries % len(exemplars)
         tries += 1
         name, whole, lattice = kit.exemplars[place].name, exemplars[place], lattices[place]
-        text = proportion_text(name, lattice.draw(task.rng("factors", tries), config.spread, config.most))
+        text = proportion_text(name, lattice.draw(task.rng("factors", tries), config.log_std, config.max_factor))
         warp = read_proportions(text)[1]
         if not drawn[place].is_new(warp):
             task.reject(text, "nearly the exemplar, or one drawn before")
             continue
         shape = warped(kit, whole, lattice, warp)
-        wrong = warp_fault(kit, whole, shape) or unmet(config.require, shape)
+        wrong = warp_fault(kit, whole, shape) or unmet_requirement(config.require, shape)
         if wrong is not None:
             task.reject(text, wrong)
             continue
@@ -146,7 +150,7 @@ def run_choice(task: Task) -> Outcome:
         chosen: list[dict[str, Any]] = []
         for number, (exemplar, path) in enumerate(zip(kit.exemplars, files[name], strict=True)):
             own = [text for text in of_kit if read_proportions(text)[0] == exemplar.name]
-            drawn = Drawn(lattice_of(kit, exemplar.whole), config.apart)
+            drawn = DistinctWarps(lattice_of(kit, exemplar.whole), config.min_difference)
             for text in own:
                 drawn.add(read_proportions(text)[1])
             share = len(range(number, config.samples_per_kit, len(kit.exemplars)))
@@ -161,8 +165,8 @@ def run_choice(task: Task) -> Outcome:
         counts[name] = len(chosen)
     if not rows:
         raise ShardFailed(
-            "no exemplar holds together in other proportions, or none differs enough; set proportions.spread or "
-            "proportions.apart smaller, or require less, or vary the layout: variations.samples_per_kit"
+            "no exemplar holds together in other proportions, or none differs enough; set proportions.log_std or "
+            "proportions.min_difference smaller, or require less, or vary the layout: variations.samples_per_kit"
         )
     split_of = assign_splits([[row] for row in range(len(rows))], config.splits, task.rng("splits"))
     shards = write_listings(task, rows, split_of, config.splits)
@@ -183,17 +187,17 @@ def report(plan: Plan) -> Sequence[str]:
     lines = []
     for kit, count in made["shapes"].items():
         refused: dict[str, int] = {}
-        for lane in range(config.lanes):
+        for lane in range(config.parallel_searches):
             for reason, number in plan.rejects("proportions", f"{kit}-lane{lane:02}").items():
                 refused[reason] = refused.get(reason, 0) + number
         why = ", ".join(f"{number:,} {reason}" for reason, number in sorted(refused.items()))
         lines.append(f"{kit}: {count:,} of {config.samples_per_kit:,} shapes; refused: {why or 'none'}")
         if count < config.samples_per_kit:
             lines.append(
-                f"warning: {kit} has fewer shapes than wanted; set proportions.apart smaller, or "
-                "proportions.tries or spread larger"
+                f"warning: {kit} has fewer shapes than wanted; set proportions.min_difference smaller, or "
+                "proportions.oversample or spread larger"
             )
-    return [*lines, *(f"warning: {sentence}" for sentence in unstated(exemplar_origins(plan.config)))]
+    return [*lines, *(f"warning: {sentence}" for sentence in missing_licenses(exemplar_origins(plan.config)))]
 
 
 def check(config: Config) -> None:

@@ -20,7 +20,7 @@ from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.penetration import PenetrationTest, depth_bound
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
-from stages.shape.graphs.patterns import SAME_UP
+from stages.shape.graphs.patterns import MAX_UP_DIFFERENCE
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
 from stages.shape.physics.stability import components
@@ -93,7 +93,7 @@ def _fallen(kit: Kit, assembly: Assembly) -> list[int]:
     for part, kind in enumerate(assembly.types.tolist()):
         ups = np.concatenate([each.whole.poses[each.whole.types == kind, axis, :3] for each in kit.exemplars])
         images = kit.types[kind].symmetries[:, :3, :3] @ assembly.poses[part, axis, :3]
-        if np.linalg.norm(images[:, None] - ups[None], axis=2).min() > SAME_UP:
+        if np.linalg.norm(images[:, None] - ups[None], axis=2).min() > MAX_UP_DIFFERENCE:
             fallen.append(part)
     return fallen
 

@@ -140,7 +140,7 @@ class Assembly:
         return tuple(zip(types.tolist(), counts.tolist(), strict=True))
 
 
-NOTHING = Assembly(np.empty(0, np.int16), np.empty((0, 4, 4)), np.empty((0, 2), np.int32))
+EMPTY_ASSEMBLY = Assembly(np.empty(0, np.int16), np.empty((0, 4, 4)), np.empty((0, 2), np.int32))
 """An assembly without parts."""
 
 
@@ -198,12 +198,12 @@ class Exemplar:
     name: str
     assembly: Assembly
     part_names: tuple[str, ...]
-    backdrop: Assembly = field(default_factory=lambda: NOTHING)
+    removed_hubs: Assembly = field(default_factory=lambda: EMPTY_ASSEMBLY)
 
     @property
     def whole(self) -> Assembly:
         """The assembly and its backdrop, without the contacts of the latter: for pictures."""
-        front, behind = self.assembly, self.backdrop
+        front, behind = self.assembly, self.removed_hubs
         types, poses = np.concatenate([front.types, behind.types]), np.concatenate([front.poses, behind.poses])
         return Assembly(types, poses, front.edges)
 

@@ -97,8 +97,8 @@ def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
                 "types.npy": array_bytes(exemplar.assembly.types),
                 "poses.npy": array_bytes(exemplar.assembly.poses),
                 "edges.npy": array_bytes(exemplar.assembly.edges),
-                "hub-types.npy": array_bytes(exemplar.backdrop.types),
-                "hub-poses.npy": array_bytes(exemplar.backdrop.poses),
+                "hub-types.npy": array_bytes(exemplar.removed_hubs.types),
+                "hub-poses.npy": array_bytes(exemplar.removed_hubs.poses),
             }
             writer.write(f"exemplar-{index:04d}", members)
 
@@ -149,7 +149,7 @@ def _exemplar(members: Mapping[str, bytes]) -> Exemplar:
             poses=bytes_array(members["poses.npy"]),
             edges=bytes_array(members["edges.npy"]),
         ),
-        backdrop=Assembly(
+        removed_hubs=Assembly(
             types=bytes_array(members["hub-types.npy"]),
             poses=bytes_array(members["hub-poses.npy"]),
             edges=np.empty((0, 2), dtype=np.int32),

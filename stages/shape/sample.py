@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes, read_shard
-from stages.shape.kit import NOTHING, Assembly
+from stages.shape.kit import EMPTY_ASSEMBLY, Assembly
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Sample:
     kit: str
     graph: str
     lineage: Mapping[str, Any]
-    assembly: Assembly = field(default_factory=lambda: NOTHING)
+    assembly: Assembly = field(default_factory=lambda: EMPTY_ASSEMBLY)
     text: str = ""
 
 

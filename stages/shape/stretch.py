@@ -15,9 +15,9 @@ from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import rounded
 from stages.shape.kit import Assembly, PartMesh
 
-SAME = 1e-6
+RIGID_TOLERANCE = 1e-6
 """A linear map whose singular values are as near to 1 is a rotation."""
-DECIMALS = 9
+STRETCH_DECIMALS = 9
 """So many of a stretch are kept."""
 STRETCHED_DEPTH = 0.02
 """A stretched part may reach so far into another, as a share of the smaller one's diagonal, beyond what their types do
@@ -41,14 +41,14 @@ def split(placed: FloatArray) -> tuple[FloatArray, FloatArray | None]:
     place of the stretches where all placements are rigid."""
     linear = placed[:, :3, :3]
     gaps = np.abs(np.swapaxes(linear, 1, 2) @ linear - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    bent = np.flatnonzero(gaps > SAME)
+    bent = np.flatnonzero(gaps > RIGID_TOLERANCE)
     if not len(bent):
         return placed, None
     u, sizes, vt = np.linalg.svd(linear[bent])
     poses, stretches = placed.copy(), np.tile(np.eye(3), (len(placed), 1, 1))
     poses[bent, :3, :3] = u @ vt
     # On a grid, so that a record is split into the same again: parts that are stretched alike share a mesh.
-    stretches[bent] = np.round(np.swapaxes(vt, 1, 2) @ (sizes[:, :, None] * vt), DECIMALS) + 0.0
+    stretches[bent] = np.round(np.swapaxes(vt, 1, 2) @ (sizes[:, :, None] * vt), STRETCH_DECIMALS) + 0.0
     return poses, stretches
 
 
@@ -63,7 +63,7 @@ def bake(meshes: Sequence[PartMesh], assembly: Assembly) -> tuple[tuple[PartMesh
     use, and behind them one for each type and stretch. As they came where nothing is stretched."""
     if assembly.stretches is None:
         return tuple(meshes), assembly
-    bent = np.abs(assembly.stretches - np.eye(3)).max(axis=(1, 2)) > SAME
+    bent = np.abs(assembly.stretches - np.eye(3)).max(axis=(1, 2)) > RIGID_TOLERANCE
     made = [meshes[each] for each in np.unique(assembly.types[~bent]).tolist()]
     places = {(each, b""): place for place, each in enumerate(np.unique(assembly.types[~bent]).tolist())}
     types = []

@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.errors import Rejected
 from pipeline.stage import Task
-from stages.shape.physics.judge import unmet
+from stages.shape.physics.judge import unmet_requirement
 from stages.shapeassembly.analysis.structure import signature
 from stages.shapeassembly.editing.edits import edited
 from stages.shapeassembly.execution.interpreter import execute
@@ -94,7 +94,7 @@ def _row(text: str, config: ShapeAssemblyConfig) -> dict[str, Any]:
         for block in program.blocks:
             for name in protruding_parts(block):
                 raise Rejected("reaches out of its assembly", f"{name} of {block.name}")
-    weak = unmet(config.require, shape_of_execution(execution))
+    weak = unmet_requirement(config.require, shape_of_execution(execution))
     if weak is not None:
         raise Rejected(weak)
     return {

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan, Task
-from stages.shape.collection.language import Anew, Language, Source
+from stages.shape.collection.language import Language, RebuildShape, Source
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
 from stages.shapeassembly.shape import label_colors, shape_of_text
@@ -47,7 +47,7 @@ def _speaker(task: Task) -> ProgramDecoder:
     return ProgramDecoder(json.loads(listed.read_bytes()))
 
 
-def _anew(places: DatasetPaths) -> Anew:
+def _anew(places: DatasetPaths) -> RebuildShape:
     """The executed program, its labels those of its category as the dataset lists them."""
     labels: dict[str, list[str]] = {}
     path = places.out / places.dataset / "classes.json"
@@ -59,10 +59,10 @@ def _anew(places: DatasetPaths) -> Anew:
 LANGUAGE = Language(
     name="shapeassembly",
     reads=_reads,
-    speaker=_speaker,
+    decoder=_speaker,
     graphs=False,
     text="Its ShapeAssembly program.",
-    anew=_anew,
+    rebuild=_anew,
     coordinates="The unit is that of the program. The middle of its bounding box is the origin, and the middle of each "
     "cuboid is the origin of its mesh.",
 )

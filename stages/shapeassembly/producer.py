@@ -14,5 +14,5 @@ PRODUCER = Producer(
     origins=program_origins,
     limits=("All parts are cuboids.",),
     splits="Samples of programs that are alike up to their numbers stand in one split.",
-    apart=True,
+    graphs_share_split=True,
 )

@@ -19,7 +19,7 @@ from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.shape.collection.assignment import planned_collection, write_listed_samples, write_listings
 from stages.shape.collection.classes import Classes
-from stages.shape.collection.origin import unstated
+from stages.shape.collection.origin import missing_licenses
 from stages.shapeassembly.acceptance import accepted_rows
 from stages.shapeassembly.extraction.shards import extraction_shards, run_extraction
 from stages.shapeassembly.language import ProgramDecoder, assignment_name
@@ -110,7 +110,7 @@ def report(plan: Plan) -> Sequence[str]:
     for shard in (*extraction, name):
         refused.update(plan.rejects("shapeassembly", shard))
     why = ", ".join(f"{count:,} {reason}" for reason, count in refused.most_common())
-    asked = [f"warning: {sentence}" for sentence in unstated(program_origins(plan))]
+    asked = [f"warning: {sentence}" for sentence in missing_licenses(program_origins(plan))]
     return [f"programs: {counts}; {summary['structures']:,} structures; refused: {why or 'none'}", *asked]
 
 

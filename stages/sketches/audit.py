@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from stages.shape.arrays import FloatArray
 from stages.shape.collection.audit import Audit
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.packaged import PackagedSample
 from stages.sketches.cameras import projected
 
 INK = (2e-4, 0.9)
@@ -29,7 +29,7 @@ ASTRAY = 0.02
 """At most so much of the ink lies off the shape."""
 
 
-def sketch_faults(sample: Packaged) -> Iterator[str]:
+def sketch_faults(sample: PackagedSample) -> Iterator[str]:
     """A sentence for each drawing that cannot be read, is blank, or shows no shape where its camera sees it."""
     corners = np.array(list(itertools.product(*np.transpose(sample.record["bounds"]))))
     for index, camera in enumerate(sample.record["sketches"]):
@@ -38,7 +38,9 @@ def sketch_faults(sample: Packaged) -> Iterator[str]:
             yield f"{name} {what}"
 
 
-def _drawing_faults(content: bytes, camera: Mapping[str, Any], corners: FloatArray, sample: Packaged) -> Iterator[str]:
+def _drawing_faults(
+    content: bytes, camera: Mapping[str, Any], corners: FloatArray, sample: PackagedSample
+) -> Iterator[str]:
     """What is wrong with one drawing of a sample in a box with these corners, float64 (8, 3)."""
     from PIL import Image
 
@@ -72,7 +74,7 @@ def _drawing_faults(content: bytes, camera: Mapping[str, Any], corners: FloatArr
     yield from _outline_faults(drawing < 255, camera, sample)
 
 
-def _outline_faults(inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], sample: Packaged) -> Iterator[str]:
+def _outline_faults(inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], sample: PackagedSample) -> Iterator[str]:
     drawn, astray = outline_shares(inked, camera, sample)
     if drawn < DRAWN:
         yield f"draws {drawn:.0%} of the outline that its camera sees"
@@ -80,7 +82,9 @@ def _outline_faults(inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], sam
         yield f"has {astray:.0%} of its ink where its camera does not see the shape"
 
 
-def outline_shares(inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], sample: Packaged) -> tuple[float, float]:
+def outline_shares(
+    inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], sample: PackagedSample
+) -> tuple[float, float]:
     """How much of the outline that a camera sees has ink near it, and how much of the ink lies off the shape, as
     shares. inked: bool (h, w), where there is ink."""
     from scipy.ndimage import binary_erosion, distance_transform_edt
@@ -88,7 +92,7 @@ def outline_shares(inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], samp
     step = max(1, -(-max(inked.shape) // SEEN_FINE))
     rows, columns = (np.arange(step // 2, length, step) for length in inked.shape)
     origins, directions = _rays(camera, columns + 0.5, rows + 0.5)
-    hit = sample.casting.hit(origins.reshape(-1, 3), directions.reshape(-1, 3)).reshape(len(rows), len(columns))
+    hit = sample.rays.hit(origins.reshape(-1, 3), directions.reshape(-1, 3)).reshape(len(rows), len(columns))
     if not hit.any():
         return 0.0, 1.0
     near = camera["line_width"] / 2 + 1.5 * step
@@ -101,12 +105,12 @@ def outline_shares(inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], samp
     return float((to_ink[outline] <= near).mean()), astray / int(inked.sum())
 
 
-def _is_seen_near(place: npt.NDArray[np.int64], near: float, camera: Mapping[str, Any], sample: Packaged) -> bool:
+def _is_seen_near(place: npt.NDArray[np.int64], near: float, camera: Mapping[str, Any], sample: PackagedSample) -> bool:
     """Whether the shape is seen `near` the pixel in row and column `place`, (2,), with rays that no thin part slips
     through."""
     offsets = np.arange(-near, near + FINEST, FINEST)
     origins, directions = _rays(camera, place[1] + 0.5 + offsets, place[0] + 0.5 + offsets)
-    return bool(sample.casting.hit(origins.reshape(-1, 3), directions.reshape(-1, 3)).any())
+    return bool(sample.rays.hit(origins.reshape(-1, 3), directions.reshape(-1, 3)).any())
 
 
 def _rays(camera: Mapping[str, Any], columns: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -11,7 +11,7 @@ from stages.shape.arrays import FloatArray
 from stages.shape.views.camera import View
 
 OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
-DECIMALS = 12
+CAMERA_DECIMALS = 12
 """Further digits of a matrix are noise."""
 
 _PIXELS = {"type": "integer", "minimum": 1}
@@ -58,7 +58,7 @@ def camera_fields(view: View, size: int, flipped: bool) -> dict[str, Any]:
         "width": size,
         "height": size,
         "projection": "perspective" if view.perspective else "orthographic",
-        **{name: (np.round(matrix, DECIMALS) + 0.0).tolist() for name, matrix in matrices.items()},
+        **{name: (np.round(matrix, CAMERA_DECIMALS) + 0.0).tolist() for name, matrix in matrices.items()},
         "flipped": flipped,
     }
 

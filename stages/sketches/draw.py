@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.errors import ShardFailed
 from stages.shape.arrays import ByteArray
-from stages.shape.views.buffers import Backend, visible_triangles
+from stages.shape.views.buffers import RendererName, visible_triangles
 from stages.shape.views.camera import Camera, View
 from stages.shape.views.scene import Scene
 from stages.sketches.settings import SketchView, StrokeOptions
@@ -26,7 +26,7 @@ def jittered_camera(view: SketchView, rng: np.random.Generator) -> Camera:
 
 
 def draw_sketch(
-    scene: Scene, camera: Camera, size: int, supersample: int, options: StrokeOptions, backend: Backend
+    scene: Scene, camera: Camera, size: int, supersample: int, options: StrokeOptions, backend: RendererName
 ) -> tuple[ByteArray, View]:
     """Dark lines on white, uint8 (size, size), and the view that they show.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.config import Config
 from stages.shape.arrays import ByteArray
-from stages.shape.collection.members import Field, Member, Members, Row
+from stages.shape.collection.members import Member, Members, PreviewRow, RecordField
 from stages.shape.views.camera import Camera
 from stages.sketches.cameras import CAMERA_FIELDS
 from stages.sketches.settings import SketchesConfig
@@ -29,14 +29,14 @@ def _members(config: Config) -> tuple[Member, ...]:
     )
 
 
-def _fields(_: Config) -> Mapping[str, Field]:
+def _fields(_: Config) -> Mapping[str, RecordField]:
     properties = {
         "view": {"description": "its name in the config", "type": "string", "minLength": 1},
         **CAMERA_FIELDS,
         "line_width": {"description": "no line is wider; unit: pixels", "type": "number", "exclusiveMinimum": 0},
     }
     return {
-        "sketches": Field(
+        "sketches": RecordField(
             {
                 "description": "the drawings in their order, each with its camera, as it stood after it was fitted "
                 "and jittered and the drawing flipped",
@@ -64,4 +64,4 @@ def _draw(members: Mapping[str, bytes], _: Camera, __: int) -> ByteArray:
     return np.asarray(Image.open(io.BytesIO(members["sketch0.png"])).convert("L"))
 
 
-MEMBERS = Members(of=_members, fields=_fields, row=Row("Sketches", _caption, _draw))
+MEMBERS = Members(of=_members, fields=_fields, row=PreviewRow("Sketches", _caption, _draw))

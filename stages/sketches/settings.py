@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field, field_validator, model_validator
 
 from pipeline.config import StrictModel
-from stages.shape.views.buffers import Backend
+from stages.shape.views.buffers import RendererName
 
 
 class SketchView(StrictModel):
@@ -118,7 +118,7 @@ class SketchesConfig(StrictModel):
     )
     strokes: StrokeOptions = Field(StrokeOptions(), description="what is drawn, and how heavily")
     augment: Augmentation = Field(Augmentation(), description="chances of changes after drawing")
-    backend: Backend = Field(
+    renderer: RendererName = Field(
         "raster",
         description="what finds the visible surfaces, in sketches and preview; raster: our own rasteriser, the "
         "same everywhere; egl: OpenGL, always by Mesa's llvmpipe, at the system's version. Their pictures differ in a "

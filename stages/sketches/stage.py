@@ -12,8 +12,8 @@ from pipeline.stage import Outcome, Plan, Stage, Task
 from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.sample import Sample
-from stages.shape.views.buffers import drawn_by
-from stages.shape.views.probe import check_backend
+from stages.shape.views.buffers import renderer_version
+from stages.shape.views.renderer_check import check_renderer
 from stages.shape.views.scene import Scene, scene_of
 from stages.sketches.cameras import camera_fields
 from stages.sketches.draw import draw_sketch, jittered_camera
@@ -35,8 +35,8 @@ def run_shard(task: Task) -> Outcome:
     summary = {
         "split": task.shard.params["split"],
         "views": [view.name for view in config.views],
-        "backend": config.backend,
-        "renderer": drawn_by(config.backend),
+        "backend": config.renderer,
+        "renderer": renderer_version(config.renderer),
     }
     return Outcome(samples, summary)
 
@@ -50,7 +50,7 @@ def drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene) -
     for index, view in enumerate(config.views):
         camera = jittered_camera(view, task.rng(sample.key, view.name, "camera"))
         try:
-            drawing, seen = draw_sketch(scene, camera, config.size, config.supersample, strokes, config.backend)
+            drawing, seen = draw_sketch(scene, camera, config.size, config.supersample, strokes, config.renderer)
         except ShardFailed as error:
             raise ShardFailed(f"sample {sample.key}, view {view.name}: {error}") from error
         drawing, flipped, thicker = augment(drawing, config.augment, task.rng(sample.key, view.name, "augment"))
@@ -71,7 +71,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 def check_machine(config: Config) -> None:
     """Raises ConfigError where the config's backend cannot draw: no other draws in its place."""
-    check_backend(config.section(SketchesConfig).backend, f"{config.path}: sketches.backend")
+    check_renderer(config.section(SketchesConfig).renderer, f"{config.path}: sketches.renderer")
 
 
 def estimate_bytes(plan: Plan) -> int:

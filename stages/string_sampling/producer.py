@@ -9,7 +9,7 @@ from typing import Any
 from pipeline.config import Config
 from pipeline.stage import Plan
 from stages.exemplars.origins import exemplar_origins
-from stages.shape.collection.members import Field
+from stages.shape.collection.members import RecordField
 from stages.shape.collection.producer import Producer
 from stages.string_sampling.rounds import model_rounds
 from stages.string_sampling.settings import StringSamplingConfig
@@ -44,21 +44,23 @@ def _card(plan: Plan) -> Sequence[str]:
     return ["\n".join(rows)]
 
 
-def _lineage(_: Config) -> Mapping[str, Field]:
+def _lineage(_: Config) -> Mapping[str, RecordField]:
     text = {"type": "string", "minLength": 1}
     return {
-        "model": Field({**text, "description": "dataset that the model was trained on, and the model's folder there"}),
-        "weights": Field({"type": "string", "pattern": "^[0-9a-f]{64}$", "description": "sha256 of its weights"}),
-        "way": Field({**text, "description": "how the point of the latent space was found"}),
-        "string": Field({**text, "description": "what the model wrote there"}),
-        "tries": Field(
+        "model": RecordField(
+            {**text, "description": "dataset that the model was trained on, and the model's folder there"}
+        ),
+        "weights": RecordField({"type": "string", "pattern": "^[0-9a-f]{64}$", "description": "sha256 of its weights"}),
+        "way": RecordField({**text, "description": "how the point of the latent space was found"}),
+        "string": RecordField({**text, "description": "what the model wrote there"}),
+        "tries": RecordField(
             {
                 "type": "integer",
                 "minimum": 1,
                 "description": "parts that were put down until the string was a shape; at least the number of parts",
             }
         ),
-        "known": Field(
+        "known": RecordField(
             {
                 "enum": ["new", "train", "exemplar"],
                 "description": "whether the model has learnt from a shape of this graph, or an exemplar has it",
@@ -75,7 +77,7 @@ PRODUCER = Producer(
     "the dockings of its kit, and kept where the contacts, found anew from the meshes, the neighbourhoods and the "
     "dockings are as the exemplars show them.",
     splits="No two samples have the same shape graph. Near relatives may stand in different splits.",
-    apart=True,
+    graphs_share_split=True,
     lineage=_lineage,
     origins=lambda plan: exemplar_origins(plan.config),
     limits=(

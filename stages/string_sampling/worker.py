@@ -14,7 +14,7 @@ from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_input import input_kit
-from stages.shape.physics.judge import unmet
+from stages.shape.physics.judge import unmet_requirement
 from stages.shape.sample import Sample, write_sample
 from stages.shape.shape import kit_shape
 from stages.string_sampling.instantiation.instantiate import Instantiator
@@ -110,7 +110,7 @@ def _sampled_shapes(
         if faults:
             task.reject(item, FAULTY, f"{string}: {'; '.join(faults)}")
             continue
-        weak = unmet(config.require, kit_shape(kit, found.assembly))
+        weak = unmet_requirement(config.require, kit_shape(kit, found.assembly))
         if weak is not None:
             task.reject(item, weak, string)
             continue

@@ -10,8 +10,8 @@ import numpy as np
 from pipeline.paths import DatasetPaths
 from stages.shape.arrays import IntArray, TypeArray
 from stages.shape.collection.audit import Audit
-from stages.shape.collection.declared import languages
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.discovery import languages
+from stages.shape.collection.packaged import PackagedSample
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_files import load_kit
 from stages.strings.alphabet import make_alphabet
@@ -22,7 +22,7 @@ from stages.strings.settings import Edges, StringsConfig
 from stages.strings.tokens import StringError
 
 
-def string_faults(sample: Packaged) -> Iterator[str]:
+def string_faults(sample: PackagedSample) -> Iterator[str]:
     """A sentence for a shape graph that is not the record's, and for strings that stand for another graph."""
     if not languages()[sample.record["language"]].graphs:
         return
@@ -52,7 +52,7 @@ def string_faults(sample: Packaged) -> Iterator[str]:
         yield "the first line of its txt is not the canonical spanning tree"
 
 
-def _anew(sample: Packaged, places: DatasetPaths) -> Iterator[str]:
+def _anew(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
     """Which contacts are faces is asked of the kit again, but of stretched parts it does not know."""
     if not languages()[sample.record["language"]].graphs or _edges(sample) != "faces" or sample.shape.is_stretched:
         return
@@ -64,7 +64,7 @@ def _anew(sample: Packaged, places: DatasetPaths) -> Iterator[str]:
         yield "its txt does not tell of its face contacts"
 
 
-def _edges(sample: Packaged) -> Edges:
+def _edges(sample: PackagedSample) -> Edges:
     """What the strings of the dataset tell of."""
     return StringsConfig.model_validate(sample.sections.get("strings", {})).edges
 
@@ -97,4 +97,4 @@ def _around(types: TypeArray, edges: Sequence[Sequence[int]] | IntArray) -> dict
     return {kind: list(each.values()) for kind, each in found.items()}
 
 
-AUDIT = Audit(faults=string_faults, anew=_anew)
+AUDIT = Audit(faults=string_faults, recheck=_anew)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from stages.shape.graphs.neighbourhoods import admits, admits_more
+from stages.shape.graphs.neighbourhoods import admits, admits_superset
 from stages.shape.kit import Grammar
 from stages.strings.alphabet import Alphabet
 from stages.strings.decoder import Decoded, decode
@@ -44,7 +44,7 @@ def check_string(string: str, alphabet: Alphabet, grammar: Grammar, edges: Edges
         if token.kind == "node":
             counts = Counter(neighbours[token.node])
             multiset = tuple(sorted(counts.items()))
-            if not (admits if edges == "all" else admits_more)(grammar, types[token.node], multiset):
+            if not (admits if edges == "all" else admits_superset)(grammar, types[token.node], multiset):
                 seen = ", ".join(f"{count} {alphabet.tokens[kind]}" for kind, count in multiset) or "no neighbour"
                 raise StringError(string, token.index, f"{token.text} {_verdict(grammar)} with {seen} around it")
     return decoded

@@ -10,7 +10,7 @@ from pipeline.errors import Rejected, ShardFailed
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.shape.collection.collection import Collection, add_members
-from stages.shape.collection.declared import language_of
+from stages.shape.collection.discovery import language_of
 from stages.shape.collection.shards import PRODUCERS, collection_shards
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_input import input_kits

@@ -8,8 +8,8 @@ import numpy as np
 
 from pipeline.paths import DatasetPaths
 from stages.shape.collection.audit import Audit
-from stages.shape.collection.declared import languages
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.discovery import languages
+from stages.shape.collection.packaged import PackagedSample
 from stages.shape.collection.pairs import CONTACTS, JOINTS
 from stages.shape.physics.judge import judge_of, physical_fields
 from stages.shape.physics.settings import PhysicsConfig
@@ -21,7 +21,7 @@ SLACK = 1e-3
 """As a share of the number, so near a number is that is computed from rounded poses."""
 
 
-def contradictions(sample: Packaged) -> Iterator[str]:
+def contradictions(sample: PackagedSample) -> Iterator[str]:
     """A sentence for each two fields that cannot both be true."""
     yield from _pair_faults(sample)
     physics, parts = sample.record["physics"], len(sample.shape)
@@ -36,7 +36,7 @@ def contradictions(sample: Packaged) -> Iterator[str]:
         yield "its json names a weakest part that is not there"
 
 
-def judged_anew(sample: Packaged, _: DatasetPaths) -> Iterator[str]:
+def judged_anew(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
     """A sentence for each field that statics finds otherwise, and for contacts that are none."""
     shape, recorded = sample.shape, sample.record["physics"]
     judge = judge_of(shape.meshes, shape.up, _config(sample))
@@ -59,7 +59,7 @@ def judged_anew(sample: Packaged, _: DatasetPaths) -> Iterator[str]:
             yield f"{named} recorded as neighbours"
 
 
-def _pair_faults(sample: Packaged) -> Iterator[str]:
+def _pair_faults(sample: PackagedSample) -> Iterator[str]:
     """Contacts and joints are pairs of parts, in order, and the joints make the components."""
     parts, physics = len(sample.record["parts"]), sample.record["physics"]
     for member in (CONTACTS, JOINTS):
@@ -77,8 +77,8 @@ def _pair_faults(sample: Packaged) -> Iterator[str]:
         yield "its joints do not make as many components as physics says"
 
 
-def _config(sample: Packaged) -> PhysicsConfig:
+def _config(sample: PackagedSample) -> PhysicsConfig:
     return PhysicsConfig.model_validate(sample.sections["validity"])
 
 
-AUDIT = Audit(faults=contradictions, anew=judged_anew)
+AUDIT = Audit(faults=contradictions, recheck=judged_anew)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pipeline.config import Config
-from stages.shape.collection.members import Column, Field, Member, Members
+from stages.shape.collection.members import IndexColumn, Member, Members, RecordField
 from stages.shape.collection.pairs import CONTACTS, JOINTS
 
 
@@ -64,9 +64,9 @@ def _members(_: Config) -> tuple[Member, ...]:
     )
 
 
-def _fields(_: Config) -> Mapping[str, Field]:
+def _fields(_: Config) -> Mapping[str, RecordField]:
     return {
-        "physics": Field(
+        "physics": RecordField(
             {
                 "description": "does it stand? By statics on its geometry; the pairs of joints.npy hold together",
                 "type": "object",
@@ -75,10 +75,10 @@ def _fields(_: Config) -> Mapping[str, Field]:
                 "additionalProperties": False,
             }
         ),
-        "contact_tolerance": Field(
+        "contact_tolerance": RecordField(
             _number("largest distance of parts in contact, in the units of the shape", exclusiveMinimum=0)
         ),
-        "joint_tolerance": Field(
+        "joint_tolerance": RecordField(
             _number(
                 "largest distance of parts that count as connected in physics, and of parts that stand from the ground",
                 minimum=0,
@@ -91,8 +91,8 @@ MEMBERS = Members(
     of=_members,
     fields=_fields,
     columns={
-        "rooted": Column("bool", ("physics", "rooted")),
-        "stable": Column("bool", ("physics", "stable")),
-        "margin": Column("float64", ("physics", "margin")),
+        "rooted": IndexColumn("bool", ("physics", "rooted")),
+        "stable": IndexColumn("bool", ("physics", "stable")),
+        "margin": IndexColumn("float64", ("physics", "margin")),
     },
 )

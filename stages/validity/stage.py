@@ -41,7 +41,7 @@ def run_shard(task: Task) -> Outcome:
             raise Rejected("no body to judge", str(error)) from error
         touching, connected = judge.tolerances(assembly)
         if graphs:
-            touching = collection.speaker.sources[sample.kit].contact_tolerance
+            touching = collection.decoder.sources[sample.kit].contact_tolerance
         physics = physical_fields(validity)
         fields = {
             "physics": physics,

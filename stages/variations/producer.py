@@ -10,7 +10,7 @@ from pipeline.stage import Plan
 from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.resolved_table import resolved_table
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.collection.members import Field
+from stages.shape.collection.members import RecordField
 from stages.shape.collection.producer import Producer
 from stages.variations.report.measures import measure_table
 from stages.variations.report.split_report import splits_table
@@ -55,14 +55,14 @@ def _made(plan: Plan) -> Sequence[str]:
     return [*resolved_table(plan), *_endings(plan)]
 
 
-def _lineage(_: Config) -> Mapping[str, Field]:
+def _lineage(_: Config) -> Mapping[str, RecordField]:
     whole = {"type": "integer", "minimum": 0}
     share = {"type": "number", "exclusiveMinimum": 0, "maximum": 1}
     places = {"type": "array", "items": whole, "minItems": 1}
     row = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
     return {
-        "name": Field({"type": "string", "minLength": 1, "description": "what the search calls it"}),
-        "made_of": Field(
+        "name": RecordField({"type": "string", "minLength": 1, "description": "what the search calls it"}),
+        "made_of": RecordField(
             {
                 "type": "array",
                 "items": {"type": "string", "minLength": 1},
@@ -71,27 +71,27 @@ def _lineage(_: Config) -> Mapping[str, Field]:
                 "of a grown shape the exemplars that its patterns are of, that of its first part first",
             }
         ),
-        "parts_from": Field(
+        "parts_from": RecordField(
             {
                 **places,
                 "description": "how many parts came from each of made_of",
             }
         ),
-        "boundary": Field(
+        "boundary": RecordField(
             {
                 **places,
                 "description": "parts of the first of made_of along which it was cut, by their places there; of a "
                 "grown shape the one that it was grown from",
             }
         ),
-        "images": Field(
+        "images": RecordField(
             {
                 **places,
                 "description": "parts of the second of made_of that each part of the boundary came to lie on, or, by "
                 "substitution, to dock to; of a grown shape the place that its first part has in it",
             }
         ),
-        "transform": Field(
+        "transform": RecordField(
             {
                 "type": "array",
                 "items": row,
@@ -101,7 +101,7 @@ def _lineage(_: Config) -> Mapping[str, Field]:
                 "translation, in the coordinates of the model files; a grown shape is not moved",
             }
         ),
-        "repeats": Field(
+        "repeats": RecordField(
             {
                 **whole,
                 "minimum": 1,
@@ -109,14 +109,14 @@ def _lineage(_: Config) -> Mapping[str, Field]:
                 "images and motion are then: a recursive rule may be carried out several times",
             }
         ),
-        "deformed": Field(
+        "deformed": RecordField(
             {
                 "type": "boolean",
                 "description": "whether parts of it were moved by themselves, or are no longer as long, wide or high "
                 "as in the exemplars; where the piece was, motion is that of its first part",
             }
         ),
-        "copied": Field(
+        "copied": RecordField(
             {
                 "type": "object",
                 "properties": {
@@ -130,8 +130,10 @@ def _lineage(_: Config) -> Mapping[str, Field]:
                 "description": "the largest connected piece that stands just so, moved as a whole, in one exemplar",
             }
         ),
-        "restored_hubs": Field({**whole, "description": "parts at the end of the list that were put back behind it"}),
-        "turned_degrees": Field(
+        "restored_hubs": RecordField(
+            {**whole, "description": "parts at the end of the list that were put back behind it"}
+        ),
+        "turned_degrees": RecordField(
             {
                 "type": "number",
                 "minimum": 0,
@@ -154,7 +156,7 @@ PRODUCER = Producer(
     "`lineage.parents` are samples of its own split, by their keys, and exemplars.",
     splits="Samples whose shape graphs are equal stand in one split.",
     nearness=_splits,
-    apart=True,
+    graphs_share_split=True,
     lineage=_lineage,
     origins=lambda plan: exemplar_origins(plan.config),
     limits=(

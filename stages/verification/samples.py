@@ -13,9 +13,9 @@ import numpy as np
 from pipeline.shards import bytes_array
 from stages.package.glb import glb_bytes
 from stages.package.record import piece_count
-from stages.shape.collection.declared import audits
-from stages.shape.collection.language import Anew
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.discovery import audits
+from stages.shape.collection.language import RebuildShape
+from stages.shape.collection.packaged import PackagedSample
 from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.geometry.pose import rounded
 from stages.shape.kit import Assembly
@@ -44,22 +44,22 @@ def read_packaged(
     key: str,
     record: Mapping[str, Any],
     members: Mapping[str, bytes],
-    anew: Mapping[str, Anew],
+    anew: Mapping[str, RebuildShape],
     sections: Mapping[str, Any],
-) -> Packaged:
+) -> PackagedSample:
     """The sample, with the shape that its record says. `anew`: by language.
 
     Raises SampleError where arrays or shape cannot be had; LookupError where what the shape is made from is not there.
     """
     arrays = {name: _array(name, content) for name, content in members.items() if name.endswith(".npy")}
-    packaged = Packaged(key, record, members, arrays, _NOTHING, sections)
+    packaged = PackagedSample(key, record, members, arrays, _NOTHING, sections)
     try:
         shape = anew[record["language"]](record, packaged.contacts)
         parts = record["parts"]
         first = parts[0]["class"] - int(shape.part_labels[0])
         assembly = replace(shape.assembly, poses=rounded(shape.assembly.poses))
         shape = replace(shape, assembly=assembly, first_class=first)
-        return Packaged(key, record, members, arrays, shape, sections)
+        return PackagedSample(key, record, members, arrays, shape, sections)
     except LookupError as error:
         if isinstance(error, KeyError | IndexError):
             raise SampleError(f"its json cannot be meant: nothing at {error}") from error
@@ -79,7 +79,7 @@ def record_faults(record: Mapping[str, Any], key: str, split: str, kits: Collect
         yield f"its json has nothing at {', '.join(empty[:3])}"
 
 
-def sample_faults(sample: Packaged) -> Iterator[str]:
+def sample_faults(sample: PackagedSample) -> Iterator[str]:
     """What is wrong with a sample beside that: a sentence for each fault."""
     record, shape = sample.record, sample.shape
     yield from _part_faults(record, shape)
@@ -94,7 +94,7 @@ def sample_faults(sample: Packaged) -> Iterator[str]:
         yield from _asked(each.faults, sample)
 
 
-def array_faults(sample: Packaged, described: list[dict[str, Any]]) -> Iterator[str]:
+def array_faults(sample: PackagedSample, described: list[dict[str, Any]]) -> Iterator[str]:
     """Arrays that are not of the type and shape that the manifest says, or hold what is no number."""
     lengths: dict[str, int] = {"parts": len(sample.record["parts"])}
     for each in described:
@@ -133,7 +133,7 @@ def _array(name: str, content: bytes) -> np.ndarray:
         raise SampleError(f"{name} cannot be read: {error}") from error
 
 
-def _asked(faults: Callable[[Packaged], Iterator[str]], sample: Packaged) -> Iterator[str]:
+def _asked(faults: Callable[[PackagedSample], Iterator[str]], sample: PackagedSample) -> Iterator[str]:
     """The faults; a record in which what is asked for is missing has one."""
     try:
         yield from faults(sample)
@@ -159,7 +159,7 @@ def _part_faults(record: Mapping[str, Any], shape: Shape) -> Iterator[str]:
         yield "its json has other poses than its source makes"
 
 
-def _count_faults(sample: Packaged) -> Iterator[str]:
+def _count_faults(sample: PackagedSample) -> Iterator[str]:
     pairs, parts = sample.contacts, len(sample.record["parts"])
     if len(pairs) and (pairs.min() < 0 or pairs.max() >= parts or (pairs[:, 0] >= pairs[:, 1]).any()):
         yield "its contacts are no pairs of its parts, the lower one first"
@@ -217,7 +217,7 @@ def _alike(found: Any, made: Any, near: float) -> bool:
     return bool(found == made)
 
 
-def _glb_fault(sample: Packaged) -> str:
+def _glb_fault(sample: PackagedSample) -> str:
     """Which part of the mesh it is."""
     import io
 

@@ -16,9 +16,9 @@ from pipeline.paths import DatasetPaths
 from pipeline.shards import read_shard
 from stages.package.index import index_row, tar_bytes
 from stages.package.schema import schema_faults, validator_of
-from stages.shape.collection.declared import audits, languages
-from stages.shape.collection.declared import members as declared_members
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.discovery import audits, languages
+from stages.shape.collection.discovery import members as declared_members
+from stages.shape.collection.packaged import PackagedSample
 from stages.verification.files import ClassCounts, SampleRow
 from stages.verification.findings import Findings
 from stages.verification.samples import (
@@ -110,7 +110,9 @@ def shard_samples(path: Path) -> Iterator[tuple[str, int, dict[str, bytes]]]:
             yield key, offset, members
 
 
-def _faults(sample: Packaged, manifest: Mapping[str, Any], places: DatasetPaths | None) -> Iterator[tuple[str, str]]:
+def _faults(
+    sample: PackagedSample, manifest: Mapping[str, Any], places: DatasetPaths | None
+) -> Iterator[tuple[str, str]]:
     """The faults of a sample with the checks that find them; with `places` it is looked at by other means, too."""
     try:
         yield from (("samples", what) for what in array_faults(sample, manifest["members"]))

@@ -9,10 +9,10 @@ import numpy as np
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.kit import Assembly, Grammar, Kit, PartType
 from stages.shape.shape import kit_shape
-from stages.shape.views.buffers import Backend, render_buffers
+from stages.shape.views.buffers import RendererName, render_buffers
 from stages.shape.views.camera import Camera
 from stages.shape.views.opengl import load_pyrender
-from stages.shape.views.probe import probe
+from stages.shape.views.renderer_check import probe
 from stages.shape.views.scene import Scene, scene_of
 from stages.sketches.draw import draw_sketch
 from stages.sketches.image import png_bytes
@@ -26,12 +26,12 @@ COLUMNS, SIDES = 6, 40
 def bench() -> Iterator[Measure]:
     """Drawings of 224 x 224 with 2 x 2 supersampling, PNG included, by each backend; then the buffers alone."""
     views = [Camera(azimuth, elevation) for azimuth, elevation in ((-40.0, 25.0), (35.0, 15.0), (25.0, 55.0))]
-    backends: list[Backend] = ["egl", "raster"] if probe("egl") is None else ["raster"]
+    backends: list[RendererName] = ["egl", "raster"] if probe("egl") is None else ["raster"]
     triangles = int(_colonnade().triangle_first[-1])
     note = f"{SIZE}x{SIZE}, {SUPERSAMPLE}x{SUPERSAMPLE}, {triangles:,} triangles, {len(_colonnade())} parts"
     for backend in backends:
 
-        def sketches(backend: Backend = backend) -> int:
+        def sketches(backend: RendererName = backend) -> int:
             scene = _colonnade()
             for view in views:
                 png_bytes(draw_sketch(scene, view, SIZE, SUPERSAMPLE, StrokeOptions(), backend)[0])
@@ -40,7 +40,7 @@ def bench() -> Iterator[Measure]:
         yield Measure(f"sketches, {backend}", "sketches", rate(sketches), note=note)
     for backend in backends:
 
-        def buffers(backend: Backend = backend) -> int:
+        def buffers(backend: RendererName = backend) -> int:
             scene = _colonnade()
             for view in views:
                 render_buffers(scene, view, (SIZE, SIZE), SUPERSAMPLE, backend)

@@ -26,7 +26,7 @@ from stages.programs.files import named_values, shape_glb
 from stages.programs.program import find_program
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Assembly, Kit
-from stages.shape.physics.judge import unmet
+from stages.shape.physics.judge import unmet_requirement
 from stages.shape.shape import kit_shape
 from stages.variations.constraint import build_test
 from stages.variations.novelty.features import AXES, MIN_MIXTURE
@@ -159,9 +159,9 @@ def _standing(kit: Kit, found: Sequence[Assembly]) -> list[Assembly]:
     """Those that stand and bear small pushes, where the exemplars do: what `variations.require.stable` keeps by itself
     of a kit that leaves it open; of other kits all."""
     physical = VariantRequirements().physical(stable=True)
-    if any(unmet(physical, kit_shape(kit, each)) for each in _exemplars(kit)):
+    if any(unmet_requirement(physical, kit_shape(kit, each)) for each in _exemplars(kit)):
         return list(found)
-    return [each for each in found if unmet(physical, kit_shape(kit, each)) is None]
+    return [each for each in found if unmet_requirement(physical, kit_shape(kit, each)) is None]
 
 
 def _listed(name: str, kit: Kit, config: SearchConfig) -> str:

@@ -6,14 +6,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from pipeline.paths import DatasetPaths
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.packaged import PackagedSample
 
 
-def _nothing(_: Packaged) -> Iterator[str]:
+def _nothing(_: PackagedSample) -> Iterator[str]:
     return iter(())
 
 
-def _nothing_anew(_: Packaged, __: DatasetPaths) -> Iterator[str]:
+def _nothing_anew(_: PackagedSample, __: DatasetPaths) -> Iterator[str]:
     return iter(())
 
 
@@ -27,5 +27,5 @@ class Audit:
     the dataset still hold; asked of some samples.
     """
 
-    faults: Callable[[Packaged], Iterator[str]] = _nothing
-    anew: Callable[[Packaged, DatasetPaths], Iterator[str]] = _nothing_anew
+    faults: Callable[[PackagedSample], Iterator[str]] = _nothing
+    recheck: Callable[[PackagedSample, DatasetPaths], Iterator[str]] = _nothing_anew

@@ -9,7 +9,7 @@ from pipeline.errors import Rejected
 from pipeline.shards import ShardWriter
 from pipeline.stage import Task
 from stages.shape.collection.classes import Classes
-from stages.shape.collection.declared import language_of
+from stages.shape.collection.discovery import language_of
 from stages.shape.sample import Sample, read_samples
 from stages.shape.shape import Shape, upright
 
@@ -21,8 +21,8 @@ class Collection:
         self._task = task
         self.producer = str(task.shard.params["producer"])
         self.language = language_of(self.producer)
-        self.speaker = self.language.speaker(task)
-        self.classes = Classes.of(self.speaker.sources)
+        self.decoder = self.language.decoder(task)
+        self.classes = Classes.of(self.decoder.sources)
 
     def samples(self, shard: str = "") -> Iterator[Sample]:
         """The samples of the collection's shard `shard`, or of the task's own, in order, one in memory at a time."""
@@ -30,7 +30,7 @@ class Collection:
 
     def shape(self, sample: Sample) -> Shape:
         """The shape of a sample. The classes of its parts are those of the dataset."""
-        shape = upright(self.speaker.shape(sample))
+        shape = upright(self.decoder.shape(sample))
         return replace(shape, first_class=self.classes.first[sample.kit])
 
 

@@ -12,7 +12,7 @@ from stages.shape.arrays import IntArray
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape
 
-Anew = Callable[[Mapping[str, Any], IntArray], Shape]
+RebuildShape = Callable[[Mapping[str, Any], IntArray], Shape]
 """The shape of a record and its contacts, int32 (m, 2)."""
 
 
@@ -31,7 +31,7 @@ class Source:
     contact_tolerance: float = 0.0
 
 
-class Speaker(Protocol):
+class ShapeDecoder(Protocol):
     """A language with what it reads of a task: it knows the sources of the dataset."""
 
     @property
@@ -61,8 +61,8 @@ class Language:
 
     name: str
     reads: Callable[[Plan], tuple[str, ...]]
-    speaker: Callable[[Task], Speaker]
+    decoder: Callable[[Task], ShapeDecoder]
     graphs: bool
     text: str
-    anew: Callable[[DatasetPaths], Anew]
+    rebuild: Callable[[DatasetPaths], RebuildShape]
     coordinates: str = ""

@@ -31,14 +31,14 @@ class Member:
 
 
 @dataclass(frozen=True)
-class Field:
+class RecordField:
     """One field of a sample's record: its JSON schema, with a `description`."""
 
     schema: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Column:
+class IndexColumn:
     """A column of the index: its Arrow type, and where in a record its value stands."""
 
     kind: str
@@ -46,7 +46,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Row:
+class PreviewRow:
     """A row of the preview picture: the same samples as in the first row, drawn from what a stage has made of them.
 
     title; caption: what is shown, in words; draw: members of one sample, camera and size in pixels -> uint8 picture.
@@ -57,7 +57,7 @@ class Row:
     draw: Callable[[Mapping[str, bytes], Camera, int], ByteArray]
 
 
-def _no_fields(_: Config) -> Mapping[str, Field]:
+def _no_fields(_: Config) -> Mapping[str, RecordField]:
     return {}
 
 
@@ -78,7 +78,7 @@ class Members:
     """
 
     of: Callable[[Config], tuple[Member, ...]]
-    fields: Callable[[Config], Mapping[str, Field]] = _no_fields
-    columns: Mapping[str, Column] = field(default_factory=dict)
-    row: Row | None = None
+    fields: Callable[[Config], Mapping[str, RecordField]] = _no_fields
+    columns: Mapping[str, IndexColumn] = field(default_factory=dict)
+    row: PreviewRow | None = None
     card: Callable[[Plan], Sequence[str]] = _nothing_to_say

@@ -39,7 +39,7 @@ class Origin:
     key: str
 
 
-def unstated(origins: Sequence[Origin]) -> list[str]:
+def missing_licenses(origins: Sequence[Origin]) -> list[str]:
     """A sentence for each file whose licence nobody has stated, with the key that does."""
     return [
         f"licence of {each.file}: not stated; say it with {each.key}: {{license: ..., author: ..., source: ...}}"

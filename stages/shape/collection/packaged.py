@@ -12,12 +12,12 @@ import numpy as np
 from stages.shape.arrays import IntArray
 from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.geometry.bounds import shape_bounds
-from stages.shape.geometry.casting import Casting
+from stages.shape.geometry.ray_casting import RayCaster
 from stages.shape.shape import Shape
 
 
 @dataclass(frozen=True)
-class Packaged:
+class PackagedSample:
     """One sample of a finished dataset.
 
     record: its `json`; members: its files by what stands after the key; arrays: the `.npy` ones among them.
@@ -44,6 +44,6 @@ class Packaged:
         return float((bounds[1] - bounds[0]).max())
 
     @cached_property
-    def casting(self) -> Casting:
+    def rays(self) -> RayCaster:
         """The shape as rays see it."""
-        return Casting(self.shape)
+        return RayCaster(self.shape)

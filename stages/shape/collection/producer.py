@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.config import Config
 from pipeline.stage import Plan
-from stages.shape.collection.members import Field
+from stages.shape.collection.members import RecordField
 from stages.shape.collection.origin import Origin
 
 
@@ -16,7 +16,7 @@ def _nothing_to_add(_: Plan) -> Sequence[str]:
     return ()
 
 
-def _no_lineage(_: Config) -> Mapping[str, Field]:
+def _no_lineage(_: Config) -> Mapping[str, RecordField]:
     return {}
 
 
@@ -53,9 +53,9 @@ class Producer:
     asked: Callable[[Config], bool]
     sentence: str
     splits: str
-    apart: bool
+    graphs_share_split: bool
     limits: tuple[str, ...] = ()
-    lineage: Callable[[Config], Mapping[str, Field]] = _no_lineage
+    lineage: Callable[[Config], Mapping[str, RecordField]] = _no_lineage
     origins: Callable[[Plan], Sequence[Origin]] = _no_origins
     nearness: Callable[[Plan], Sequence[str]] = _nothing_to_add
     card: Callable[[Plan], Sequence[str]] = _nothing_to_add

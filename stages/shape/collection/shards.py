@@ -5,7 +5,7 @@ from __future__ import annotations
 from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.stage import Plan, Shard
-from stages.shape.collection.declared import language_of, producers
+from stages.shape.collection.discovery import language_of, producers
 
 PRODUCERS = "*/producer.py"
 """What a stage that reads samples names among its inputs: every stage that makes them."""

@@ -42,8 +42,8 @@ class ContactTest:
         return np.array([each.diagonal for each in self.types])
 
     def mesh(self, index: int) -> Mesh:
-        """The box tree of a type (stages.shape.geometry.triangles), built at first use."""
-        from stages.shape.geometry.triangles import build_tree
+        """The box tree of a type (stages.shape.geometry.mesh_pairs), built at first use."""
+        from stages.shape.geometry.mesh_pairs import build_tree
 
         if index not in self._meshes:
             self._meshes[index] = build_tree(self.types[index].vertices, self.types[index].faces)
@@ -51,7 +51,7 @@ class ContactTest:
 
     def touches(self, a: int, b: int, pose: FloatArray, tolerance: float | None = None) -> bool:
         """Whether a part of type `b` at `pose` (4, 4), in coordinates of a part of type `a`, touches that part."""
-        from stages.shape.geometry.triangles import first_contact
+        from stages.shape.geometry.mesh_pairs import first_contact
 
         return first_contact(self.mesh(a), self.mesh(b), pose, self.tolerance if tolerance is None else tolerance)
 
@@ -63,7 +63,7 @@ class ContactTest:
 
     def _patches(self, a: int, b: int, pose: FloatArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
         """Points, areas and crossings of `contact_patches`; areas and crossings are none where there is no contact."""
-        from stages.shape.geometry.triangles import contact_patches, near_pairs
+        from stages.shape.geometry.mesh_pairs import contact_patches, near_pairs
 
         pairs = near_pairs(self.mesh(a), self.mesh(b), pose, self.tolerance)
         patches: tuple[FloatArray, FloatArray, np.ndarray] = contact_patches(

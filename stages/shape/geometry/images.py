@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.geometry.cells import OWN, cell_hash
+from stages.shape.geometry.grid_hash import OWN_CELL, cell_hash
 
 
 @numba.njit(cache=True)
@@ -48,7 +48,7 @@ def distinct_images(vectors, labels, tolerance, same):
             continue
         if nearest >= 0 and labels[kept[nearest]] // 2 == labels[candidate] // 2:
             labels[candidate] = labels[kept[nearest]]
-        cell = cell_hash(vector, OWN, reach) & (size - 1)
+        cell = cell_hash(vector, OWN_CELL, reach) & (size - 1)
         following[count] = heads[cell]
         heads[cell] = count
         kept[count] = candidate

@@ -6,7 +6,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-DECIMALS = 12
+POSE_DECIMALS = 12
 """So many of the numbers of a record are kept."""
 
 
@@ -53,7 +53,7 @@ def pose_vectors(poses: FloatArray, length: float) -> FloatArray:
 
 def rounded(numbers: FloatArray) -> FloatArray:
     """`numbers` as a record has them, without the noise of their last digits and without minus zeros."""
-    return np.round(numbers, DECIMALS) + 0.0
+    return np.round(numbers, POSE_DECIMALS) + 0.0
 
 
 def rigid_fit(source: FloatArray, target: FloatArray) -> FloatArray:

@@ -51,7 +51,7 @@ def admits(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
     return all(pair in together for pair in combinations(sorted(types), 2))
 
 
-def admits_more(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
+def admits_superset(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
     """Whether a part of type `part_type` may have these `neighbours` and, it may be, others: what a graph that leaves
     out contacts can show of it."""
     if part_type in grammar.hubs:

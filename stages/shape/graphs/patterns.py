@@ -12,7 +12,7 @@ from stages.shape.geometry.docking import DockingTable
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Kit, PartType
 
-SAME_UP = 0.02
+MAX_UP_DIFFERENCE = 0.02
 """Ways up that differ by less, as unit vectors, are one."""
 
 
@@ -73,7 +73,7 @@ def _same(kit: Kit, first: Pattern, second: Pattern, upright: bool) -> bool:
     """Whether one pattern is the other, turned by a symmetry of the part in the middle."""
     turns = kit.types[first.part_type].symmetries[:, :3, :3]
     if upright:
-        turns = turns[np.linalg.norm(turns @ first.up - second.up, axis=1) < SAME_UP]
+        turns = turns[np.linalg.norm(turns @ first.up - second.up, axis=1) < MAX_UP_DIFFERENCE]
     limit = 2.0 * kit.pose_tolerance
     for turn in turns:
         places = first.poses[:, :3, 3] @ turn.T
@@ -95,7 +95,7 @@ def _looks_same(part_type: PartType, rotation: FloatArray, other: FloatArray, li
     return bool(np.linalg.norm(gaps.reshape(-1, 9), axis=1).min() * part_type.diagonal / 2 <= limit)
 
 
-def seen_once(patterns: Sequence[Pattern]) -> float:
+def unique_pattern_share(patterns: Sequence[Pattern]) -> float:
     """The share of the exemplars' parts whose pattern no other part shows: it foretells how much growth copies."""
     total = sum(each.seen for each in patterns)
     return sum(each.seen == 1 for each in patterns) / total

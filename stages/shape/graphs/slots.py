@@ -24,21 +24,21 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.geometry.pose import invert
-from stages.shape.graphs.patterns import SAME_UP, Pattern, observed_patterns
+from stages.shape.graphs.patterns import MAX_UP_DIFFERENCE, Pattern, observed_patterns
 from stages.shape.kit import Assembly, Kit, Strictness
 
-OVERLAP = 0.3
+MIN_SLOT_OVERLAP = 0.3
 """Share of the smaller box from which on two places are one slot."""
 IMAGES = 8192
 """Where the symmetric images of what was seen of a way to stand have more members than this, symmetry is left out of
 account: round parts have hundreds, all alike."""
-PATTERNS = 256
+MAX_PATTERNS = 256
 """Most patterns of a way to stand that are offered to growth."""
 DRAWS = 2048
 """Random neighbourhoods that are drawn where there are too many to list."""
 STEPS = 4096
 """Most steps of one listing of neighbourhoods."""
-SLOTS = 32
+MAX_SLOTS = 32
 """Parts with more slots than this, which are hubs, have no neighbourhoods offered but those that were observed."""
 UNSEEN = 0.5
 """Weight of a neighbourhood that no part shows, beside one that is shown once."""
@@ -104,11 +104,11 @@ class SlotGrammar:
         known = self._stances.setdefault(pattern.part_type, [])
         turns = self.kit.types[pattern.part_type].symmetries[:, :3, :3]
         for stance in known:
-            if not self.upright or np.linalg.norm(turns @ pattern.up - stance.up, axis=1).min() < SAME_UP:
+            if not self.upright or np.linalg.norm(turns @ pattern.up - stance.up, axis=1).min() < MAX_UP_DIFFERENCE:
                 return stance
         kept = turns
         if self.upright:
-            kept = turns[np.linalg.norm(turns @ pattern.up - pattern.up, axis=1) < SAME_UP]
+            kept = turns[np.linalg.norm(turns @ pattern.up - pattern.up, axis=1) < MAX_UP_DIFFERENCE]
         known.append(_Stance(pattern.part_type, pattern.up, kept))
         return known[-1]
 
@@ -116,7 +116,7 @@ class SlotGrammar:
         """The symmetries (k, 3, 3) that bring a part's way up to that of the stance; all where nothing is upright."""
         turns: FloatArray = self.kit.types[stance.part_type].symmetries[:, :3, :3]
         if self.upright:
-            turns = turns[np.linalg.norm(turns @ up - stance.up, axis=1) < SAME_UP]
+            turns = turns[np.linalg.norm(turns @ up - stance.up, axis=1) < MAX_UP_DIFFERENCE]
         return turns
 
     def _observe(self, stance: _Stance) -> None:
@@ -191,7 +191,7 @@ class SlotGrammar:
         volumes = np.prod(boxes[:, 1] - boxes[:, 0], axis=1)
         for i in range(count - 1):
             shared = np.minimum(boxes[i, 1], boxes[i + 1 :, 1]) - np.maximum(boxes[i, 0], boxes[i + 1 :, 0])
-            much = np.prod(shared, axis=1) > OVERLAP * np.minimum(volumes[i], volumes[i + 1 :])
+            much = np.prod(shared, axis=1) > MIN_SLOT_OVERLAP * np.minimum(volumes[i], volumes[i + 1 :])
             for j in (np.flatnonzero((shared > 0).all(axis=1) & much) + i + 1).tolist():
                 owner[owner == owner[j]] = owner[i]
         _, slot_of = np.unique(owner, return_inverse=True)
@@ -253,7 +253,7 @@ class SlotGrammar:
                     chosen[key] = before + seen, first
                 owner = stance.patterns[0].owner
                 for places in self._others(stance):
-                    if len(chosen) >= PATTERNS:
+                    if len(chosen) >= MAX_PATTERNS:
                         break
                     chosen.setdefault(_canonical(stance, places), (UNSEEN, owner))
                 for places, (weight, owner) in chosen.items():
@@ -264,10 +264,10 @@ class SlotGrammar:
 
     def _others(self, stance: _Stance) -> Iterator[State]:
         """Neighbourhoods that the grammar admits: all in order where they are few, else drawn at random."""
-        if not 0 < stance.slots <= SLOTS:
+        if not 0 < stance.slots <= MAX_SLOTS:
             return
         listed = list(self._list(stance))
-        if len(listed) < PATTERNS * len(stance.turns):
+        if len(listed) < MAX_PATTERNS * len(stance.turns):
             yield from listed
             return
         rng = np.random.Generator(np.random.PCG64([stance.part_type, stance.slots]))

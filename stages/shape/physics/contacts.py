@@ -12,7 +12,7 @@ from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.contact import overlapping_boxes
 from stages.shape.geometry.pose import relative_poses
 from stages.shape.kit import PartMesh
-from stages.shape.physics.solids import Placed, Solids
+from stages.shape.physics.solids import MeshSolids, PlacedParts
 
 STEP = 1e-6
 """Poses are asked about on a grid of this share of the smaller part's diagonal, so that answers can be kept."""
@@ -20,7 +20,7 @@ KEPT = 100_000
 
 
 @dataclass(frozen=True)
-class Patches:
+class ContactPatches:
     """Points at which bodies press on each other.
 
     first, second: int (q,), the bodies of each point, `second` is -1 for the ground; patch: int (q,), which points
@@ -34,16 +34,16 @@ class Patches:
     normals: FloatArray
 
 
-class Touch:
+class PairContacts:
     """Answers about pairs of posed parts with given meshes; what recurs is looked up."""
 
-    def __init__(self, meshes: Sequence[PartMesh], solids: Solids) -> None:
+    def __init__(self, meshes: Sequence[PartMesh], solids: MeshSolids) -> None:
         self.meshes = tuple(meshes)
         self.solids = solids
         self._trees: dict[int, Any] = {}
         self._answers: dict[tuple[Any, ...], Any] = {}
 
-    def connected(self, placed: Placed, distance: float, known: IntArray) -> IntArray:
+    def connected(self, placed: PlacedParts, distance: float, known: IntArray) -> IntArray:
         """Pairs of parts that overlap or are at most `distance` apart, int32 (m, 2), i < j in lexicographic order.
 
         `known`: pairs of which that is known. A part that lies wholly inside another is connected to it.
@@ -61,7 +61,7 @@ class Touch:
         found[asked] = [self._near(placed, i, j, distance) for i, j in pairs[asked].tolist()]
         return pairs[found]
 
-    def overlaps(self, placed: Placed, pairs: IntArray) -> tuple[FloatArray, FloatArray]:
+    def overlaps(self, placed: PlacedParts, pairs: IntArray) -> tuple[FloatArray, FloatArray]:
         """Volume that the parts of each pair share and how deep they reach into each other, float64 (m,) each.
 
         Exact for two boxes; on lines through the parts otherwise; 0 where a mesh is open.
@@ -76,7 +76,7 @@ class Touch:
             volumes[row], depths[row] = self._overlap(placed, *pairs[row].tolist())
         return volumes, depths
 
-    def patches(self, placed: Placed, pairs: IntArray, tolerance: float) -> tuple[Patches, BoolArray]:
+    def patches(self, placed: PlacedParts, pairs: IntArray, tolerance: float) -> tuple[ContactPatches, BoolArray]:
         """The patches between the parts of `pairs`, and which pairs are interlocked, bool (m,): near each other with
         no face or edge of one on a face of the other."""
         from stages.shape.physics.boxes import box_contacts
@@ -95,7 +95,7 @@ class Touch:
         order = np.argsort(patch, kind="stable")
         patch = patch[order]
         return (
-            Patches(
+            ContactPatches(
                 first=pairs[patch, 0].astype(np.int64),
                 second=pairs[patch, 1].astype(np.int64),
                 patch=patch,
@@ -106,13 +106,13 @@ class Touch:
         )
 
     def _tree(self, mesh: int) -> Any:
-        from stages.shape.geometry.triangles import build_tree
+        from stages.shape.geometry.mesh_pairs import build_tree
 
         if mesh not in self._trees:
             self._trees[mesh] = build_tree(self.meshes[mesh].vertices, self.meshes[mesh].faces)
         return self._trees[mesh]
 
-    def _question(self, placed: Placed, i: int, j: int) -> tuple[int, int, FloatArray, bytes]:
+    def _question(self, placed: PlacedParts, i: int, j: int) -> tuple[int, int, FloatArray, bytes]:
         """Meshes, the pose of part j in coordinates of part i on a grid, and what to remember it by."""
         a, b = int(placed.types[i]), int(placed.types[j])
         pose = relative_poses(placed.poses, np.array([[i, j]]))[0]
@@ -127,8 +127,8 @@ class Touch:
         self._answers[question] = answer
         return answer
 
-    def _near(self, placed: Placed, i: int, j: int, distance: float) -> bool:
-        from stages.shape.geometry.triangles import first_contact
+    def _near(self, placed: PlacedParts, i: int, j: int, distance: float) -> bool:
+        from stages.shape.geometry.mesh_pairs import first_contact
 
         a, b, pose, key = self._question(placed, i, j)
         question = ("near", a, b, key, distance)
@@ -140,7 +140,7 @@ class Touch:
             near = bool((inner >= 0).all() or (inner <= 0).all()) and self._overlap(placed, i, j)[0] > 0
         return bool(self._remember(question, near))
 
-    def _overlap(self, placed: Placed, i: int, j: int) -> tuple[float, float]:
+    def _overlap(self, placed: PlacedParts, i: int, j: int) -> tuple[float, float]:
         from stages.shape.physics.patches import overlap
 
         a, b, pose, key = self._question(placed, i, j)
@@ -159,11 +159,11 @@ class Touch:
         remembered: tuple[float, float] = self._remember(question, answer)
         return remembered
 
-    def _patch(self, placed: Placed, i: int, j: int, tolerance: float) -> tuple[bool, FloatArray, FloatArray]:
+    def _patch(self, placed: PlacedParts, i: int, j: int, tolerance: float) -> tuple[bool, FloatArray, FloatArray]:
         """Whether the parts are within `tolerance`, corners of the patches between them, and normals out of part i;
         in its coordinates."""
+        from stages.shape.geometry.mesh_pairs import near_pairs
         from stages.shape.geometry.pose import invert
-        from stages.shape.geometry.triangles import near_pairs
         from stages.shape.physics.patches import facing_polygons, flat_hulls, touching_edges
 
         a, b, pose, key = self._question(placed, i, j)
@@ -190,7 +190,7 @@ class Touch:
         return remembered
 
 
-def _both_boxes(placed: Placed, pairs: IntArray) -> BoolArray:
+def _both_boxes(placed: PlacedParts, pairs: IntArray) -> BoolArray:
     return placed.boxes[pairs[:, 0]] & placed.boxes[pairs[:, 1]]
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.physics.contacts import Patches
+from stages.shape.physics.contacts import ContactPatches
 
 DIRECTIONS = 8
 """Sides of the friction pyramid of a joint."""
@@ -34,7 +34,7 @@ BORNE = 1e-5
 
 
 @dataclass(frozen=True)
-class Limits:
+class LoadLimits:
     """How far loads can grow.
 
     factors: float64 (loads,), the greatest factor up to the cap at which there is equilibrium, all -1 where there is
@@ -47,7 +47,7 @@ class Limits:
 
 
 def load_limits(
-    patches: Patches,
+    patches: ContactPatches,
     centres: FloatArray,
     steady: FloatArray,
     growing: FloatArray,
@@ -55,7 +55,7 @@ def load_limits(
     pull: FloatArray,
     azimuth: float,
     cap: float = 1.0,
-) -> Limits:
+) -> LoadLimits:
     """The greatest factor, at most `cap`, by which each of the loads `growing` can be borne beside the `steady` load.
 
     centres: float64 (n, 3), where the torques on each body are about; steady: float64 (n, 6), force and torque on each
@@ -81,10 +81,10 @@ def load_limits(
     )
     load = -(steady + _glue(patches, centres, pull)) / weights[:, None]
     limits = _solved(wrenches, bodies, load, growing / weights[:, None], cap)
-    return Limits(limits.factors, limits.motions / weights[:, None])
+    return LoadLimits(limits.factors, limits.motions / weights[:, None])
 
 
-def _solved(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float) -> Limits:
+def _solved(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float) -> LoadLimits:
     """One body by the simplex method on its six equations, small programmes by HiGHS, large ones by the interior point
     method for bodies; each by another if it fails."""
     if len(load) == 1:
@@ -100,14 +100,14 @@ def _solved(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing:
         one = growing[index : index + 1]
         found = _by_interior_point(wrenches, bodies, load, one, cap) or _by_highs(wrenches, bodies, load, one, cap)
         if found is None or found.factors[0] < 0:
-            return Limits(np.full(len(growing), -1.0), motions)
+            return LoadLimits(np.full(len(growing), -1.0), motions)
         factors[index], motions[index] = found.factors[0], found.motions[0]
-    return Limits(factors, motions)
+    return LoadLimits(factors, motions)
 
 
 def _by_tableau(
     wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float
-) -> Limits | None:
+) -> LoadLimits | None:
     """All loads on one body, which nothing but the ground bears. None where the method fails."""
     from stages.shape.physics.tableau import grow_loads
 
@@ -116,12 +116,12 @@ def _by_tableau(
         factors, multipliers = grow_loads(edges, load[0], growing[:, 0], cap)
     except ArithmeticError:
         return None
-    return Limits(factors, multipliers[:, None])
+    return LoadLimits(factors, multipliers[:, None])
 
 
 def _by_highs(
     wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float
-) -> Limits | None:
+) -> LoadLimits | None:
     """All loads as one programme of independent blocks: a call costs more than a small programme. None where HiGHS
     finds no answer."""
     from scipy import sparse
@@ -148,15 +148,15 @@ def _by_highs(
         options={"maxiter": PATIENCE},
     )
     if solved.status == 2:  # no equilibrium at factor 0, which is the same for all
-        return Limits(np.full(loads, -1.0), np.zeros_like(growing))
+        return LoadLimits(np.full(loads, -1.0), np.zeros_like(growing))
     if solved.status != 0:
         return None
-    return Limits(solved.x[-loads:], -solved.eqlin.marginals.reshape(growing.shape))
+    return LoadLimits(solved.x[-loads:], -solved.eqlin.marginals.reshape(growing.shape))
 
 
 def _by_interior_point(
     wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float
-) -> Limits | None:
+) -> LoadLimits | None:
     """One load. The steady load has a factor of its own, at most 1, that counts far more than the growing one: so
     there always is a solution, and the steady load is borne where that factor is 1. None where the method fails."""
     from stages.shape.physics.interior import solve_interior
@@ -169,7 +169,7 @@ def _by_interior_point(
     except (ArithmeticError, np.linalg.LinAlgError):
         return None
     borne = found[0] >= 1 - BORNE
-    return Limits(np.array([found[1] if borne else -1.0]), -dual.reshape(growing.shape))
+    return LoadLimits(np.array([found[1] if borne else -1.0]), -dual.reshape(growing.shape))
 
 
 def _cone(normals: FloatArray, friction: float, azimuth: float, directions: int) -> FloatArray:
@@ -202,7 +202,7 @@ def _wrenches(
     return wrenches.reshape(-1, 2, 6), np.repeat(bodies, forces.shape[1], axis=0)
 
 
-def _glue(patches: Patches, centres: FloatArray, pull: FloatArray) -> FloatArray:
+def _glue(patches: ContactPatches, centres: FloatArray, pull: FloatArray) -> FloatArray:
     """The load on each body, float64 (n, 6), of the pull of all glue at its limit."""
     load = np.zeros((len(centres), 6))
     for bodies, sign in ((patches.first, -1.0), (patches.second, 1.0)):

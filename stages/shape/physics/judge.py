@@ -11,10 +11,10 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.kit import Assembly, PartMesh
-from stages.shape.physics.contacts import Patches, Touch
+from stages.shape.physics.contacts import ContactPatches, PairContacts
 from stages.shape.physics.settings import PhysicsConfig, Requirements
 from stages.shape.physics.settling import Body, tilt_to_fall
-from stages.shape.physics.solids import Placed, Solids
+from stages.shape.physics.solids import MeshSolids, PlacedParts
 from stages.shape.physics.stability import Stability, components, stability, standing_points, tipping_angle
 from stages.shape.physics.structure import ground_share, mirror_score
 from stages.shape.shape import Shape
@@ -56,15 +56,15 @@ class Judge:
     def __init__(self, meshes: Sequence[PartMesh], up: Literal["y", "z"], config: PhysicsConfig) -> None:
         self.config = config
         self._meshes, self._up = tuple(meshes), up
-        self._solids = Solids(self._meshes)
-        self._touch = Touch(self._meshes, self._solids)
+        self._solids = MeshSolids(self._meshes)
+        self._touch = PairContacts(self._meshes, self._solids)
 
     def rooted(self, assembly: Assembly) -> bool:
         """Whether every part is connected to the ground (shapeassembly App. E), and nothing more."""
         placed = self._placed(assembly)
         return not _floating(placed, self._connected(placed, assembly), self.config).any()
 
-    def unmet(self, assembly: Assembly, requirements: Requirements) -> str | None:
+    def unmet_requirement(self, assembly: Assembly, requirements: Requirements) -> str | None:
         """The first of the requirements that is not met, None if all are. What tips over as a whole is seen before
         anything is asked about its parts. Raises ValueError as `validity` does."""
         placed = self._placed(assembly)
@@ -129,18 +129,20 @@ class Judge:
         diagonal = self._placed(assembly).diagonal
         return self.config.touching * diagonal, self.config.connected * diagonal
 
-    def _placed(self, assembly: Assembly) -> Placed:
-        return Placed.of(self._meshes, self._solids, assembly, self._up)
+    def _placed(self, assembly: Assembly) -> PlacedParts:
+        return PlacedParts.of(self._meshes, self._solids, assembly, self._up)
 
-    def _standing(self, placed: Placed) -> Patches:
+    def _standing(self, placed: PlacedParts) -> ContactPatches:
         return standing_points(placed, np.arange(len(placed)), self.config.connected * placed.diagonal)
 
-    def _stability(self, placed: Placed, connected: IntArray, depths: FloatArray, standing: Patches) -> Stability:
+    def _stability(
+        self, placed: PlacedParts, connected: IntArray, depths: FloatArray, standing: ContactPatches
+    ) -> Stability:
         """`depths`: how deep the connected pairs reach into each other; of no matter where joints are rigid."""
         deep = connected[depths > self.config.touching * placed.diagonal]
         return stability(placed, self._touch, connected, deep, standing, self.config)
 
-    def _connected(self, placed: Placed, assembly: Assembly) -> np.ndarray:
+    def _connected(self, placed: PlacedParts, assembly: Assembly) -> np.ndarray:
         return self._touch.connected(placed, self.config.connected * placed.diagonal, assembly.edges)
 
 
@@ -161,7 +163,7 @@ def physical_fields(validity: Validity) -> dict[str, Any]:
     return {name: round(value, 6) + 0.0 if isinstance(value, float) else value for name, value in values.items()}
 
 
-def unmet(requirements: Requirements, shape: Shape) -> str | None:
+def unmet_requirement(requirements: Requirements, shape: Shape) -> str | None:
     """The reason, as it is counted among the rejects, why a shape is not kept; None if it is kept.
 
     Where nothing is required nothing is computed. A shape without a body to judge meets no requirement.
@@ -169,19 +171,19 @@ def unmet(requirements: Requirements, shape: Shape) -> str | None:
     if not requirements.rooted and not requirements.stable:
         return None
     try:
-        return judge_of(shape.meshes, shape.up, requirements.physics).unmet(shape.assembly, requirements)
+        return judge_of(shape.meshes, shape.up, requirements.physics).unmet_requirement(shape.assembly, requirements)
     except ValueError:
         return "no body to judge"
 
 
-def _body(placed: Placed, own: BoolArray) -> Body:
+def _body(placed: PlacedParts, own: BoolArray) -> Body:
     """The parts `own`, bool (n,), as one body."""
     weights = placed.weights[own]
     points = np.concatenate([placed.points[part] for part in np.flatnonzero(own).tolist()])
     return Body(points, weights @ placed.centroids[own] / max(weights.sum(), np.finfo(float).tiny))
 
 
-def _floating(placed: Placed, connected: np.ndarray, config: PhysicsConfig) -> np.ndarray:
+def _floating(placed: PlacedParts, connected: np.ndarray, config: PhysicsConfig) -> np.ndarray:
     """Which parts no chain of connected parts leads to the ground, bool (n,)."""
     pieces = components(len(placed), connected)
     low = placed.spans[:, 0, 2] <= config.connected * placed.diagonal

@@ -14,7 +14,7 @@ from stages.shape.physics.boxes import box_corners, recognise_boxes
 from stages.shape.physics.polygons import convex_hull
 
 
-class Solids:
+class MeshSolids:
     """What is known of each mesh by itself, in its own coordinates.
 
     closed: bool (k,), whether the mesh has an inside: every edge is passed as often in one sense as in the other, and
@@ -84,7 +84,7 @@ def _has_inside(faces: IntArray) -> bool:
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedParts:
     """The parts of one assembly as bodies in a world whose third axis points up, the ground at height 0.
 
     types: the mesh of each part; poses: float64 (n, 4, 4); spans: float64 (n, 2, 3), their upright boxes;
@@ -109,7 +109,9 @@ class Placed:
     halves: FloatArray
 
     @classmethod
-    def of(cls, meshes: Sequence[PartMesh], solids: Solids, assembly: Assembly, up: Literal["y", "z"]) -> Placed:
+    def of(
+        cls, meshes: Sequence[PartMesh], solids: MeshSolids, assembly: Assembly, up: Literal["y", "z"]
+    ) -> PlacedParts:
         """The bodies of `assembly`. Raises ValueError for a shape without parts or without extent."""
         types = assembly.types.astype(np.int64)
         if not len(types):

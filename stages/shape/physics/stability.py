@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
-from stages.shape.physics.contacts import Patches, Touch
+from stages.shape.physics.contacts import ContactPatches, PairContacts
 from stages.shape.physics.equilibrium import load_limits
 from stages.shape.physics.polygons import convex_hull, inside_margin
 from stages.shape.physics.settings import PhysicsConfig
-from stages.shape.physics.solids import Placed
-from stages.shape.physics.tableau import TIE
+from stages.shape.physics.solids import PlacedParts
+from stages.shape.physics.tableau import TIE_TOLERANCE
 
 ARM = 0.25
 """Lever arm of the twists, as a share of the diagonal: a twist of factor 1 is the part's weight at this arm."""
@@ -53,7 +53,7 @@ def components(count: int, pairs: IntArray) -> np.ndarray:
     return found
 
 
-def standing_points(placed: Placed, body_of: np.ndarray, tolerance: float) -> Patches:
+def standing_points(placed: PlacedParts, body_of: np.ndarray, tolerance: float) -> ContactPatches:
     """Where bodies stand on the ground: for each body the hull of its points at most `tolerance` above the ground."""
     low = placed.spans[:, 0, 2] <= tolerance
     first, points = [], []
@@ -66,7 +66,7 @@ def standing_points(placed: Placed, body_of: np.ndarray, tolerance: float) -> Pa
     if not first:
         return _no_patches()
     bodies = np.concatenate(first)
-    return Patches(
+    return ContactPatches(
         first=bodies,
         second=np.full(len(bodies), -1),
         patch=bodies,
@@ -75,7 +75,7 @@ def standing_points(placed: Placed, body_of: np.ndarray, tolerance: float) -> Pa
     )
 
 
-def tipping_angle(placed: Placed, standing: Patches) -> float:
+def tipping_angle(placed: PlacedParts, standing: ContactPatches) -> float:
     """By how many degrees the whole shape, were it rigid, can be tilted before it tips over its support polygon, in
     the direction in which it tips soonest; below zero, by how many it is beyond that already."""
     centre = placed.weights @ placed.centroids
@@ -84,7 +84,12 @@ def tipping_angle(placed: Placed, standing: Patches) -> float:
 
 
 def stability(
-    placed: Placed, touch: Touch, connected: IntArray, deep: IntArray, standing: Patches, config: PhysicsConfig
+    placed: PlacedParts,
+    touch: PairContacts,
+    connected: IntArray,
+    deep: IntArray,
+    standing: ContactPatches,
+    config: PhysicsConfig,
 ) -> Stability:
     """Whether the shape stands, its margin, and its weakest part.
 
@@ -110,7 +115,7 @@ def stability(
     moments = np.stack([np.bincount(pieces, placed.weights * placed.centroids[:, k]) for k in range(3)], axis=1)
     centres = moments / np.maximum(weights, 1e-300)[:, None]
     size = placed.diagonal
-    scaled = Patches(patches.first, patches.second, patches.patch, patches.points / size, patches.normals)
+    scaled = ContactPatches(patches.first, patches.second, patches.patch, patches.points / size, patches.normals)
     azimuth = _azimuth(placed)
     gravity = np.zeros((len(weights), 6))
     gravity[:, 2] = -weights
@@ -120,7 +125,7 @@ def stability(
     if not stands:
         empty = np.zeros_like(gravity)
         limits = load_limits(scaled, centres / size, empty, gravity[None], config.friction, pull, azimuth, 2.0)
-    worst = int(np.flatnonzero(limits.factors <= limits.factors.min() + TIE)[0])
+    worst = int(np.flatnonzero(limits.factors <= limits.factors.min() + TIE_TOLERANCE)[0])
     margin = float(limits.factors[worst]) if stands else -1.0
     gives = not stands or margin < CAP * (1 - 1e-9)
     return Stability(
@@ -131,15 +136,15 @@ def stability(
 
 
 def _dry_joints(
-    placed: Placed, touch: Touch, connected: IntArray, deep: IntArray, tolerance: float
-) -> tuple[np.ndarray, Patches]:
+    placed: PlacedParts, touch: PairContacts, connected: IntArray, deep: IntArray, tolerance: float
+) -> tuple[np.ndarray, ContactPatches]:
     """The bodies that parts which reach into each other make, and the patches between bodies."""
     shallow = connected[~_among(connected, deep)]
     patches, locked = touch.patches(placed, shallow, tolerance)
     pieces = components(len(placed), np.concatenate([deep, shallow[locked]]))
     first, second = pieces[patches.first], pieces[patches.second]
     apart = first != second
-    return pieces, Patches(
+    return pieces, ContactPatches(
         first[apart], second[apart], patches.patch[apart], patches.points[apart], patches.normals[apart]
     )
 
@@ -149,7 +154,7 @@ def _among(pairs: IntArray, some: IntArray) -> np.ndarray:
     return np.array([tuple(pair) in listed for pair in pairs.tolist()], dtype=bool)
 
 
-def _reach(pieces: np.ndarray, between: Patches, standing: Patches) -> np.ndarray:
+def _reach(pieces: np.ndarray, between: ContactPatches, standing: ContactPatches) -> np.ndarray:
     """For each part whether its body rests on the ground, by way of other bodies or not, bool (n,)."""
     links = np.stack([between.first, between.second], axis=1).astype(np.int32)
     groups = components(int(pieces.max()) + 1, links)
@@ -157,7 +162,7 @@ def _reach(pieces: np.ndarray, between: Patches, standing: Patches) -> np.ndarra
     return found
 
 
-def _hulls_of(standing: Patches, pieces: np.ndarray) -> Patches:
+def _hulls_of(standing: ContactPatches, pieces: np.ndarray) -> ContactPatches:
     """The points on the ground of parts, as hulls of the points of bodies."""
     bodies = pieces[standing.first]
     kept = []
@@ -165,10 +170,12 @@ def _hulls_of(standing: Patches, pieces: np.ndarray) -> Patches:
         own = np.flatnonzero(bodies == body)
         kept.append(own[convex_hull(standing.points[own, :2])])
     rows = np.concatenate(kept)
-    return Patches(bodies[rows], standing.second[rows], bodies[rows], standing.points[rows], standing.normals[rows])
+    return ContactPatches(
+        bodies[rows], standing.second[rows], bodies[rows], standing.points[rows], standing.normals[rows]
+    )
 
 
-def _azimuth(placed: Placed) -> float:
+def _azimuth(placed: PlacedParts) -> float:
     """A direction that turns with the shape about the vertical: to its point furthest from the vertical through the
     centre of mass, and among equals the first. The pushes look alike in a mirror along it."""
     centre = (placed.weights @ placed.centroids)[:2]
@@ -191,7 +198,7 @@ def _pushes(weights: FloatArray, azimuth: float, glued: bool) -> FloatArray:
     return unit[:, None] * weights[:, None]
 
 
-def _fastest(placed: Placed, pieces: np.ndarray, centres: FloatArray, motion: FloatArray) -> int:
+def _fastest(placed: PlacedParts, pieces: np.ndarray, centres: FloatArray, motion: FloatArray) -> int:
     """The part whose centroid moves most in a motion (n, 6), lengths in diagonals, of the bodies."""
     arms = (placed.centroids - centres[pieces]) / placed.diagonal
     moves = motion[pieces, :3] + np.cross(motion[pieces, 3:], arms)
@@ -199,8 +206,8 @@ def _fastest(placed: Placed, pieces: np.ndarray, centres: FloatArray, motion: Fl
     return int(np.flatnonzero(lengths >= lengths.max() * (1 - 1e-6))[0])
 
 
-def _joined(one: Patches, other: Patches) -> Patches:
-    return Patches(
+def _joined(one: ContactPatches, other: ContactPatches) -> ContactPatches:
+    return ContactPatches(
         first=np.concatenate([one.first, other.first]),
         second=np.concatenate([one.second, other.second]),
         patch=np.concatenate([one.patch, other.patch]),
@@ -209,6 +216,6 @@ def _joined(one: Patches, other: Patches) -> Patches:
     )
 
 
-def _no_patches() -> Patches:
+def _no_patches() -> ContactPatches:
     nothing = np.empty(0, dtype=np.int64)
-    return Patches(nothing, nothing, nothing, np.empty((0, 3)), np.empty((0, 3)))
+    return ContactPatches(nothing, nothing, nothing, np.empty((0, 3)), np.empty((0, 3)))

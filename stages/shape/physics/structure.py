@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.physics.contacts import Patches
+from stages.shape.physics.contacts import ContactPatches
 from stages.shape.physics.polygons import convex_hull
-from stages.shape.physics.solids import Placed
+from stages.shape.physics.solids import PlacedParts
 
 ALIKE = 0.02
 """Parts are mirror images where centroids and extents differ by at most this share of the shape's diagonal."""
 
 
-def ground_share(placed: Placed, standing: Patches) -> float:
+def ground_share(placed: PlacedParts, standing: ContactPatches) -> float:
     """Area on which the shape stands, as a share of the area of its outline seen from above: the flat undersides of
     its parts, each part's hull of what stands on the ground. 0 where it stands on points or lines."""
     outline = np.concatenate(placed.points)[:, :2]
@@ -29,7 +29,7 @@ def _area(polygon: FloatArray) -> float:
     return float(abs((polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]).sum()) / 2)
 
 
-def mirror_score(placed: Placed) -> float:
+def mirror_score(placed: PlacedParts) -> float:
     """The greatest share of the weight, over upright mirror planes through the centre of mass, of parts that the mirror
     maps to a part alike: same place of the centroid, same extents, within ALIKE.
 
@@ -51,14 +51,14 @@ def mirror_score(placed: Placed) -> float:
     return max(_matched(placed, places, spreads, normal) for normal in normals)
 
 
-def _long_axis(placed: Placed) -> FloatArray:
+def _long_axis(placed: PlacedParts) -> FloatArray:
     """The level axis along which the points of the shape spread most."""
     flat = np.concatenate(placed.points)[:, :2] - (placed.weights @ placed.centroids)[:2]
     axis: FloatArray = np.linalg.eigh(flat.T @ flat)[1][:, 1]
     return axis
 
 
-def _spreads(placed: Placed) -> FloatArray:
+def _spreads(placed: PlacedParts) -> FloatArray:
     """How the corners of each part spread about their middle, float64 (n, 3, 3), as a root of second moments."""
     found = np.empty((len(placed), 3, 3))
     for part, points in enumerate(placed.points):
@@ -68,7 +68,7 @@ def _spreads(placed: Placed) -> FloatArray:
     return found
 
 
-def _matched(placed: Placed, places: FloatArray, spreads: FloatArray, normal: FloatArray) -> float:
+def _matched(placed: PlacedParts, places: FloatArray, spreads: FloatArray, normal: FloatArray) -> float:
     from scipy.spatial import cKDTree
 
     mirror = np.eye(3)

@@ -10,7 +10,7 @@ from stages.shape.arrays import FloatArray
 
 FEASIBLE = 1e-7
 """What may be left over of an equation that holds."""
-TIE = 1e-6
+TIE_TOLERANCE = 1e-6
 """Of loads that grow equally far the first tells what gives way."""
 ZERO = 1e-9
 """Smaller rates are rounding: none is divided by."""
@@ -58,7 +58,7 @@ def grow_loads(edges: FloatArray, load: FloatArray, growing: FloatArray, cap: fl
         factors[index] = reached
         if reached < cap:
             multipliers[index] = grown[row[0], count : count + rows] * sign
-    worst = int(np.flatnonzero(factors <= factors.min() + TIE)[0])
+    worst = int(np.flatnonzero(factors <= factors.min() + TIE_TOLERANCE)[0])
     if factors[worst] < cap:
         multipliers[worst] = _least(edges, load, growing[worst], factors[worst], multipliers[worst])
     return factors, multipliers

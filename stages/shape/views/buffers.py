@@ -13,7 +13,7 @@ from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
 from stages.shape.views.camera import Camera, View
 from stages.shape.views.scene import Scene
 
-Backend = Literal["raster", "egl"]
+RendererName = Literal["raster", "egl"]
 """`raster`: our own, whole numbers in compiled code; `egl`: OpenGL on EGL, rasterised by Mesa's llvmpipe."""
 
 RENDERS_A_CONTEXT = 20_000
@@ -56,7 +56,7 @@ class Buffers:
     color: ByteArray
 
 
-def visible_triangles(scene: Scene, camera: Camera, size: tuple[int, int], backend: Backend) -> Visible:
+def visible_triangles(scene: Scene, camera: Camera, size: tuple[int, int], backend: RendererName) -> Visible:
     """What `camera` sees of the scene on `size` (width, height) pixels.
 
     Raises ShardFailed for a blank picture or one with numbers of triangles that do not exist: both have been seen
@@ -75,7 +75,9 @@ def visible_triangles(scene: Scene, camera: Camera, size: tuple[int, int], backe
     return Visible(scene, view, triangles, screen, screen_normals(scene, view, screen))
 
 
-def render_buffers(scene: Scene, camera: Camera, size: tuple[int, int], supersample: int, backend: Backend) -> Buffers:
+def render_buffers(
+    scene: Scene, camera: Camera, size: tuple[int, int], supersample: int, backend: RendererName
+) -> Buffers:
     """Buffers of `size` (width, height) times `supersample` pixels. Raises ShardFailed for a blank picture."""
     from stages.shape.views.screen import surface_buffers
 
@@ -83,16 +85,16 @@ def render_buffers(scene: Scene, camera: Camera, size: tuple[int, int], supersam
     return Buffers(*surface_buffers(scene, seen.view, seen.triangles, seen.screen, seen.normals))
 
 
-def drawn_by(backend: Backend) -> str:
+def renderer_version(backend: RendererName) -> str:
     """What draws for `backend` on this machine, with its version. Raises ShardFailed where nothing does."""
     return _renderer(backend).name
 
 
-_RENDERERS: dict[Backend, _Renderer] = {}
-_RENDERS: dict[Backend, int] = {}
+_RENDERERS: dict[RendererName, _Renderer] = {}
+_RENDERS: dict[RendererName, int] = {}
 
 
-def _draw(scene: Scene, view: View, width: int, height: int, backend: Backend) -> IntArray:
+def _draw(scene: Scene, view: View, width: int, height: int, backend: RendererName) -> IntArray:
     """Draw with this process's one renderer of the kind `backend`; a lost context is made anew once."""
     if _RENDERS.get(backend, 0) >= RENDERS_A_CONTEXT:
         _RENDERERS.pop(backend).close()
@@ -107,7 +109,7 @@ def _draw(scene: Scene, view: View, width: int, height: int, backend: Backend) -
         raise ShardFailed(f"{backend} fails with a fresh context too: {error}") from error
 
 
-def _renderer(backend: Backend) -> _Renderer:
+def _renderer(backend: RendererName) -> _Renderer:
     if backend not in _RENDERERS:
         _RENDERERS[backend] = _new_renderer(backend)
         _RENDERS[backend] = 0
@@ -115,7 +117,7 @@ def _renderer(backend: Backend) -> _Renderer:
     return _RENDERERS[backend]
 
 
-def _new_renderer(backend: Backend) -> _Renderer:
+def _new_renderer(backend: RendererName) -> _Renderer:
     if backend == "raster":
         from stages.shape.views.raster import RasterRenderer
 

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, Float32Array, FloatArray, IntArray
-from stages.shape.views.buffers import Backend, render_buffers
+from stages.shape.views.buffers import RendererName, render_buffers
 from stages.shape.views.camera import Camera, View
 from stages.shape.views.scene import Scene
 
@@ -37,7 +37,7 @@ class KeyLight:
         return share
 
 
-def key_light(scene: Scene, azimuth: float, elevation: float, backend: Backend) -> KeyLight:
+def key_light(scene: Scene, azimuth: float, elevation: float, backend: RendererName) -> KeyLight:
     """A light that shines on the scene from a direction given as a camera's is."""
     camera = Camera(azimuth, elevation, "orthographic", margin=0.02)
     view = camera.look(scene.points, scene.up)

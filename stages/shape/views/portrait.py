@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, ByteArray, FloatArray, IntArray
-from stages.shape.views.buffers import Backend, Visible, visible_triangles
+from stages.shape.views.buffers import RendererName, Visible, visible_triangles
 from stages.shape.views.camera import Camera, View
 from stages.shape.views.light import KeyLight, eye_positions, ground_seen, key_light, openness, to_world
 from stages.shape.views.palette import label_colors, linear_to_srgb, srgb_to_linear
@@ -17,7 +17,7 @@ from stages.shape.views.scene import Scene
 PAPER = (250, 248, 244)
 """Background, sRGB: a warm near-white."""
 INK = (38, 32, 36)
-SUPERSAMPLE = 2
+SUBPIXELS_PER_PIXEL = 2
 
 KEY = np.array([1.0, 0.965, 0.90]) * 0.86
 SKY = np.array([0.93, 0.97, 1.0]) * 0.50
@@ -31,7 +31,7 @@ def portrait(
     camera: Camera,
     size: tuple[int, int],
     part_colors: ByteArray | None = None,
-    backend: Backend = "raster",
+    backend: RendererName = "raster",
 ) -> ByteArray:
     """A shaded picture of a scene, uint8 (height, width, 3) for `size` (width, height).
 
@@ -39,10 +39,10 @@ def portrait(
     parts meet, and a shadow on the ground. `part_colors` uint8 (n, 3) paints each part in one colour instead of its
     faces' own. Raises ShardFailed for a blank picture.
     """
+    from stages.shape.views.corner_normals import smooth_normals
     from stages.shape.views.screen import surface_buffers
-    from stages.shape.views.smooth import smooth_normals
 
-    width, height = size[0] * SUPERSAMPLE, size[1] * SUPERSAMPLE
+    width, height = size[0] * SUBPIXELS_PER_PIXEL, size[1] * SUBPIXELS_PER_PIXEL
     seen = visible_triangles(scene, camera, (width, height), backend)
     depth, _, part, color = surface_buffers(scene, seen.view, seen.triangles, seen.screen, seen.normals)
     normal = smooth_normals(seen)
@@ -80,7 +80,7 @@ def points_portrait(
     paint: uint8 (k, 3) sRGB, the colour of each label; without, labels have colours that differ well. The more points,
     the smaller the balls. Raises ValueError where there are no points.
     """
-    width, height = size[0] * SUPERSAMPLE, size[1] * SUPERSAMPLE
+    width, height = size[0] * SUBPIXELS_PER_PIXEL, size[1] * SUBPIXELS_PER_PIXEL
     view = camera.look(points, up, width / height)
     radius = 0.9 * view.radius / np.sqrt(len(points))
     local = points @ view.eye[:3, :3].T + view.eye[:3, 3]
@@ -121,19 +121,21 @@ def _ground_light(scene: Scene, view: View, light: KeyLight, hidden: BoolArray) 
 
 def _ink(seen: Visible, size: tuple[int, int]) -> FloatArray:
     """Thin lines over the picture, (height, width) 0..1."""
+    from stages.shape.views.corner_normals import SHARP
     from stages.shape.views.ink import ink_strokes
-    from stages.shape.views.smooth import SHARP
     from stages.shape.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, find_strokes
 
-    strokes = find_strokes(seen, SHARP, 0.5 * SUPERSAMPLE, 4.0 * SUPERSAMPLE)
+    strokes = find_strokes(seen, SHARP, 0.5 * SUBPIXELS_PER_PIXEL, 4.0 * SUBPIXELS_PER_PIXEL)
     widths = {OUTLINE: 1.1, CONTOUR: 0.9, BOUNDARY: 0.7, CREASE: 0.35}
-    return 0.62 * ink_strokes(strokes, widths, size[0], size[1], 1.0 / SUPERSAMPLE, 4.0)
+    return 0.62 * ink_strokes(strokes, widths, size[0], size[1], 1.0 / SUBPIXELS_PER_PIXEL, 4.0)
 
 
 def _reduced(picture: FloatArray) -> FloatArray:
     """The mean over each square of SUPERSAMPLE pixels."""
     height, width, channels = picture.shape
-    tiles = picture.reshape(height // SUPERSAMPLE, SUPERSAMPLE, width // SUPERSAMPLE, SUPERSAMPLE, channels)
+    tiles = picture.reshape(
+        height // SUBPIXELS_PER_PIXEL, SUBPIXELS_PER_PIXEL, width // SUBPIXELS_PER_PIXEL, SUBPIXELS_PER_PIXEL, channels
+    )
     mean: FloatArray = tiles.mean(axis=(1, 3))
     return mean
 

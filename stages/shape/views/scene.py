@@ -13,7 +13,7 @@ from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
 from stages.shape.kit import PartMesh
 from stages.shape.shape import Shape
 
-WELD = 2e-6
+WELD_DISTANCE_SHARE = 2e-6
 """Vertices closer than this share of half their mesh's longest side are one vertex where faces are asked for those
 beside them."""
 
@@ -62,7 +62,7 @@ class MeshSet:
     @cached_property
     def corner_normals(self) -> Float32Array:
         """Unit normal at each corner of each face in mesh coordinates, float32 (f, 3, 3), for smooth shading."""
-        from stages.shape.views.smooth import corner_normals
+        from stages.shape.views.corner_normals import corner_normals
 
         return corner_normals(self.vertices, self.faces, self._welded, self.normals)
 
@@ -72,7 +72,7 @@ class MeshSet:
         mesh_of = np.repeat(np.arange(len(self.centers)), np.diff(self.vertex_first))
         size = np.zeros(len(self.centers))
         np.maximum.at(size, mesh_of, np.abs(self.vertices).max(axis=1))
-        places = np.rint(self.vertices / np.maximum(size[mesh_of, None] * WELD, np.finfo(float).tiny))
+        places = np.rint(self.vertices / np.maximum(size[mesh_of, None] * WELD_DISTANCE_SHARE, np.finfo(float).tiny))
         welded = np.unique(np.column_stack([mesh_of, places + 0.0]), axis=0, return_inverse=True)[1].ravel()
         return np.asarray(welded[self.faces])
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, pose_vectors
-from stages.shape.graphs.patterns import SAME_UP
+from stages.shape.graphs.patterns import MAX_UP_DIFFERENCE
 from stages.shape.kit import Kit, PartType
 
 
@@ -98,7 +98,7 @@ def _orientations(kit: Kit, part_type: int, upright: bool) -> list[_Orientation]
 def _keeping(part_type: PartType, up: FloatArray, other: FloatArray) -> np.ndarray:
     """Which symmetries bring one way up to another, bool (k,)."""
     gaps = np.linalg.norm(part_type.symmetries[:, :3, :3] @ up - other, axis=1)
-    near: np.ndarray = gaps < SAME_UP
+    near: np.ndarray = gaps < MAX_UP_DIFFERENCE
     return near
 
 

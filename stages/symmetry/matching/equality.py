@@ -17,7 +17,7 @@ INSIDE = 0.8
 def soups_match(one: Soup, other: Soup, pose: FloatArray, tolerance: float, share: float = DUST) -> bool:
     """Whether `pose` (4, 4) moves one surface onto another: by their areas, which may differ by `share`, and by points
     of all triangles but the smallest, dust of about this share of the surface, within twice the tolerance."""
-    from stages.shape.geometry.triangles import build_tree, points_on_surface
+    from stages.shape.geometry.mesh_pairs import build_tree, points_on_surface
 
     if abs(one.area - other.area) > share * one.area:
         return False

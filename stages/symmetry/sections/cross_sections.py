@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.geometry.cells import OWN, cell_hash
+from stages.shape.geometry.grid_hash import OWN_CELL, cell_hash
 
 TURNED = 0.3
 """Normals that are farther apart than this are of different sides."""
@@ -80,14 +80,14 @@ def _covered(points, lengths, others, tolerance, most):
         size *= 2
     heads, following = np.full(size, -1), np.full(len(others), -1)
     for place in range(len(others)):
-        cell = cell_hash(others[place], OWN, tolerance) & (size - 1)
+        cell = cell_hash(others[place], OWN_CELL, tolerance) & (size - 1)
         following[place] = heads[cell]
         heads[cell] = place
     covered = np.zeros(len(points), dtype=np.bool_)
     bare = 0.0
     for number in range(len(points)):
         for turn in range(27):
-            cell = cell_hash(points[number], (turn + OWN) % 27, tolerance) & (size - 1)  # its own first
+            cell = cell_hash(points[number], (turn + OWN_CELL) % 27, tolerance) & (size - 1)  # its own first
             place = heads[cell]
             while place >= 0 and not covered[number]:
                 total = 0.0

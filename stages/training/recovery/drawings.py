@@ -48,5 +48,5 @@ def draw_fitted(
     scene = scene_of(shape_from_parts(program, parts))
     camera = jittered_camera(view, rng)
     drawing: ByteArray
-    drawing, _ = draw_sketch(scene, camera, config.size, config.supersample, config.strokes, config.backend)
+    drawing, _ = draw_sketch(scene, camera, config.size, config.supersample, config.strokes, config.renderer)
     return fit_to_square(drawing < INK)

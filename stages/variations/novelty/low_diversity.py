@@ -60,7 +60,7 @@ def _remedies(kit: Kit) -> list[str]:
         remedies.append(f"a looser grammar (grammar: {looser})")
     if set(kit.contact_kinds) != {"face"}:
         remedies.append("neighbours by their faces alone (contact.kinds: [face])")
-    if not kit.grammar.hubs and not any(len(each.backdrop) for each in kit.exemplars):
+    if not kit.grammar.hubs and not any(len(each.removed_hubs) for each in kit.exemplars):
         remedies.append("leaving out parts that touch everything (hubs.types: auto)")
     return [*remedies, "the same layout in other proportions (proportions.samples_per_kit)"]
 

@@ -27,7 +27,7 @@ from stages.shape.kit_files import load_kit
 from stages.shape.sample import Sample, read_samples
 from stages.shape.shape import kit_shape, upright
 from stages.shape.views.camera import Camera
-from stages.shape.views.paint import part_paint
+from stages.shape.views.part_colors import part_paint
 from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png

@@ -100,7 +100,7 @@ class HubRestorer:
             for hub in kit.grammar.hubs
         }
         widest = max(touching, key=lambda hub: touching[hub])
-        there = sum(int((each.backdrop.types == widest).sum()) for each in kit.exemplars)
+        there = sum(int((each.removed_hubs.types == widest).sum()) for each in kit.exemplars)
         return widest, there / sum(len(each.whole) for each in kit.exemplars)
 
     @cached_property
@@ -109,7 +109,7 @@ class HubRestorer:
         always: dict[int, set[int]] = {}
         for exemplar in self.kit.exemplars:
             whole = exemplar.assembly
-            for hub, place in zip(exemplar.backdrop.types.tolist(), exemplar.backdrop.poses, strict=True):
+            for hub, place in zip(exemplar.removed_hubs.types.tolist(), exemplar.removed_hubs.poses, strict=True):
                 answers = self.answers.around(whole.types, whole.poses, hub, place)
                 whole = _with_part(whole, hub, place, np.flatnonzero(answers >= 0).tolist())
             for part_type, found in zip(whole.types.tolist(), self._hubs_beside(whole), strict=True):
@@ -146,7 +146,7 @@ class HubRestorer:
 
     def _docked(self, exemplar: Exemplar, hub: int) -> list[tuple[int, FloatArray, FloatArray]]:
         """Each part of an exemplar that touches a hub: its type, the hub's pose and up, both in its coordinates."""
-        assembly, backdrop = exemplar.assembly, exemplar.backdrop
+        assembly, backdrop = exemplar.assembly, exemplar.removed_hubs
         docked: list[tuple[int, FloatArray, FloatArray]] = []
         for place in backdrop.poses[backdrop.types == hub]:
             relative = invert(assembly.poses) @ place

@@ -21,7 +21,7 @@ from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
-from stages.shape.physics.judge import unmet
+from stages.shape.physics.judge import unmet_requirement
 from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY, REQUIRED_LABELS_KEY, STABLE_KEY, resolved_settings
 from stages.shape.shape import kit_shape
 from stages.variations.constraint import build_repair, build_test, module_of
@@ -154,7 +154,9 @@ def _required(
     backdrop, kept = hub_restorer(task, kit.name), []
     for variant in telling:
         whole = backdrop.fit(variant.assembly)
-        weak = unmet(physical, kit_shape(kit, whole)) if backdrop.has_hubs(hubs, whole) else HUBS_NOT_RESTORED
+        weak = (
+            unmet_requirement(physical, kit_shape(kit, whole)) if backdrop.has_hubs(hubs, whole) else HUBS_NOT_RESTORED
+        )
         if weak is None:
             kept.append(variant)
         else:

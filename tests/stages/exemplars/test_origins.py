@@ -13,7 +13,7 @@ from pipeline.config import Config, load_config
 from pipeline.errors import ConfigError
 from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.collection.origin import unstated
+from stages.shape.collection.origin import missing_licenses
 
 
 def config_of(folder: Path, *kits: dict[str, Any]) -> Config:
@@ -41,12 +41,12 @@ def test_a_file_has_the_credit_of_its_kit_unless_it_has_its_own(files: list[str]
     )
     assert (two.author, two.license, two.source, two.notice) == ("B", "CC0-1.0", "", "")
     assert one.sha256 == hashlib.sha256(b"one.glb").hexdigest()
-    assert unstated([one, two]) == []
+    assert missing_licenses([one, two]) == []
 
 
 def test_a_licence_that_nobody_states_is_asked_for_by_name(files: list[str], tmp_path: Path) -> None:
     origins = exemplar_origins(config_of(tmp_path, {"name": "k", "shapes": files[:1], "credit": {"author": "A"}}))
-    (sentence,) = unstated(origins)
+    (sentence,) = missing_licenses(origins)
     assert sentence.startswith("licence of models/one.glb: not stated; say it with exemplars.kits[k].credit")
 
 

@@ -196,7 +196,7 @@ def toy_config(shards: int = 4) -> Config:
         "abstraction": AbstractionConfig(),
         "points": PointsConfig(uniform=64, farthest=16, pool=256),
         "sketches": SketchesConfig(
-            size=24, backend="raster", views=(SketchView(name="left"), SketchView(name="right", azimuth=30.0))
+            size=24, renderer="raster", views=(SketchView(name="left"), SketchView(name="right", azimuth=30.0))
         ),
         "package": PackageConfig(previewed=1),
     }

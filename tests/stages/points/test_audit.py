@@ -12,16 +12,16 @@ import pytest
 from stages.points.audit import AUDIT
 from stages.points.cloud import sample_cloud
 from stages.points.frame import NormalizeMode, normalization
-from stages.points.settings import Surface
+from stages.points.settings import SampledSurface
 from stages.points.visibility import seen_from_outside
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.packaged import PackagedSample
 from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.kit import Assembly
 from stages.shape.shape import kit_shape
 from tests.stages.shape.views.solids import box, cylinder, kit_of, part_type, posed
 
 
-def sample(mode: NormalizeMode = "none", surface: Surface = "all") -> Packaged:
+def sample(mode: NormalizeMode = "none", surface: SampledSurface = "all") -> PackagedSample:
     """A row of parts that reach into each other, a hundred away from the origin; the class of a part is its type and
     5."""
     kit = kit_of(part_type("box", box()), part_type("drum", cylinder(24, 0.5, 1.0)))
@@ -37,12 +37,12 @@ def sample(mode: NormalizeMode = "none", surface: Surface = "all") -> Packaged:
         "instances.npy": cloud.instances,
     }
     record = {"points": made, "parts": parts, "bounds": shape_bounds(shape).tolist()}
-    return Packaged("a", record, {}, arrays, replace(shape, first_class=5), {})
+    return PackagedSample("a", record, {}, arrays, replace(shape, first_class=5), {})
 
 
-@pytest.mark.parametrize("surface", get_args(Surface))
+@pytest.mark.parametrize("surface", get_args(SampledSurface))
 @pytest.mark.parametrize("mode", get_args(NormalizeMode))
-def test_good_points_have_no_faults(mode: NormalizeMode, surface: Surface) -> None:
+def test_good_points_have_no_faults(mode: NormalizeMode, surface: SampledSurface) -> None:
     assert list(AUDIT.faults(sample(mode, surface))) == []
 
 

@@ -8,9 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stages.points.cloud import sample_cloud
-from stages.points.visibility import OBLIQUE, SHORTEST, VIEWS, seen_from_outside, view_directions
+from stages.points.visibility import (
+    MIN_HIT_DISTANCE_SHARE,
+    MIN_VIEW_COSINE,
+    VIEW_COUNT,
+    seen_from_outside,
+    view_directions,
+)
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.shape.geometry.casting import Casting
+from stages.shape.geometry.ray_casting import RayCaster
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape, kit_shape
 from tests.stages.shape.views.solids import box, kit_of, part_type, posed
@@ -47,7 +53,7 @@ def test_what_is_seen_is_what_brute_force_sees(seed: int, count: int) -> None:
     shape = shape_of(
         part_type("soup", (rng.normal(size=(3 * count, 3)), np.arange(3 * count, dtype=np.int32).reshape(-1, 3)))
     )
-    casting = Casting(shape)
+    casting = RayCaster(shape)
     corners, _ = casting.triangles
     # The middles of the triangles: rounding does not decide about them.
     points = corners.mean(axis=1)
@@ -55,8 +61,8 @@ def test_what_is_seen_is_what_brute_force_sees(seed: int, count: int) -> None:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     expected = np.zeros(count, dtype=bool)
     for view in view_directions():
-        least = SHORTEST * casting.size
-        expected |= (np.abs(normals @ view) > OBLIQUE) & free_ways(points, view, corners, least)
+        least = MIN_HIT_DISTANCE_SHARE * casting.size
+        expected |= (np.abs(normals @ view) > MIN_VIEW_COSINE) & free_ways(points, view, corners, least)
     assert (seen_from_outside(casting, points, normals) == expected).mean() >= 1.0 - 1.0 / count
     assert (seen_from_outside(casting, points, -normals) == seen_from_outside(casting, points, normals)).all()
 
@@ -87,10 +93,10 @@ def test_visible_clouds_depend_on_their_stream_alone_and_uniform_points_on_nothi
 
 def test_views_are_even_however_few_are_needed() -> None:
     views = view_directions()
-    assert views.shape == (VIEWS, 3)
+    assert views.shape == (VIEW_COUNT, 3)
     np.testing.assert_allclose(np.linalg.norm(views, axis=1), 1.0)
-    assert len(np.unique(views[:, 1])) == VIEWS
-    for count in (8, 16, VIEWS):
+    assert len(np.unique(views[:, 1])) == VIEW_COUNT
+    for count in (8, 16, VIEW_COUNT):
         assert np.linalg.norm(views[:count].mean(axis=0)) < 0.15
         probes = np.random.default_rng(0).normal(size=(500, 3))
         probes /= np.linalg.norm(probes, axis=1, keepdims=True)

@@ -14,7 +14,7 @@ from stages.programs.intersection import meshes_intersect
 from stages.programs.program import Program, find_program, program_names
 from stages.programs.sampling import Sampler, all_value_indices
 from stages.programs.schema import Values
-from stages.shape.geometry.triangles import build_tree, near_pairs
+from stages.shape.geometry.mesh_pairs import build_tree, near_pairs
 
 TOYS = ("tests.stages.programs.stool", "tests.stages.programs.rack")
 NAMES = (*program_names(), *TOYS)

@@ -65,13 +65,13 @@ def test_a_dataset_of_stools_goes_the_whole_way_and_is_the_same_with_two_workers
 
 
 def test_a_run_that_finds_too_few_says_what_would_help(tmp_path: Path) -> None:
-    config = write_config(tmp_path, apart=0.4)
+    config = write_config(tmp_path, min_difference=0.4)
     code, said = shapemill("run", "autoconfig", "--config", config, "--out", tmp_path / "out", "--workers", 1)
     assert code == 0, said
     shapemill("run", "exemplars", "--config", config, "--out", tmp_path / "out", "--workers", 1)
     code, said = shapemill("run", "proportions", "--config", config, "--out", tmp_path / "out", "--workers", 1)
     assert code != 0
-    assert "set proportions.spread or proportions.apart smaller" in said
+    assert "set proportions.log_std or proportions.min_difference smaller" in said
 
 
 def test_no_proportions_without_exemplars(tmp_path: Path) -> None:

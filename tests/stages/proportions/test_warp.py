@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stages.proportions.faults import warp_fault
 from stages.proportions.warp import warped
+from stages.proportions.warp_check import warp_fault
 from stages.shape.geometry.contact import ContactTest, world_boxes
 from stages.shape.shape import Shape
 from tests.stages.proportions.stools import kit, lattice, whole

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.packaged import PackagedSample
 from stages.shape.geometry.bounds import shape_bounds
 from stages.sketches.audit import AUDIT
 from stages.sketches.image import png_array, png_bytes
@@ -20,19 +20,19 @@ WIDE = 1.8
 """Width of the widest line that `StrokeOptions` draws when nobody asks for another; pixels."""
 
 
-def sample(view: str = "perspective", chances: Augmentation | None = None) -> Packaged:
+def sample(view: str = "perspective", chances: Augmentation | None = None) -> PackagedSample:
     drawn = sketch(view, "z", chances)
     camera = {"view": view, **drawn.camera, "line_width": WIDE + drawn.thicker}
     record = {"bounds": shape_bounds(lopsided("z")).tolist(), "sketches": [camera]}
-    return Packaged("a", record, {"sketch0.png": png_bytes(drawn.pixels)}, {}, lopsided("z"), {})
+    return PackagedSample("a", record, {"sketch0.png": png_bytes(drawn.pixels)}, {}, lopsided("z"), {})
 
 
-def redrawn(good: Packaged, change: Callable[[np.ndarray], np.ndarray]) -> Packaged:
+def redrawn(good: PackagedSample, change: Callable[[np.ndarray], np.ndarray]) -> PackagedSample:
     pixels = change(png_array(good.members["sketch0.png"]))
     return replace(good, members={"sketch0.png": png_bytes(pixels.astype(np.uint8))})
 
 
-def recorded(good: Packaged, **changed: Any) -> Packaged:
+def recorded(good: PackagedSample, **changed: Any) -> PackagedSample:
     record = {**good.record, "sketches": [{**good.record["sketches"][0], **changed}]}
     return replace(good, record=record)
 
@@ -59,6 +59,6 @@ def test_a_good_drawing_has_no_faults(view: str, chances: Augmentation | None) -
         (lambda good: recorded(good, world_to_camera=np.eye(4).tolist(), projection="orthographic"), "beyond"),
     ],
 )
-def test_a_damaged_drawing_is_found(damage: Callable[[Packaged], Packaged], found: str) -> None:
+def test_a_damaged_drawing_is_found(damage: Callable[[PackagedSample], PackagedSample], found: str) -> None:
     with pytest.raises(AssertionError, match=f"sketch0.png .*({found})"):
         assert list(AUDIT.faults(damage(sample()))) == []

@@ -18,8 +18,8 @@ from pipeline.status import status_lines
 from stages.shape.kit import Assembly
 from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, write_sample
-from stages.shape.views.probe import probe_in_subprocess
 from stages.shape.views.raster import RasterRenderer
+from stages.shape.views.renderer_check import check_in_subprocess
 from stages.sketches.image import png_array
 from stages.sketches.settings import Augmentation, SketchesConfig, SketchView
 from stages.sketches.stage import STAGE
@@ -129,12 +129,12 @@ def test_the_same_config_gives_the_same_bytes(tmp_path):
 def test_where_the_backend_of_the_config_cannot_draw_nothing_starts(tmp_path, monkeypatch):
     (tmp_path / "pyrender.py").write_text("raise ImportError('libXrender.so.1: cannot open shared object file')\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    probe_in_subprocess.cache_clear()
+    check_in_subprocess.cache_clear()
     try:
         with pytest.raises(ConfigError, match=r"toys\.yaml: sketches\.backend: egl cannot draw .*libXrender.*doctor"):
-            turn(tmp_path / "out", backend="egl")
+            turn(tmp_path / "out", renderer="egl")
     finally:
-        probe_in_subprocess.cache_clear()
+        check_in_subprocess.cache_clear()
     assert not list((tmp_path / "out").rglob("*.tar")) + list((tmp_path / "out").rglob("*.npy"))
 
 

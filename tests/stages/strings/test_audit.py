@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.paths import DatasetPaths
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.packaged import PackagedSample
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Kit
@@ -31,13 +31,13 @@ def written(edges: Edges) -> list[str]:
     return [each.string for each in writer.strings(writer.graph(assembly()), 3, np.random.default_rng(2))]
 
 
-def sample(strings: list[str], said: Edges | None) -> Packaged:
+def sample(strings: list[str], said: Edges | None) -> PackagedSample:
     """A sample with these strings, of a dataset that says what they tell of, or is older than that."""
     labelled = kit().labelled(assembly())
     record = {"language": "kit", "kit": "cubes", "graph": graph_digest(labelled.types, labelled.edges)}
     members = {"txt": "".join(f"{each}\n" for each in strings).encode(), CONTACTS: pair_bytes(assembly().edges)}
     sections = {"strings": {"strings_per_shape": 3, **({"edges": said} if said else {})}}
-    return Packaged("cubes-0", record, members, {}, kit_shape(kit(), assembly()), sections)
+    return PackagedSample("cubes-0", record, members, {}, kit_shape(kit(), assembly()), sections)
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from pipeline.shards import ShardWriter, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.programs.program import find_program
 from stages.programs.settings import ProgramsConfig
-from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.packaged import PackagedSample
 from stages.shape.collection.pairs import CONTACTS, JOINTS, pairs_of
 from stages.shape.kit import Assembly
 from stages.shape.kit_files import write_kit
@@ -140,7 +140,7 @@ def test_contradictions_between_joints_and_physics_are_found() -> None:
         arrays = {CONTACTS: np.empty((2, 0), np.int32), JOINTS: pairs.T}
         record = {"parts": [{}, {}], "physics": {**physics, **changed}}
         sections = {"validity": PhysicsConfig().model_dump()}
-        return list(AUDIT.faults(Packaged("key", record, {}, arrays, shape, sections)))
+        return list(AUDIT.faults(PackagedSample("key", record, {}, arrays, shape, sections)))
 
     assert faults() == []
     assert faults(components=2) == ["its joints do not make as many components as physics says"]

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from pipeline.paths import DatasetPaths
-from stages.shape.collection.language import Anew, Language, Source
+from stages.shape.collection.language import Language, RebuildShape, Source
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
@@ -44,7 +44,7 @@ class Heaps:
         return [("a pebble", heap("1.0"))]
 
 
-def _anew(_: DatasetPaths) -> Anew:
+def _anew(_: DatasetPaths) -> RebuildShape:
     return lambda record, _: upright(heap(record["text"]))
 
 

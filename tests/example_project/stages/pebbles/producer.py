@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from stages.pebbles.stage import PebblesConfig
-from stages.shape.collection.members import Field
+from stages.shape.collection.members import RecordField
 from stages.shape.collection.producer import Producer
 
 PRODUCER = Producer(
@@ -13,6 +13,6 @@ PRODUCER = Producer(
     sentence="pebbles are thrown on a heap.",
     splits="Every heap is thrown anew.",
     apart=False,
-    lineage=lambda _: {"drawn": Field({"type": "integer", "minimum": 0, "description": "which throw it was"})},
+    lineage=lambda _: {"drawn": RecordField({"type": "integer", "minimum": 0, "description": "which throw it was"})},
     card=lambda _: ["No pebble was harmed."],
 )

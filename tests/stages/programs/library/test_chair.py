@@ -40,7 +40,7 @@ def meshes_of(values: Mapping[str, Value]) -> list[PartMesh]:
 
 def loose_parts(parts: list[PartMesh]) -> list[str]:
     """The names of parts to which no way leads from the first over parts that touch or meet."""
-    from stages.shape.geometry.triangles import build_tree, first_contact
+    from stages.shape.geometry.mesh_pairs import build_tree, first_contact
 
     trees = [build_tree(part.vertices, part.faces) for part in parts]
     boxes = np.stack([part.bounds for part in parts])

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from pipeline.config import StrictModel
 from pipeline.stage import Outcome, Stage
-from stages.shape.collection.declared import members, producers
+from stages.shape.collection.discovery import members, producers
 
 
 class NothingConfig(StrictModel):

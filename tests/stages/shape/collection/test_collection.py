@@ -109,7 +109,7 @@ def test_the_card_explains_every_parameter(made: tuple[Path, tuple[str, ...]]) -
 
 
 def test_verify_sees_a_surface_that_the_text_does_not_make(made: tuple[Path, tuple[str, ...]]) -> None:
-    samples, anew = samples_of(made[0]), {"program": LANGUAGE.anew(DatasetPaths(made[0], "toy"))}
+    samples, anew = samples_of(made[0]), {"program": LANGUAGE.rebuild(DatasetPaths(made[0], "toy"))}
     manifest = json.loads((made[0] / "toy" / "manifest.json").read_text())
     key, members = next(iter(samples.items()))
     other = next(each for each in samples.values() if each["txt"] != members["txt"])

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stages.shape.graphs.neighbourhoods import STRICTNESS, admits, admits_more
+from stages.shape.graphs.neighbourhoods import STRICTNESS, admits, admits_superset
 from stages.shape.kit import Grammar, Multiset, Strictness
 
 A, B, C, D = range(4)
@@ -97,11 +97,11 @@ def test_fewer_neighbours_are_admitted_exactly_where_some_neighbourhood_has_them
     wholes = [dict(each) for each in every(6) if admits(rules, A, each)]
     for part in every(4):
         found = any(all(whole.get(other, 0) >= count for other, count in part) for whole in wholes)
-        assert admits_more(rules, A, part) == found
+        assert admits_superset(rules, A, part) == found
 
 
 def test_hubs_are_left_out_of_account_where_neighbours_are_missing_too() -> None:
     rules = grammar(multiset(B, C), hubs=(D,))
-    assert admits_more(rules, A, multiset(B, D, D))
-    assert not admits_more(rules, A, multiset(B, B, D))
-    assert admits_more(rules, D, multiset(A, A, B))
+    assert admits_superset(rules, A, multiset(B, D, D))
+    assert not admits_superset(rules, A, multiset(B, B, D))
+    assert admits_superset(rules, D, multiset(A, A, B))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from stages.shape.geometry.docking import DockingTable
-from stages.shape.graphs.patterns import Pattern, observed_patterns, seen_once
+from stages.shape.graphs.patterns import Pattern, observed_patterns, unique_pattern_share
 from stages.shape.kit import Kit
 from tests.toy_kits.chains_and_rings import CHAIN, box, chain, kit_of
 
@@ -23,7 +23,7 @@ def test_patterns_of_arrows_tell_their_two_ends_apart() -> None:
     patterns = observed_patterns(kit, DockingTable.of(kit), upright=True)
     ends = [("cap", "link", 2), ("link", "cap link", 2)]
     assert named(kit, patterns) == sorted([*ends, *ends, ("link", "link link", 4)])
-    assert seen_once(patterns) == 0.0
+    assert unique_pattern_share(patterns) == 0.0
 
 
 def test_patterns_are_one_modulo_the_symmetries_of_the_part() -> None:
@@ -50,4 +50,4 @@ def test_a_pattern_belongs_to_the_exemplar_that_showed_it_first() -> None:
 @pytest.mark.parametrize(("lengths", "share"), [((1,), 1.0), ((4,), 4 / 6), ((1, 5), 3 / 10), ((3, 5), 0.0)])
 def test_share_of_parts_whose_pattern_no_other_shows(lengths: tuple[int, ...], share: float) -> None:
     kit = kit_of(CHAIN, [chain(length) for length in lengths])
-    assert seen_once(observed_patterns(kit, DockingTable.of(kit), upright=True)) == pytest.approx(share)
+    assert unique_pattern_share(observed_patterns(kit, DockingTable.of(kit), upright=True)) == pytest.approx(share)

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from stages.shape.arrays import FloatArray
 from stages.shape.physics import equilibrium
-from stages.shape.physics.contacts import Patches
-from stages.shape.physics.equilibrium import Limits, load_limits
-from stages.shape.physics.judge import Judge, physical_fields, unmet
+from stages.shape.physics.contacts import ContactPatches
+from stages.shape.physics.equilibrium import LoadLimits, load_limits
+from stages.shape.physics.judge import Judge, physical_fields, unmet_requirement
 from stages.shape.physics.settings import PhysicsConfig, Requirements
 from stages.shape.shape import Shape
 from tests.stages.shape.geometry.bodies import box
@@ -40,7 +40,7 @@ def stool(legs: list[int]) -> Shape:
     return solid(box(2.4, 2.4, 0.1, at=(0, 0, 1.05)), *feet)
 
 
-def random_problem(seed: int) -> tuple[Patches, FloatArray, FloatArray, FloatArray]:
+def random_problem(seed: int) -> tuple[ContactPatches, FloatArray, FloatArray, FloatArray]:
     """Bodies one above another, random points between them and on the ground, gravity and some pushes."""
     rng = np.random.default_rng(seed)
     count = int(rng.integers(1, 5))
@@ -54,15 +54,15 @@ def random_problem(seed: int) -> tuple[Patches, FloatArray, FloatArray, FloatArr
     gravity = np.zeros((count, 6))
     gravity[:, 2] = -weights
     pushes = rng.normal(size=(3, 1, 6)) * weights[:, None] * [1, 1, 0.2, 0.1, 0.1, 0.1]
-    return Patches(first, first - 1, first, points, normals), centres, gravity, pushes
+    return ContactPatches(first, first - 1, first, points, normals), centres, gravity, pushes
 
 
-def limits(problem: tuple[Patches, FloatArray, FloatArray, FloatArray], friction: float = 0.6) -> Limits:
+def limits(problem: tuple[ContactPatches, FloatArray, FloatArray, FloatArray], friction: float = 0.6) -> LoadLimits:
     patches, *rest = problem
     return load_limits(patches, *rest, friction, np.zeros(len(patches.points)), 0.3)
 
 
-def brick_wall(seed: int) -> tuple[Patches, FloatArray, FloatArray, FloatArray]:
+def brick_wall(seed: int) -> tuple[ContactPatches, FloatArray, FloatArray, FloatArray]:
     """Bricks that each stand on two below and press on their neighbours, weights over five orders of magnitude."""
     rng = np.random.default_rng(seed)
     rows, columns = rng.integers(3, 9, 2).tolist()
@@ -86,12 +86,14 @@ def brick_wall(seed: int) -> tuple[Patches, FloatArray, FloatArray, FloatArray]:
     pushes = np.zeros((2, len(centres), 6))
     pushes[0, :, 0] = pushes[1, :, 1] = weights
     joints = np.arange(len(first))
-    patches = Patches(np.array(first), np.array(second), joints, np.array(points, float), np.array(normals, float))
+    patches = ContactPatches(
+        np.array(first), np.array(second), joints, np.array(points, float), np.array(normals, float)
+    )
     return patches, centres, gravity, pushes
 
 
 def both_ways(
-    problem: tuple[Patches, FloatArray, FloatArray, FloatArray], monkeypatch: pytest.MonkeyPatch
+    problem: tuple[ContactPatches, FloatArray, FloatArray, FloatArray], monkeypatch: pytest.MonkeyPatch
 ) -> tuple[FloatArray, FloatArray]:
     """The factors by the interior point method, with no HiGHS behind it, and by HiGHS."""
     with monkeypatch.context() as patch:
@@ -148,7 +150,9 @@ def test_more_friction_never_hurts(seed: int, one: float, other: float) -> None:
 def test_less_contact_never_helps(seed: int, dropped: int) -> None:
     patches, *rest = problem = random_problem(seed)
     kept = np.arange(len(patches.points)) % 5 != dropped
-    fewer = Patches(*(getattr(patches, name)[kept] for name in ("first", "second", "patch", "points", "normals")))
+    fewer = ContactPatches(
+        *(getattr(patches, name)[kept] for name in ("first", "second", "patch", "points", "normals"))
+    )
     assert (limits((fewer, *rest)).factors <= limits(problem).factors + 1e-6).all()
 
 
@@ -228,9 +232,9 @@ def test_requirements_name_what_is_not_met() -> None:
     stands, floats = solid(box()), solid(box(), box(at=(0, 0, 9)))
     falls = solid(box(0.1, 0.1, 1), box(1, 1, 1, at=(0.5, 0, 1)))
     asked = Requirements(rooted=True, stable=True)
-    assert [unmet(asked, each) for each in (stands, floats, falls)] == [None, "not rooted", "not stable"]
-    assert unmet(Requirements(), floats) is None
-    assert unmet(Requirements(rooted=True), falls) is None
+    assert [unmet_requirement(asked, each) for each in (stands, floats, falls)] == [None, "not rooted", "not stable"]
+    assert unmet_requirement(Requirements(), floats) is None
+    assert unmet_requirement(Requirements(rooted=True), falls) is None
 
 
 def test_symmetry_is_the_weight_that_a_mirror_maps_to_its_like() -> None:

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stages.shape.physics.contacts import Touch
+from stages.shape.physics.contacts import PairContacts
 from stages.shape.physics.polygons import convex_hull, inside_margin
-from stages.shape.physics.solids import Placed, Solids
+from stages.shape.physics.solids import MeshSolids, PlacedParts
 from stages.shape.shape import Shape
 from tests.stages.shape.geometry.bodies import box, prism, sphere
 from tests.stages.shape.physics.structures import solid, studded
@@ -17,9 +17,9 @@ from tests.stages.shape.physics.structures import solid, studded
 PAIR = np.array([[0, 1]], dtype=np.int32)
 
 
-def asked(shape: Shape) -> tuple[Touch, Placed]:
-    solids = Solids(shape.meshes)
-    return Touch(shape.meshes, solids), Placed.of(shape.meshes, solids, shape.assembly, shape.up)
+def asked(shape: Shape) -> tuple[PairContacts, PlacedParts]:
+    solids = MeshSolids(shape.meshes)
+    return PairContacts(shape.meshes, solids), PlacedParts.of(shape.meshes, solids, shape.assembly, shape.up)
 
 
 @given(st.floats(-0.9, 0.9), st.floats(-0.9, 0.9), st.floats(-0.02, 0.02))
@@ -77,7 +77,7 @@ def test_edge_on_a_face_touches_along_the_edge() -> None:
 
 
 def test_volume_and_centroid_are_those_of_the_body() -> None:
-    solids = Solids(solid(box(1, 2, 3, at=(1, 1, 1)), studded(box(1, 2, 3, at=(1, 1, 1))), box(sides=5)).meshes)
+    solids = MeshSolids(solid(box(1, 2, 3, at=(1, 1, 1)), studded(box(1, 2, 3, at=(1, 1, 1))), box(sides=5)).meshes)
     assert solids.boxes.tolist() == [True, False, False]
     assert solids.closed.tolist() == [True, True, False]
     np.testing.assert_allclose(solids.volumes, [6, 6, 0])

@@ -6,10 +6,10 @@ import pytest
 from pipeline.errors import ShardFailed
 from stages.shape.views import buffers as module
 from stages.shape.views import opengl
-from stages.shape.views.buffers import drawn_by, render_buffers, visible_triangles
+from stages.shape.views.buffers import render_buffers, renderer_version, visible_triangles
 from stages.shape.views.camera import Camera
 from stages.shape.views.opengl import OpenGLRenderer
-from stages.shape.views.probe import probe_in_subprocess
+from stages.shape.views.renderer_check import check_in_subprocess
 from stages.shape.views.scene import mesh_scene
 from tests.stages.shape.views.solids import box, boxes_scene, cylinder, exemplar_scene
 
@@ -137,9 +137,9 @@ def test_a_blank_picture_is_an_error(backend):
 def test_opengl_is_drawn_in_software_whatever_the_environment_says(monkeypatch):
     for name, value in (("LIBGL_ALWAYS_SOFTWARE", "0"), ("GALLIUM_DRIVER", "softpipe"), ("EGL_DEVICE_ID", "7")):
         monkeypatch.setenv(name, value)
-    probe_in_subprocess.cache_clear()
-    assert probe_in_subprocess("egl") is None
-    assert drawn_by("egl").startswith("llvmpipe")
+    check_in_subprocess.cache_clear()
+    assert check_in_subprocess("egl") is None
+    assert renderer_version("egl").startswith("llvmpipe")
 
 
 @pytest.mark.egl

@@ -14,14 +14,14 @@ CAMERA = Camera(-35.0, 28.0)
 
 def test_a_portrait_is_deterministic_and_of_the_size_asked():
     scene = boxes_scene([(0, 0, 0), (1, 0, 0)], edges=[(0, 1)])
-    one, two = (portrait(scene, CAMERA, (96, 64), backend="raster") for _ in range(2))
+    one, two = (portrait(scene, CAMERA, (96, 64), renderer="raster") for _ in range(2))
     assert one.shape == (64, 96, 3)
     assert one.dtype == np.uint8
     assert (one == two).all()
 
 
 def test_a_portrait_has_paper_around_a_lit_top_a_darker_side_and_a_shadow_on_the_ground():
-    picture = portrait(boxes_scene([(0, 0, 0)]), CAMERA, (160, 160), backend="raster").astype(int)
+    picture = portrait(boxes_scene([(0, 0, 0)]), CAMERA, (160, 160), renderer="raster").astype(int)
     assert (picture[:6, :6] == PAPER).all()
     top, left, right = (picture[row, column].sum() for row, column in ((30, 80), (80, 40), (80, 100)))
     shadow, paper = picture[95, 147].sum(), sum(PAPER)
@@ -32,7 +32,7 @@ def test_a_portrait_has_paper_around_a_lit_top_a_darker_side_and_a_shadow_on_the
 def test_part_colours_replace_those_of_the_faces():
     scene = boxes_scene([(0, 0, 0)])
     blue = np.array([[20, 40, 220]], dtype=np.uint8)
-    picture = portrait(scene, CAMERA, (64, 64), part_colors=blue, backend="raster")
+    picture = portrait(scene, CAMERA, (64, 64), part_colors=blue, renderer="raster")
     assert picture[32, 32, 2] > picture[32, 32, 0] + 50
 
 

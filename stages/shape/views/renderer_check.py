@@ -1,4 +1,4 @@
-"""Check a renderer: `python -m stages.shape.views.probe raster|egl` renders and checks one triangle."""
+"""Check a renderer: `python -m stages.shape.views.renderer_check raster|egl` renders and checks one triangle."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from typing import get_args
 import numpy as np
 
 from pipeline.errors import ConfigError, ShardFailed
-from stages.shape.views.buffers import Backend, drawn_by, render_buffers
+from stages.shape.views.buffers import RendererName, render_buffers, renderer_version
 from stages.shape.views.camera import Camera
 from stages.shape.views.scene import mesh_scene
 
-BACKENDS: tuple[Backend, ...] = get_args(Backend)
+RENDERERS: tuple[RendererName, ...] = get_args(RendererName)
 
 SECONDS = 120.0
 
 
-def check_backend(backend: Backend, asked: str) -> None:
+def check_renderer(backend: RendererName, asked: str) -> None:
     """Raises ConfigError, with the mend, where `backend` cannot draw on this machine; `asked` names the config's key.
 
     Our own rasteriser needs nothing but numba, so it is not tried.
     """
-    wrong = None if backend == "raster" else probe_in_subprocess(backend)
+    wrong = None if backend == "raster" else check_in_subprocess(backend)
     if wrong is not None:
         raise ConfigError(
             f"{asked}: {backend} cannot draw on this machine: {wrong}; `make doctor` says what is missing, and "
@@ -33,7 +33,7 @@ def check_backend(backend: Backend, asked: str) -> None:
         )
 
 
-def probe(backend: Backend) -> str | None:
+def probe(backend: RendererName) -> str | None:
     """Render a triangle with `backend` in this process; None if it is right, else what is wrong."""
     vertices = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0]])
     red = np.array([[200, 30, 20]], dtype=np.uint8)
@@ -51,11 +51,11 @@ def probe(backend: Backend) -> str | None:
     return None
 
 
-@lru_cache(maxsize=len(BACKENDS))
-def probe_in_subprocess(backend: Backend) -> str | None:
+@lru_cache(maxsize=len(RENDERERS))
+def check_in_subprocess(backend: RendererName) -> str | None:
     """`probe` in a process of its own, so that a driver that crashes or hangs takes nothing with it."""
     root = Path(__file__).resolve().parents[3]
-    command = [sys.executable, "-m", "stages.shape.views.probe", backend]
+    command = [sys.executable, "-m", "stages.shape.views.renderer_check", backend]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, cwd=root, check=False)
     except subprocess.TimeoutExpired:
@@ -69,12 +69,12 @@ def probe_in_subprocess(backend: Backend) -> str | None:
 def main() -> int:
     """Entry point: prints what draws, or what is wrong, in one line; 0 if the backend draws, 1 if it does not, 2 for a
     wrong call."""
-    if len(sys.argv) != 2 or sys.argv[1] not in BACKENDS:
-        print(f"usage: python -m stages.shape.views.probe {'|'.join(BACKENDS)}", file=sys.stderr)
+    if len(sys.argv) != 2 or sys.argv[1] not in RENDERERS:
+        print(f"usage: python -m stages.shape.views.renderer_check {'|'.join(RENDERERS)}", file=sys.stderr)
         return 2
-    backend = BACKENDS[BACKENDS.index(sys.argv[1])]
+    backend = RENDERERS[RENDERERS.index(sys.argv[1])]
     wrong = probe(backend)
-    print(drawn_by(backend) if wrong is None else wrong)
+    print(renderer_version(backend) if wrong is None else wrong)
     return 0 if wrong is None else 1
 
 

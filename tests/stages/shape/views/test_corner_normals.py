@@ -6,8 +6,8 @@ import trimesh
 
 from stages.shape.views.buffers import visible_triangles
 from stages.shape.views.camera import Camera
+from stages.shape.views.corner_normals import SHARP, smooth_normals
 from stages.shape.views.scene import MeshSet, mesh_scene
-from stages.shape.views.smooth import SHARP, smooth_normals
 from stages.shape.views.strokes import find_strokes
 from tests.stages.shape.views.solids import box, cylinder
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-OWN = 13
+OWN_CELL = 13
 """The turn of `cell_hash` that is the cell of the point itself."""
 _PRIMES = (73856093, 19349663, 83492791)
 

@@ -12,7 +12,7 @@ from stages.shape.geometry.pose import transform_points
 from stages.shape.shape import Shape
 
 
-class Casting:
+class RayCaster:
     """A shape as rays see it. Open3D counts in 32-bit numbers, so it is cast about the shape's middle."""
 
     def __init__(self, shape: Shape) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.proportions.drawn import Drawn
+from stages.proportions.distinct_warps import DistinctWarps
 from stages.proportions.warp import Warp
 from tests.stages.proportions.stools import lattice
 
@@ -22,7 +22,7 @@ def end(factor: float) -> float:
 
 
 def test_what_is_nearly_the_exemplar_or_another_is_not_new() -> None:
-    drawn = Drawn(lattice(), 0.05)
+    drawn = DistinctWarps(lattice(), 0.05)
     assert not drawn.is_new(wide(1.0))
     assert not drawn.is_new(wide(1.05))
     assert end(1.05) - end(1.0) < 0.05 < end(1.5) - end(1.0)
@@ -30,11 +30,13 @@ def test_what_is_nearly_the_exemplar_or_another_is_not_new() -> None:
     drawn.add(wide(1.5))
     assert not drawn.is_new(wide(1.52))
     assert drawn.is_new(wide(2.5))
-    assert not Drawn(lattice(), 0.05).is_new(tuple(2 * each for each in wide(1.0)))  # at equal size it is the same
+    assert not DistinctWarps(lattice(), 0.05).is_new(
+        tuple(2 * each for each in wide(1.0))
+    )  # at equal size it is the same
 
 
 def test_the_farthest_come_first_and_none_that_are_alike() -> None:
-    drawn = Drawn(lattice(), 0.02)
+    drawn = DistinctWarps(lattice(), 0.02)
     assert drawn.farthest_first(5) == []
     for factor in (1.5, 3.0, 1.52, 0.4, 1.01):
         drawn.add(wide(factor))
@@ -43,7 +45,7 @@ def test_the_farthest_come_first_and_none_that_are_alike() -> None:
 
 
 def test_more_are_kept_than_there_is_room_for_at_first() -> None:
-    drawn = Drawn(lattice(), 0.0)
+    drawn = DistinctWarps(lattice(), 0.0)
     for place in range(100):
         assert drawn.is_new(wide(1.1 + 0.01 * place))
         drawn.add(wide(1.1 + 0.01 * place))

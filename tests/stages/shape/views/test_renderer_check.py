@@ -5,14 +5,14 @@ import subprocess
 import sys
 from pathlib import Path
 
-from stages.shape.views.probe import probe
 from stages.shape.views.raster import RasterRenderer
+from stages.shape.views.renderer_check import probe
 
 ROOT = Path(__file__).resolve().parents[4]
 
 
 def run(*words, **environment):
-    command = [sys.executable, "-m", "stages.shape.views.probe", *words]
+    command = [sys.executable, "-m", "stages.shape.views.renderer_check", *words]
     env = {**os.environ, **environment}
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False, env=env)
 

@@ -10,7 +10,7 @@ LEAST = 1e-9
 """What differs by less is the same."""
 
 
-class Drawn:
+class DistinctWarps:
     """Warps of an exemplar, held against it and each other by their signatures: by the greatest difference of one
     coordinate, where some end of a part lies, as a share of the diagonal."""
 
