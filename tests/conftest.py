@@ -20,9 +20,9 @@ settings.load_profile("shapemill")
 
 @cache
 def no_egl() -> str | None:
-    from stages.shape.views.renderer_check import probe
+    from stages.shape.views.renderer_check import check_triangle
 
-    return probe("egl")
+    return check_triangle("egl")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

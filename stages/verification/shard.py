@@ -46,7 +46,7 @@ def check_shard(
     """
     findings, rows, tally, path = Findings(), list[SampleRow](), ClassCounts(), str(shard["path"])
     places = DatasetPaths(folder.resolve().parent, folder.resolve().name)
-    spoken = {name: each.anew(places) for name, each in languages().items()}
+    spoken = {name: each.rebuild(places) for name, each in languages().items()}
     validator = validator_of(schema)
     wanted = [each["name"] for each in manifest["members"]]
     made, indexed = _made(places, path), _indexed(index, path)
@@ -119,7 +119,7 @@ def _faults(
         yield from (("samples", what) for what in sample_faults(sample))
         if places is not None:
             for each in audits().values():
-                yield from (("geometry", what) for what in each.anew(sample, places))
+                yield from (("geometry", what) for what in each.recheck(sample, places))
     except (KeyError, IndexError, TypeError, ValueError) as error:
         yield "samples", f"its json cannot be meant: {type(error).__name__}: {error}"
 

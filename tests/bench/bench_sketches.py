@@ -12,7 +12,7 @@ from stages.shape.shape import kit_shape
 from stages.shape.views.buffers import RendererName, render_buffers
 from stages.shape.views.camera import Camera
 from stages.shape.views.opengl import load_pyrender
-from stages.shape.views.renderer_check import probe
+from stages.shape.views.renderer_check import check_triangle
 from stages.shape.views.scene import Scene, scene_of
 from stages.sketches.draw import draw_sketch
 from stages.sketches.image import png_bytes
@@ -26,7 +26,7 @@ COLUMNS, SIDES = 6, 40
 def bench() -> Iterator[Measure]:
     """Drawings of 224 x 224 with 2 x 2 supersampling, PNG included, by each backend; then the buffers alone."""
     views = [Camera(azimuth, elevation) for azimuth, elevation in ((-40.0, 25.0), (35.0, 15.0), (25.0, 55.0))]
-    backends: list[RendererName] = ["egl", "raster"] if probe("egl") is None else ["raster"]
+    backends: list[RendererName] = ["egl", "raster"] if check_triangle("egl") is None else ["raster"]
     triangles = int(_colonnade().triangle_first[-1])
     note = f"{SIZE}x{SIZE}, {SUPERSAMPLE}x{SUPERSAMPLE}, {triangles:,} triangles, {len(_colonnade())} parts"
     for backend in backends:

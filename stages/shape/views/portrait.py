@@ -39,7 +39,7 @@ def portrait(
     parts meet, and a shadow on the ground. `part_colors` uint8 (n, 3) paints each part in one colour instead of its
     faces' own. Raises ShardFailed for a blank picture.
     """
-    from stages.shape.views.corner_normals import smooth_normals
+    from stages.shape.views.pixel_normals import smooth_normals
     from stages.shape.views.screen import surface_buffers
 
     width, height = size[0] * SUBPIXELS_PER_PIXEL, size[1] * SUBPIXELS_PER_PIXEL
@@ -121,11 +121,11 @@ def _ground_light(scene: Scene, view: View, light: KeyLight, hidden: BoolArray) 
 
 def _ink(seen: Visible, size: tuple[int, int]) -> FloatArray:
     """Thin lines over the picture, (height, width) 0..1."""
-    from stages.shape.views.corner_normals import SHARP
+    from stages.shape.views.corner_normals import CREASE_ANGLE_DEGREES
     from stages.shape.views.ink import ink_strokes
     from stages.shape.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, find_strokes
 
-    strokes = find_strokes(seen, SHARP, 0.5 * SUBPIXELS_PER_PIXEL, 4.0 * SUBPIXELS_PER_PIXEL)
+    strokes = find_strokes(seen, CREASE_ANGLE_DEGREES, 0.5 * SUBPIXELS_PER_PIXEL, 4.0 * SUBPIXELS_PER_PIXEL)
     widths = {OUTLINE: 1.1, CONTOUR: 0.9, BOUNDARY: 0.7, CREASE: 0.35}
     return 0.62 * ink_strokes(strokes, widths, size[0], size[1], 1.0 / SUBPIXELS_PER_PIXEL, 4.0)
 

@@ -33,7 +33,7 @@ def check_renderer(backend: RendererName, asked: str) -> None:
         )
 
 
-def probe(backend: RendererName) -> str | None:
+def check_triangle(backend: RendererName) -> str | None:
     """Render a triangle with `backend` in this process; None if it is right, else what is wrong."""
     vertices = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0]])
     red = np.array([[200, 30, 20]], dtype=np.uint8)
@@ -53,7 +53,7 @@ def probe(backend: RendererName) -> str | None:
 
 @lru_cache(maxsize=len(RENDERERS))
 def check_in_subprocess(backend: RendererName) -> str | None:
-    """`probe` in a process of its own, so that a driver that crashes or hangs takes nothing with it."""
+    """`check_triangle` in a process of its own, so that a driver that crashes or hangs takes nothing with it."""
     root = Path(__file__).resolve().parents[3]
     command = [sys.executable, "-m", "stages.shape.views.renderer_check", backend]
     try:
@@ -73,7 +73,7 @@ def main() -> int:
         print(f"usage: python -m stages.shape.views.renderer_check {'|'.join(RENDERERS)}", file=sys.stderr)
         return 2
     backend = RENDERERS[RENDERERS.index(sys.argv[1])]
-    wrong = probe(backend)
+    wrong = check_triangle(backend)
     print(renderer_version(backend) if wrong is None else wrong)
     return 0 if wrong is None else 1
 

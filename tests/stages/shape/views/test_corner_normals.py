@@ -6,7 +6,8 @@ import trimesh
 
 from stages.shape.views.buffers import visible_triangles
 from stages.shape.views.camera import Camera
-from stages.shape.views.corner_normals import SHARP, smooth_normals
+from stages.shape.views.corner_normals import CREASE_ANGLE_DEGREES
+from stages.shape.views.pixel_normals import smooth_normals
 from stages.shape.views.scene import MeshSet, mesh_scene
 from stages.shape.views.strokes import find_strokes
 from tests.stages.shape.views.solids import box, cylinder
@@ -33,7 +34,9 @@ def test_a_ball_of_flat_faces_has_the_normals_of_a_ball():
     assert degrees(flat, places / np.linalg.norm(places, axis=1)[:, None]).max() < 2.0
     corners = view.scene.meshes.corner_normals.astype(np.float64)
     assert degrees(corners, ball.vertices[ball.faces]).max() < 1.5
-    jumps = [degrees(each[:, 1:], each[:, :-1])[shown_pairs(view)] for each in (flat_image(view), smooth_normals(view))]
+    jumps = [
+        degrees(image[:, 1:], image[:, :-1])[shown_pairs(view)] for image in (flat_image(view), smooth_normals(view))
+    ]
     assert jumps[0].max() > 8.0
     assert jumps[1].max() < 5.0
 
@@ -63,7 +66,7 @@ def test_the_rim_of_a_smooth_cylinder_keeps_its_edge():
     cap = np.abs(flat_image(view) @ view.view.eye[:3, :3] @ [0, 1, 0]) > 0.99
     assert np.allclose(upright[cap], [0, 1, 0], atol=1e-6)
     assert np.abs(upright[(view.triangles >= 0) & ~cap][:, 1]).max() < 1e-6
-    assert len(find_strokes(view, SHARP, 0.5, 4.0).kinds) > 0  # and it is drawn
+    assert len(find_strokes(view, CREASE_ANGLE_DEGREES, 0.5, 4.0).kinds) > 0  # and it is drawn
 
 
 def test_a_small_bevel_does_not_bend_the_large_face_beside_it():

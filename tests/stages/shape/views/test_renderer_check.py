@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from stages.shape.views.raster import RasterRenderer
-from stages.shape.views.renderer_check import probe
+from stages.shape.views.renderer_check import check_triangle
 
 ROOT = Path(__file__).resolve().parents[4]
 
@@ -18,7 +18,7 @@ def run(*words, **environment):
 
 
 def test_the_rasteriser_draws_everywhere():
-    assert probe("raster") is None
+    assert check_triangle("raster") is None
     done = run("raster")
     assert (done.returncode, done.stdout.strip()) == (0, RasterRenderer.name)
 

@@ -1,0 +1,49 @@
+"""Smooth normals of pixels: corner normals interpolated over each triangle, so that a facetted surface looks round.
+
+Numba compiles this module when it is imported: import it inside functions.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from stages.shape.arrays import Float32Array
+from stages.shape.views.buffers import Visible
+
+
+def smooth_normals(seen: Visible) -> Float32Array:
+    """Return the unit normal of each pixel in eye space, float32 (h, w, 3), zero for background.
+
+    A normal points towards the viewer, as those of the flat faces do.
+    """
+    scene = seen.scene
+    rotations = (seen.view.eye @ scene.poses)[:, :3, :3]
+    parts, faces = scene.triangle_part, scene.triangle_face
+    normals: Float32Array = _interpolate(
+        seen.triangles, seen.screen, seen.normals, scene.meshes.corner_normals, parts, faces, rotations
+    )
+    return normals
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _interpolate(triangles, screen, flat, corners, parts, face_of, rotations):
+    height, width = triangles.shape
+    normals = np.zeros((height, width, 3), np.float32)
+    for row in range(height):
+        for column in range(width):
+            t = triangles[row, column]
+            if t < 0:
+                continue
+            s, n, r = screen[t], corners[face_of[t]], rotations[parts[t]]
+            ax, ay, bx, by = s[1, 0] - s[0, 0], s[1, 1] - s[0, 1], s[2, 0] - s[0, 0], s[2, 1] - s[0, 1]
+            px, py = column + 0.5 - s[0, 0], row + 0.5 - s[0, 1]
+            area = ax * by - ay * bx
+            u = min(max((px * by - py * bx) / area, 0.0), 1.0) if area != 0.0 else 0.0
+            v = min(max((ax * py - ay * px) / area, 0.0), 1.0 - u) if area != 0.0 else 0.0
+            x, y, z = (1.0 - u - v) * n[0] + u * n[1] + v * n[2]
+            turned = np.array([r[k, 0] * x + r[k, 1] * y + r[k, 2] * z for k in range(3)])
+            length, towards = np.linalg.norm(turned), np.dot(turned, flat[t])
+            if length > 0.0:
+                normals[row, column] = turned / (length if towards >= 0.0 else -length)
+    return normals
