@@ -43,7 +43,7 @@ def program_models(subject: DatasetRun, top_p: float) -> list[TrainedModel[Any]]
 
 def told_without(trained: TrainedModel[Any]) -> str:
     """The part of the language without which a model tells programs, or `nothing`."""
-    return str(trained.model.header["settings"].get("without", "nothing"))
+    return str(trained.model.header["settings"].get("ablate", "nothing"))
 
 
 def category_programs(subject: DatasetRun, category: str, split: str) -> list[AssemblyProgram]:

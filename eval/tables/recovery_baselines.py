@@ -23,7 +23,7 @@ def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
         for name, shapes, inputs in held_out(model, asked.compared, decision_rng(seed, "recovery", model.program.name)):
             label = f"{path.parent.name}, {name}"
             rows.append(tried(label, model.program, guess, shapes, inputs))
-            steps[label] = model.entry.steps * model.entry.rounds
+            steps[label] = model.entry.steps * model.entry.max_rounds
     return TableResult([baselines_table(rows, steps)])
 
 

@@ -110,7 +110,7 @@ def train(
     learner.module.train()
     for done in range(entry.steps):
         for group in optimizer.param_groups:
-            group["lr"] = entry.learning_rate * _rate(trainee.step, entry.steps * entry.rounds)
+            group["lr"] = entry.learning_rate * _rate(trainee.step, entry.steps * entry.max_rounds)
         with torch.autocast(
             device.type, torch.bfloat16, enabled=resolve_precision(entry.precision, device) == "bfloat16"
         ):

@@ -32,11 +32,11 @@ class ModelConfig(StrictModel):
     )
     seeds: int = Field(1, ge=1, le=100, description="how often it is trained, from other weights; unit: models")
     learning_rate: float = Field(1e-3, gt=0, le=1, description="of Adam at the start; it falls to a twentieth")
-    batch: int = Field(64, ge=1, le=65_536, description="samples that a step of the optimiser sees; unit: samples")
+    batch_size: int = Field(64, ge=1, le=65_536, description="samples that a step of the optimiser sees; unit: samples")
     steps: int = Field(
         250, ge=1, le=1_000_000, description="steps of a round, a minute or two of work; unit: optimiser steps"
     )
-    rounds: int = Field(12, ge=1, le=10_000, description="rounds at most; unit: rounds")
+    max_rounds: int = Field(12, ge=1, le=10_000, description="rounds at most; unit: rounds")
     patience: int = Field(
         4, ge=1, le=10_000, description="so many rounds in a row that are no better than the best end it; unit: rounds"
     )

@@ -80,7 +80,7 @@ def rounds(
     shards: list[Shard] = []
     summaries: list[Mapping[str, Any]] = []
     best = 0
-    for number in range(entry.rounds):
+    for number in range(entry.max_rounds):
         name = f"{model_name(entry, subject, seed)}-r{number:04}"
         before = [shards[-1].name] if shards else []
         params = {

@@ -31,7 +31,7 @@ AnyModelConfig = Annotated[
 class TrainingConfig(StrictModel):
     """Which models are trained. None belongs to the dataset: `make train` trains them."""
 
-    longest: int = Field(
+    max_length: int = Field(
         256, ge=2, le=100_000, description="longer strings are left out of the training of models; unit: tokens"
     )
     models: tuple[AnyModelConfig, ...] = Field((), description="the models; each is trained by itself")

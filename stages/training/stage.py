@@ -64,7 +64,7 @@ def report(plan: Plan) -> Sequence[str]:
     for entry, subject, seed in _models(plan):
         chain = rounds(plan, entry, entry.kind, subject, seed, "")
         if chain.summaries:
-            state = "ended" if chain.ended else f"of {entry.rounds} at most"
+            state = "ended" if chain.ended else f"of {entry.max_rounds} at most"
             lines.append(
                 f"{model_name(entry, subject, seed)}: {len(chain.summaries)} rounds {state}, "
                 f"{chain.summaries[-1]['step']:,} steps; best loss {chain.summaries[chain.best]['loss']:.4g} "
@@ -119,7 +119,7 @@ def uses_samples(config: Config, only: str) -> bool:
 
 def estimate_bytes(plan: Plan) -> int:
     """All rounds of all models."""
-    return sum(entry.rounds * BYTES_PER_ROUND for entry, _, _ in _models(plan))
+    return sum(entry.max_rounds * BYTES_PER_ROUND for entry, _, _ in _models(plan))
 
 
 def trial(config: Config) -> TrainingConfig:
@@ -159,7 +159,7 @@ def _kit_shard(plan: Plan, entry: KitModelConfig, kind: str, kit: str) -> Shard:
         "kind": kind,
         "kit": kit,
         **entry.prepared,
-        "longest": plan.config.section(TrainingConfig).longest,
+        "longest": plan.config.section(TrainingConfig).max_length,
     }
     if entry.learns_from == "strings":
         stage = "strings"
@@ -196,7 +196,7 @@ def _program_shards(plan: Plan, entry: RecoveryModelConfig, program: str) -> lis
     name, code = model_name(entry, program, 0).removesuffix("0"), (kind_module(entry.kind), program_module(program))
     judged = {**params, "split": "val", "shapes": entry.validation}
     learnt = {**params, "split": "train", "shapes": entry.pool}
-    pools = (Shard(f"{name}pool{number:04}", learnt, (), code) for number in range(entry.rounds))
+    pools = (Shard(f"{name}pool{number:04}", learnt, (), code) for number in range(entry.max_rounds))
     return [Shard(f"{name}data", judged, (), code), *pools]
 
 

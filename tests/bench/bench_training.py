@@ -75,7 +75,7 @@ def _programs_measure() -> Measure:
             learnt.append(assembly_lines(parse(text)))
     rates = {}
     for batch in (64, 1):
-        entry = ProgramVaeConfig(name="bench", kind="program_vae", batch=batch)
+        entry = ProgramVaeConfig(name="bench", kind="program_vae", batch_size=batch)
         programs = ProgramCorpus.of(list(islice(cycle(learnt), max(len(learnt), batch))))
         learner = ProgramVaeTask(new_program_vae(entry, 0), {}, entry, programs, programs)
         rates[batch] = rate(_steps(learner, lambda levels: len(levels[0].lines)), 4.0, 2)
@@ -134,7 +134,7 @@ def moses_steps(strings: StringCorpus, tokens: int, entry: StringVaeConfig) -> A
     each = [torch.from_numpy(part.astype(np.int64)) for part in np.split(strings.tokens, strings.first[1:-1])]
 
     def step() -> int:
-        chosen = sorted((each[row] for row in rng.choice(len(each), entry.batch)), key=len, reverse=True)
+        chosen = sorted((each[row] for row in rng.choice(len(each), entry.batch_size)), key=len, reverse=True)
         _descend(model, optimizer, model(chosen, entry.kl_weight))
         return len(chosen)
 

@@ -42,7 +42,7 @@ _SMALL: dict[str, dict[str, Any]] = {
     "package": {"previewed": 2},
 }
 _PROGRAMS = {"programs": [{"name": "furniture", "path": "datasets/exemplars/programs"}], "splits": {"shards": 2}}
-_TINY = {"batch": 4, "steps": 3, "rounds": 2, "hidden": 16, "latent": 8}
+_TINY = {"batch_size": 4, "steps": 3, "max_rounds": 2, "hidden": 16, "latent": 8}
 
 
 def _edits(dataset: str) -> list[dict[str, dict[str, Any]]]:

@@ -59,7 +59,7 @@ class CuboidRnnTask:
         """Random batches of train, one pass after another."""
         device = next(self.module.parameters()).device
         while True:
-            for batch in batches(self.train, self.entry.batch, rng):
+            for batch in batches(self.train, self.entry.batch_size, rng):
                 yield batch.to(device)
 
     def losses(self, batch: CuboidBatch, step: int, noise: Generator) -> dict[str, Tensor]:
@@ -75,6 +75,6 @@ class CuboidRnnTask:
     def validate(self, noise: Generator) -> dict[str, float]:
         """The same on val."""
         device = next(self.module.parameters()).device
-        shown = batches(self.val, self.entry.batch, None)
+        shown = batches(self.val, self.entry.batch_size, None)
         found = ((self.losses(batch.to(device), 0, noise), len(batch.shown)) for batch in shown)
         return weighted_means(found, len(self.val))

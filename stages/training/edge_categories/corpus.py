@@ -51,7 +51,7 @@ def prepare_corpus(task: Task) -> Outcome:
                 before = len(graph)
                 for each in found:
                     if len(each.categories) > params["longest"]:
-                        task.reject(key, "longer than training.longest")
+                        task.reject(key, "longer than training.max_length")
                     elif split == "val" and each.string in learnt:
                         task.reject(each.string, "stands in train as well")
                     else:

@@ -124,7 +124,7 @@ class AutoregressiveEdgeDecoder(EdgeCategoriesModel):
 def make_model(entry: EdgeCategoriesConfig, tables: CategoryTables, cycles: int) -> EdgeCategoriesModel:
     """A model of the categories of a kit, with cycle numbers below `cycles`."""
     codes = len(tables.masks) + 2 + cycles
-    if entry.reader == "lstm":
+    if entry.decoder == "lstm":
         return IndependentEdgeDecoder(entry, codes, len(tables.poses))
     return AutoregressiveEdgeDecoder(entry, codes, torch.from_numpy(tables.poses))
 

@@ -17,18 +17,18 @@ class EdgeCategoriesConfig(KitModelConfig):
     kind: Literal["edge_categories"] = Field(
         description="reads from a string where each part stands beside the one that it hangs on"
     )
-    reader: Literal["lstm", "walker"] = Field(
-        "walker",
+    decoder: Literal["lstm", "autoregressive"] = Field(
+        "autoregressive",
         description="`lstm`: an LSTM that reads a string both ways, and a dense layer that judges each token by itself "
         "(strings §6); `walker`: the same LSTM, and a transformer that walks the string and sees the parts that stand "
         "already, so that a choice agrees with those before it",
     )
     learning_rate: float = Field(3e-3, gt=0, le=1, description="of Adam at the start; it falls to a twentieth")
-    batch: int = Field(32, ge=1, le=65_536, description="strings that a step of the optimiser sees; unit: strings")
+    batch_size: int = Field(32, ge=1, le=65_536, description="strings that a step of the optimiser sees; unit: strings")
     steps: int = Field(
         200, ge=1, le=1_000_000, description="steps of a round, a minute or two of work; unit: optimiser steps"
     )
-    rounds: int = Field(9, ge=1, le=10_000, description="rounds at most; unit: rounds")
+    max_rounds: int = Field(9, ge=1, le=10_000, description="rounds at most; unit: rounds")
     mask: bool = Field(True, description="whether only categories of a token's pair of labels have a probability")
     embedding: int = Field(32, ge=1, le=4096, description="numbers that stand for a token")
     hidden: int = Field(

@@ -60,7 +60,7 @@ class EdgeCategoriesTask:
         """Random batches of train, one pass after another."""
         device = next(self.module.parameters()).device
         while True:
-            for batch in batches(self.train, self.entry.batch, self.tables.masks, rng):
+            for batch in batches(self.train, self.entry.batch_size, self.tables.masks, rng):
                 yield batch.to(device)
 
     def losses(self, batch: CategoryBatch, step: int, noise: Generator) -> dict[str, Tensor]:
@@ -73,7 +73,7 @@ class EdgeCategoriesTask:
         that may have more than one category; `tokens`: of all, as published; `strings`: of strings with none wrong."""
         device = next(self.module.parameters()).device
         sums = dict.fromkeys(("nats", "right", "open", "sure", "tokens", "strings"), 0.0)
-        for batch in (each.to(device) for each in batches(self.val, self.entry.batch, self.tables.masks, None)):
+        for batch in (each.to(device) for each in batches(self.val, self.entry.batch_size, self.tables.masks, None)):
             right, nats = self._judge(batch)
             there, undecided = batch.there_is, is_open(batch)
             found = {

@@ -41,7 +41,7 @@ class PartGraphVae(LatentGaussian):
         hidden = entry.hidden
         self.read_box = nn.Sequential(nn.Linear(BOX_WIDTH, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, hidden))
         self.read_node = nn.Linear(hidden, hidden)
-        self.heard = MessagePassing(hidden, entry.rounds_of_messages)
+        self.heard = MessagePassing(hidden, entry.message_rounds)
         self.mean = nn.Linear(hidden, entry.latent)
         self.log_variance = nn.Linear(hidden, entry.latent)
         self.root = nn.Linear(entry.latent, hidden)
@@ -50,7 +50,7 @@ class PartGraphVae(LatentGaussian):
         )
         self.there = nn.Linear(hidden, 1)
         self.edges = nn.Linear(hidden, hidden)
-        self.told = MessagePassing(hidden, entry.rounds_of_messages)
+        self.told = MessagePassing(hidden, entry.message_rounds)
         self.said = nn.Sequential(nn.Linear(hidden, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, BOX_WIDTH + 1))
         self.below = nn.Sequential(nn.Linear(hidden, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, hidden))
 

@@ -18,7 +18,7 @@ class PartGraphVaeConfig(KitModelConfig):
     kind: Literal["part_graph_vae"] = Field(description="a VAE of graphs of parts, in the way of StructureNet")
     latent: int = Field(256, ge=1, le=4096, description="dimensions of the latent space")
     hidden: int = Field(256, ge=2, le=8192, description="numbers that stand for a part")
-    rounds_of_messages: int = Field(2, ge=0, le=16, description="how often parts hear of those that they touch")
+    message_rounds: int = Field(2, ge=0, le=16, description="how often parts hear of those that they touch")
     number_weight: float = Field(
         50.0, ge=0, le=10_000, description="weight of the absolute error of numbers, beside the nats of choices"
     )

@@ -96,7 +96,7 @@ def _worded(task: Task, programs: list[tuple[str, AssemblyProgram]], unit: float
             task.reject(key, error.reason, str(error))
             continue
         if len(words) > task.shard.params["longest"]:
-            task.reject(key, "longer than training.longest")
+            task.reject(key, "longer than training.max_length")
             continue
         found.append((key, words))
     return found

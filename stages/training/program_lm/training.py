@@ -65,7 +65,7 @@ class ProgramLmTask:
         """Random batches of train, one pass after another."""
         device = next(self.module.parameters()).device
         while True:
-            for batch in batches(self.train, self.entry.batch, rng):
+            for batch in batches(self.train, self.entry.batch_size, rng):
                 yield batch.to(device)
 
     def losses(self, batch: WordBatch, step: int, noise: Generator) -> dict[str, Tensor]:
@@ -75,7 +75,7 @@ class ProgramLmTask:
     def validate(self, noise: Generator) -> dict[str, float]:
         """The same on val, nothing jittered."""
         device = next(self.module.parameters()).device
-        val = (batch.to(device) for batch in batches(self.val, self.entry.batch, None))
+        val = (batch.to(device) for batch in batches(self.val, self.entry.batch_size, None))
         return weighted_means(((self._nats(each, each.before), len(each.words)) for each in val), len(self.val))
 
     def _nats(self, batch: WordBatch, before: Tensor) -> dict[str, Tensor]:

@@ -36,14 +36,12 @@ def prepare_corpus(task: Task) -> Outcome:
         kept: list[list[AssemblyLines]] = []
         for key, program in category_programs(task, split):
             try:
-                nodes = assembly_lines(
-                    ablate_program(program, params.get("without", "nothing"), task.rng("order", key))
-                )
+                nodes = assembly_lines(ablate_program(program, params.get("ablate", "nothing"), task.rng("order", key)))
             except (ProgramError, Rejected) as error:
                 task.reject(key, error.reason, str(error))
                 continue
             if sum(len(node.numbers) for node in nodes) > params["longest"]:
-                task.reject(key, "longer than training.longest")
+                task.reject(key, "longer than training.max_length")
                 continue
             kept.append(nodes)
         if not kept:

@@ -19,7 +19,7 @@ class ProgramVaeConfig(KitModelConfig):
     learns_from: ClassVar[LearningSource] = "programs"
 
     kind: Literal["program_vae"] = Field(description="a variational autoencoder of ShapeAssembly programs")
-    without: Ablation = Field(
+    ablate: Ablation = Field(
         "nothing",
         description="what of the language it learns without: `hierarchy`, programs of one assembly, extracted again "
         "from the cuboids; `macros`, cuboids and attachments alone; `order`, lines in random order; `align`, no cuboid "
@@ -39,4 +39,4 @@ class ProgramVaeConfig(KitModelConfig):
 
     @property
     def prepared(self) -> dict[str, str]:
-        return {} if self.without == "nothing" else {"without": self.without}
+        return {} if self.ablate == "nothing" else {"without": self.ablate}

@@ -77,7 +77,7 @@ class ProgramVaeTask:
         """Random batches of train, one pass after another."""
         device = next(self.module.parameters()).device
         while True:
-            for levels in batches(self.train, self.entry.batch, rng):
+            for levels in batches(self.train, self.entry.batch_size, rng):
                 yield [level.to(device) for level in levels]
 
     def losses(self, batch: Sequence[AssemblyLevel], step: int, noise: Generator) -> dict[str, Tensor]:
@@ -91,7 +91,7 @@ class ProgramVaeTask:
     def validate(self, noise: Generator) -> dict[str, float]:
         """The same on val; and the module learns where the programs of train stand."""
         device = next(self.module.parameters()).device
-        train, val = (batches(each, self.entry.batch, None) for each in (self.train, self.val))
+        train, val = (batches(each, self.entry.batch_size, None) for each in (self.train, self.val))
         self.module.fit_posterior(self.module.encode([level.to(device) for level in levels]) for levels in train)
         found = ((self.losses([each.to(device) for each in levels], 0, noise), len(levels[0].lines)) for levels in val)
         return weighted_means(found, len(self.val))

@@ -35,7 +35,7 @@ class RecoveryModelConfig(ModelConfig):
         description="the views of `sketches.views`, by name, that drawings are learnt from; all if empty",
     )
     learning_rate: float = Field(2e-3, gt=0, le=1, description="of Adam at the start; it falls to a twentieth")
-    batch: int = Field(32, ge=2, le=65_536, description="inputs that a step of the optimiser sees; unit: inputs")
+    batch_size: int = Field(32, ge=2, le=65_536, description="inputs that a step of the optimiser sees; unit: inputs")
     points: int = Field(512, ge=64, le=100_000, description="points of a cloud that are looked at; unit: points")
     neighbors: int = Field(
         20, ge=1, le=256, description="nearest neighbours that an edge convolution looks at; unit: points"

@@ -146,7 +146,7 @@ class RecoveryTask:
         inputs = torch.from_numpy(self.train["inputs"]).to(self.device)
         classes = torch.from_numpy(self.train["classes"].astype(np.int64)).to(self.device)
         while True:
-            rows = torch.from_numpy(rng.integers(len(classes), size=self.entry.batch)).to(self.device)
+            rows = torch.from_numpy(rng.integers(len(classes), size=self.entry.batch_size)).to(self.device)
             if self.entry.input == "points":
                 seen = augment_clouds(inputs[rows], self.entry.points, self.entry.noise, noise)
             else:
@@ -164,7 +164,7 @@ class RecoveryTask:
         from the true ones, squared, in sides of their boxes."""
         inputs = torch.from_numpy(self.val["inputs"]).to(self.device)
         read = unpack_drawings if self.entry.input == "sketch" else Tensor.float
-        found = torch.cat([self.module(read(each)) for each in torch.split(inputs, self.entry.batch)])
+        found = torch.cat([self.module(read(each)) for each in torch.split(inputs, self.entry.batch_size)])
         classes = torch.from_numpy(self.val["classes"].astype(np.int64)).to(self.device)
         counts = self.answers.counts
         chances, visible = self.answers.probabilities(found), classes < counts

@@ -41,7 +41,7 @@ def prepare_corpus(task: Task) -> Outcome:
             kept = kept if strings[0] in kept[:1] else []  # what the others shall be written as
             refused = len(strings) - len(kept)
             if refused:
-                task.reject(key, "longer than training.longest", count=refused)
+                task.reject(key, "longer than training.max_length", count=refused)
             shapes.setdefault(split, []).append(kept)
         task.progress(done + 1, len(splits))
     vocabulary = Vocabulary(alphabet, _cycles(shapes.get("train", [])))

@@ -39,7 +39,7 @@ class StringVaeConfig(KitModelConfig):
     kl_weight: float = Field(
         0.01, ge=0, le=10, description="weight of the divergence from the prior, in nats, beside that of a whole string"
     )
-    anneal: int = Field(
+    anneal_steps: int = Field(
         750,
         ge=0,
         le=1_000_000,

@@ -89,7 +89,7 @@ class StringVaeTask:
         nats, _ = self._reconstruction(logits, batch)
         divergence = _divergence(mean, log_variance)
         losses = {"nats": nats, "divergence": divergence}
-        loss = nats + self.entry.kl_weight * annealed(step, self.entry.anneal) * divergence
+        loss = nats + self.entry.kl_weight * annealed(step, self.entry.anneal_steps) * divergence
         if self.entry.triplet_weight:
             losses["triplet"] = triplet_loss(mean, batch.histograms, self.entry.triplet_margin, noise)
             loss = loss + self.entry.triplet_weight * losses["triplet"]
@@ -112,7 +112,7 @@ class StringVaeTask:
         return {"loss": loss, "nats": nats, "divergence": divergence, "accuracy": accuracy}
 
     def _batches(self, strings: StringCorpus, rng: np.random.Generator | None) -> Iterator[StringBatch]:
-        return batches(strings, self.entry.batch, len(self.vocabulary), self.canonical, rng)
+        return batches(strings, self.entry.batch_size, len(self.vocabulary), self.canonical, rng)
 
     def _reconstruction(self, logits: Tensor, batch: StringBatch) -> tuple[Tensor, Tensor]:
         """Nats of a string, mean over the batch, and the share of the tokens that are the likeliest."""

@@ -28,7 +28,7 @@ def test_a_model_that_has_learnt_is_right_more_often_and_strings_that_vote_agree
     shapes = [network(seed) for seed in range(6)]
     learnt, random = (
         judge(model, writer(), shapes, 3, np.random.default_rng(0))
-        for model in (trained_model(reader="walker"), random_model(reader="walker"))
+        for model in (trained_model(decoder="autoregressive"), random_model(decoder="autoregressive"))
     )
     for each in (learnt, random):
         assert each.graphs == len(shapes)
@@ -47,7 +47,7 @@ def test_a_model_that_has_learnt_is_right_more_often_and_strings_that_vote_agree
 def test_what_is_read_back_stands_where_the_shape_stands() -> None:
     """Two posts, a rod and a sign leave little to guess: the same places, or the sign at another side."""
     shape = network(2, 2)
-    found = read_back(trained_model(reader="walker"), writer(), shape, 3, np.random.default_rng(0))
+    found = read_back(trained_model(decoder="autoregressive"), writer(), shape, 3, np.random.default_rng(0))
     assert found is not None
     assert sorted(found.types.tolist()) == sorted(shape.types.tolist())
     first, place = found.poses[0], found.poses[:, :3, 3]
@@ -61,12 +61,12 @@ def test_shapes_that_have_no_string_are_left_out() -> None:
     parts = np.array([0, len(whole) - 2])
     apart = whole.select(parts)
     assert not len(apart.edges)
-    found = judge(random_model(reader="lstm"), writer(), [apart, network(2)], 1, np.random.default_rng(0))
+    found = judge(random_model(decoder="lstm"), writer(), [apart, network(2)], 1, np.random.default_rng(0))
     assert (found.graphs, found.strings) == (1, 2)
 
 
 def test_models_are_read_beside_their_kits(tmp_path: Path) -> None:
-    model = random_model(reader="lstm")
+    model = random_model(decoder="lstm")
     folder = tmp_path / "lstm-toy-0"
     folder.mkdir()
     header = {**model.header, "name": "lstm-toy-0"}
@@ -81,7 +81,7 @@ def test_models_are_read_beside_their_kits(tmp_path: Path) -> None:
 
 
 def test_a_row_says_what_strings_say_alone_and_one_what_they_vote_for() -> None:
-    model = random_model(reader="lstm")
+    model = random_model(decoder="lstm")
     judged = Judged(5, 20, 91.0, Shares(90.0, 80.0, 10.0, 30.0), Shares(95.0, 85.0, 40.0, 60.0))
     found = [(TrainedModel("lstm", "toy", 0, model), split, judged) for split in ("val", "test")]
     table = categories_table(found)

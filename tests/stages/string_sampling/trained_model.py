@@ -26,7 +26,7 @@ def publish_model(
     """Put a model called `tiny`, its header `changed`, and the training strings of a dataset below `out`; the path of
     the weights."""
     vocabulary = Vocabulary(make_alphabet(kit.labels), 1)
-    sizes = {"latent": 4, "embedding": 4, "hidden": 16, "rounds": 1, "decoder": "masked", "cycle_attention": False}
+    sizes = {"latent": 4, "embedding": 4, "hidden": 16, "max_rounds": 1, "decoder": "masked", "cycle_attention": False}
     entry = StringVaeConfig.model_validate({"name": "tiny", "kind": "string_vae", **sizes})
     module = new_model(entry, vocabulary, MOST, 7)
     header = {

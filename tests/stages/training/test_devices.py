@@ -36,7 +36,7 @@ FURNITURE = [parse(BOX), parse(STOOL)]
 
 
 def program_vae() -> TrainingTask:
-    entry = ProgramVaeConfig(name="tiny", kind="program_vae", latent=4, hidden=8, batch=2)
+    entry = ProgramVaeConfig(name="tiny", kind="program_vae", latent=4, hidden=8, batch_size=2)
     programs = ProgramCorpus.of([assembly_lines(each) for each in FURNITURE])
     return ProgramVaeTask(new_program_vae(entry, 0), {}, entry, programs, programs)
 
@@ -46,13 +46,13 @@ def program_lm() -> TrainingTask:
 
 
 def cuboid_rnn() -> TrainingTask:
-    entry = CuboidRnnConfig(name="tiny", kind="cuboid_rnn", hidden=8, mixtures=2, batch=2)
+    entry = CuboidRnnConfig(name="tiny", kind="cuboid_rnn", hidden=8, mixtures=2, batch_size=2)
     cuboids = CuboidCorpus.of([cuboid_rows(execution_boxes(execute(each))) for each in FURNITURE])
     return CuboidRnnTask(new_cuboid_rnn(entry, 0), {}, entry, cuboids, cuboids)
 
 
 def part_graph_vae() -> TrainingTask:
-    entry = PartGraphVaeConfig(name="tiny", kind="part_graph_vae", latent=4, hidden=8, batch=2)
+    entry = PartGraphVaeConfig(name="tiny", kind="part_graph_vae", latent=4, hidden=8, batch_size=2)
     graphs = GraphCorpus.of([graph_nodes(execute(each)) for each in FURNITURE])
     return PartGraphVaeTask(new_part_graph_vae(entry, 0), {}, entry, graphs, graphs)
 

@@ -28,17 +28,41 @@ def test_models_of_programs_are_trained_and_read_again(tmp_path: Path) -> None:
         for number in range(2):
             text = path.read_text().replace("0.5, 0.0, 0.5, 0.5, 1.0, 0.5", f"0.5, 0.0, 0.5, 0.5, 1.0, 0.5{number}")
             (tmp_path / "programs" / f"{path.stem}-{number}.txt").write_text(text)
-    model = {"name": "tiny", "kind": "program_vae", "latent": 8, "hidden": 32, "batch": 4, "steps": 30, "rounds": 2}
-    flat = {**model, "name": "flat", "without": "hierarchy"}
-    cuboids = {"name": "cuboids", "kind": "cuboid_rnn", "hidden": 32, "batch": 4, "steps": 60, "rounds": 2}
-    parts = {"name": "parts", "kind": "part_graph_vae", "latent": 8, "hidden": 32, "batch": 4, "steps": 60, "rounds": 2}
-    words = {"name": "words", "kind": "program_lm", "width": 16, "layers": 1, "batch": 4, "steps": 20, "rounds": 2}
+    model = {
+        "name": "tiny",
+        "kind": "program_vae",
+        "latent": 8,
+        "hidden": 32,
+        "batch_size": 4,
+        "steps": 30,
+        "max_rounds": 2,
+    }
+    flat = {**model, "name": "flat", "ablate": "hierarchy"}
+    cuboids = {"name": "cuboids", "kind": "cuboid_rnn", "hidden": 32, "batch_size": 4, "steps": 60, "max_rounds": 2}
+    parts = {
+        "name": "parts",
+        "kind": "part_graph_vae",
+        "latent": 8,
+        "hidden": 32,
+        "batch_size": 4,
+        "steps": 60,
+        "max_rounds": 2,
+    }
+    words = {
+        "name": "words",
+        "kind": "program_lm",
+        "width": 16,
+        "layers": 1,
+        "batch_size": 4,
+        "steps": 20,
+        "max_rounds": 2,
+    }
     sections = {
         "shapeassembly": {
             "programs": [{"name": "furniture", "path": str(tmp_path / "programs")}],
             "splits": {"shards": 1, "val": 0.2, "test": 0.2},
         },
-        "training": {"longest": 1000, "models": [model, flat, cuboids, parts, words]},
+        "training": {"max_length": 1000, "models": [model, flat, cuboids, parts, words]},
     }
     config = tmp_path / "toy.yaml"
     config.write_text(yaml.safe_dump({"name": "toy", "seed": 5, **sections}))

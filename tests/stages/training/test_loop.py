@@ -51,7 +51,7 @@ def _trained(before: int, seed: int) -> torch.Tensor:
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(0)
         module = nn.Sequential(nn.Linear(4, 4), nn.Dropout(0.5))
-    entry = ProgramLmConfig(name="halving", kind="program_lm", steps=5, rounds=1)
+    entry = ProgramLmConfig(name="halving", kind="program_lm", steps=5, max_rounds=1)
     trainee = TrainState.of(_Halving(module), entry)
     train(trainee, entry, np.random.default_rng(seed), lambda done, total: None)
     return module[0].weight.detach()
@@ -76,7 +76,7 @@ class _Half(nn.Module):
 
 def _rounds(stops: bool) -> dict[str, torch.Tensor]:
     """What is kept after two rounds, which are taken up again after each where it `stops`."""
-    entry = ProgramLmConfig(name="halving", kind="program_lm", steps=5, rounds=2)
+    entry = ProgramLmConfig(name="halving", kind="program_lm", steps=5, max_rounds=2)
 
     def fresh() -> TrainState:
         with torch.random.fork_rng(devices=[]):

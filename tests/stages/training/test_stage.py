@@ -99,13 +99,13 @@ def test_killed_training_ends_with_the_same_weights(out: Path, tmp_path: Path) -
 
 
 def test_edit_of_one_model_trains_no_other_anew(tmp_path: Path) -> None:
-    both = config({"rounds": 1}, {"name": "other", "rounds": 1})
+    both = config({"max_rounds": 1}, {"name": "other", "max_rounds": 1})
     assert train(both, tmp_path, only="tiny").made == 3
     assert [path.name for path in (tmp_path / "toys-models").iterdir()] == ["tiny-toy-0"]
     assert train(both, tmp_path, workers=2).made == 2
-    edited = config({"rounds": 1}, {"name": "other", "rounds": 1, "latent": 5})
+    edited = config({"max_rounds": 1}, {"name": "other", "max_rounds": 1, "latent": 5})
     assert train(edited, tmp_path).made == 2
-    more = config({"rounds": 1, "seeds": 2}, {"name": "other", "rounds": 1, "latent": 5})
+    more = config({"max_rounds": 1, "seeds": 2}, {"name": "other", "max_rounds": 1, "latent": 5})
     assert train(more, tmp_path).made == 2
     one, other = (tmp_path / f"toys-models/tiny-toy-{seed}/weights.safetensors" for seed in (0, 1))
     assert one.read_bytes() != other.read_bytes()
@@ -113,7 +113,7 @@ def test_edit_of_one_model_trains_no_other_anew(tmp_path: Path) -> None:
 
 def test_training_ends_when_rounds_in_a_row_are_no_better(tmp_path: Path) -> None:
     # So large a rate makes it worse at once.
-    wanted = config({"rounds": 9, "patience": 1, "learning_rate": 0.9, "steps": 3})
+    wanted = config({"max_rounds": 9, "patience": 1, "learning_rate": 0.9, "steps": 3})
     result = train(wanted, tmp_path)
     assert not result.failed
     survey = Inventory(wanted, STAGES, DatasetPaths(tmp_path, "toys")).stage("training")

@@ -122,8 +122,9 @@ STAGES: Mapping[str, Stage] = named_inputs(
 )
 
 TINY: Mapping[str, Any] = {
-    "kind": "string_vae", "name": "tiny", "decoder": "masked", "latent": 4, "embedding": 4, "hidden": 8, "batch": 16,
-    "steps": 4, "rounds": 4, "anneal": 8,
+    "kind": "string_vae", "name": "tiny", "decoder": "masked", "latent": 4, "embedding": 4, "hidden": 8,
+"batch_size": 16,
+    "steps": 4, "max_rounds": 4, "anneal_steps": 8,
 }  # fmt: skip
 
 

@@ -22,7 +22,7 @@ TWO_LEGS = """Assembly P { bbox = Cuboid(1.0, 1.0, 0.4, True)
 top = Cuboid(1.0, 0.1, 0.4, True) leg = Cuboid(0.1, 0.9, 0.1, False)
 attach(top, bbox, 0.5, 1.0, 0.5, 0.5, 1.0, 0.5) attach(leg, bbox, 0.5, 0.0, 0.5, 0.05, 0.0, 0.5)
 attach(leg, top, 0.5, 1.0, 0.5, 0.2, 0.0, 0.5) reflect(leg, X) }"""
-ENTRY = CuboidRnnConfig(name="tiny", kind="cuboid_rnn", hidden=48, mixtures=1, batch=2)
+ENTRY = CuboidRnnConfig(name="tiny", kind="cuboid_rnn", hidden=48, mixtures=1, batch_size=2)
 
 
 @pytest.mark.parametrize("text", [BOX, STOOL, TWO_LEGS])

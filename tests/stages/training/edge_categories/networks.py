@@ -114,8 +114,8 @@ def strings_of(shapes: int) -> LabelledStrings:
 
 def entry(**changes: Any) -> EdgeCategoriesConfig:
     """Settings of a model that learns in seconds."""
-    settings = {"kind": "edge_categories", "name": "tiny", "embedding": 8, "hidden": 32, "layers": 1, "batch": 16}
-    return EdgeCategoriesConfig.model_validate({**settings, "steps": 150, "rounds": 1, **changes})
+    settings = {"kind": "edge_categories", "name": "tiny", "embedding": 8, "hidden": 32, "layers": 1, "batch_size": 16}
+    return EdgeCategoriesConfig.model_validate({**settings, "steps": 150, "max_rounds": 1, **changes})
 
 
 def header(settings: EdgeCategoriesConfig) -> dict[str, Any]:
@@ -200,8 +200,8 @@ STAGES: Mapping[str, Stage] = named_inputs(
 
 def config(strings: Mapping[str, Any] | None = None, **changes: Any) -> Config:
     """A config with one model."""
-    model = entry(steps=4, rounds=2, **changes).model_dump(mode="json")
-    training = TrainingConfig.model_validate_json(json_bytes({"models": [model], "longest": 60}))
+    model = entry(steps=4, max_rounds=2, **changes).model_dump(mode="json")
+    training = TrainingConfig.model_validate_json(json_bytes({"models": [model], "max_length": 60}))
     sections: dict[str, StrictModel] = {"exemplars": NothingConfig(), "variations": NothingConfig()}
     sections |= {
         **ABSENT_SECTIONS,

@@ -36,7 +36,7 @@ from tests.stages.training.edge_categories.networks import (
 )
 from tests.toy_kits.program_chairs import write_chairs
 
-READERS = ("lstm", "walker")
+READERS = ("lstm", "autoregressive")
 
 
 def strings(seed: int, count: int = 0) -> list[Encoded]:
@@ -79,9 +79,9 @@ def test_batches_hold_each_string_once() -> None:
         assert max(map(len, seen)) <= 4
 
 
-@pytest.mark.parametrize("reader", READERS)
-def test_a_string_is_judged_alike_whatever_stands_beside_it(reader: str) -> None:
-    module = random_model(reader=reader).module
+@pytest.mark.parametrize("decoder", READERS)
+def test_a_string_is_judged_alike_whatever_stands_beside_it(decoder: str) -> None:
+    module = random_model(decoder=decoder).module
     rows = sorted((labelled(network(seed, size), 0, 0)[0] for seed, size in ((1, 2), (2, 5))), key=len)
     with torch.no_grad():
         alone, beside = (module(batch_of(each, space().masks))[0, : len(rows[0])] for each in (rows[:1], rows))
@@ -89,7 +89,7 @@ def test_a_string_is_judged_alike_whatever_stands_beside_it(reader: str) -> None
 
 
 def test_a_walker_sees_the_categories_before_a_token_and_no_others() -> None:
-    module = random_model(reader="walker").module
+    module = random_model(decoder="autoregressive").module
     batch = batch_of([labelled(network(3), 0, 0)[0]], space().masks)
     token = next(each for each in range(4, batch.codes.shape[1]) if int(batch.allowed[0, each].sum()) > 1)
     with torch.no_grad():
@@ -102,7 +102,7 @@ def test_a_walker_sees_the_categories_before_a_token_and_no_others() -> None:
 
 
 def test_frames_of_a_walker_are_those_of_the_categories() -> None:
-    module = random_model(reader="walker").module
+    module = random_model(decoder="autoregressive").module
     assert isinstance(module, AutoregressiveEdgeDecoder)
     (encoded,) = strings(4)
     row = labelled(network(4), 0, 0)[0]
@@ -113,9 +113,9 @@ def test_frames_of_a_walker_are_those_of_the_categories() -> None:
     np.testing.assert_allclose(pose_vectors(frames[parts], 1.0), pose_vectors(placed.poses, 1.0), atol=1e-4)
 
 
-@pytest.mark.parametrize("reader", READERS)
-def test_token_by_token_a_model_says_what_it_says_of_the_whole(reader: str) -> None:
-    model = random_model(reader=reader)
+@pytest.mark.parametrize("decoder", READERS)
+def test_token_by_token_a_model_says_what_it_says_of_the_whole(decoder: str) -> None:
+    model = random_model(decoder=decoder)
     (encoded,) = strings(5)
     steps = model.steps([encoded.string, "A", encoded.string])
     for category in right(5).tolist():
@@ -130,7 +130,7 @@ def test_token_by_token_a_model_says_what_it_says_of_the_whole(reader: str) -> N
 
 
 def test_strings_that_are_kept_go_on_as_they_would_have() -> None:
-    model = random_model(reader="walker")
+    model = random_model(decoder="autoregressive")
     texts = [strings(seed)[0].string for seed in (1, 2)]
     both, kept = model.steps(texts), model.steps(texts)
     for each in (both, kept):
@@ -140,9 +140,9 @@ def test_strings_that_are_kept_go_on_as_they_would_have() -> None:
     np.testing.assert_allclose(kept.scores(), both.scores()[[1, 1]], atol=1e-5)
 
 
-@pytest.mark.parametrize("reader", READERS)
-def test_only_what_the_mask_allows_is_chosen(reader: str) -> None:
-    model = random_model(reader=reader)
+@pytest.mark.parametrize("decoder", READERS)
+def test_only_what_the_mask_allows_is_chosen(decoder: str) -> None:
+    model = random_model(decoder=decoder)
     for seed in range(3):
         (encoded,) = strings(seed)
         for rng in (None, np.random.default_rng(seed)):
@@ -151,7 +151,7 @@ def test_only_what_the_mask_allows_is_chosen(reader: str) -> None:
         scores = model.scores(encoded.string)
         assert ((scores > -np.inf) <= space().allowed(encoded.string)).all()
         np.testing.assert_allclose(np.exp(scores).sum(axis=1), 1.0)
-    without = random_model(reader=reader, mask=False)
+    without = random_model(decoder=decoder, mask=False)
     assert (without.scores(strings(0)[0].string) > -np.inf).all()
 
 
@@ -161,7 +161,7 @@ def test_parts_of_one_label_have_one_surface_in_all_their_categories(tmp_path: P
     shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path, 4))
     chairs = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").resolve(STRICTEST))
     of_chairs, of_kit = CategorySpace(chairs), KitStrings(chairs, "all")
-    settings = model_entry(random_model(reader="walker"))
+    settings = model_entry(random_model(decoder="autoregressive"))
     module = new_model(settings, CategoryTables.of(of_chairs), CYCLES, 0)
     model = TrainedEdgeCategories(module.eval(), of_chairs, random_model().header)
     for seed, exemplar in enumerate(chairs.exemplars):
@@ -186,22 +186,22 @@ def model_entry(model: TrainedEdgeCategories) -> EdgeCategoriesConfig:
 def test_it_learns_and_a_walker_learns_what_no_token_can_know_by_itself() -> None:
     """Where the first of several rods goes is anybody's guess, but those after it must go elsewhere."""
     found = {}
-    for reader in READERS:
-        model = trained_model(reader=reader)
+    for decoder in READERS:
+        model = trained_model(decoder=decoder)
         learning = learner(model_entry(model))
         with torch.no_grad():
             fresh = learning.validate(torch.Generator())
             learning.module.load_state_dict(model.module.state_dict())
-            found[reader] = learning.validate(torch.Generator())
-        assert found[reader]["loss"] < fresh["loss"] / 2
-        assert found[reader]["tokens"] >= found[reader]["accuracy"] > fresh["accuracy"]
-    assert found["walker"]["accuracy"] > found["lstm"]["accuracy"]
-    assert found["walker"]["strings"] > found["lstm"]["strings"]
+            found[decoder] = learning.validate(torch.Generator())
+        assert found[decoder]["loss"] < fresh["loss"] / 2
+        assert found[decoder]["tokens"] >= found[decoder]["accuracy"] > fresh["accuracy"]
+    assert found["autoregressive"]["accuracy"] > found["lstm"]["accuracy"]
+    assert found["autoregressive"]["strings"] > found["lstm"]["strings"]
 
 
 @pytest.mark.slow
 def test_strings_vote_for_a_shape_that_closes_and_all_read_it_alike() -> None:
-    model = trained_model(reader="walker")
+    model = trained_model(decoder="autoregressive")
     several = strings(1, 4)
     # as seen from the first: its nodes are those of its own order
     order = np.argsort(several[0].nodes)
@@ -219,9 +219,9 @@ def test_strings_vote_for_a_shape_that_closes_and_all_read_it_alike() -> None:
     np.testing.assert_allclose(np.exp(scores).sum(axis=1), 1.0)
 
 
-@pytest.mark.parametrize("reader", READERS)
-def test_weights_come_back_from_their_file_and_only_for_their_kit(reader: str, tmp_path: Path) -> None:
-    model = random_model(reader=reader)
+@pytest.mark.parametrize("decoder", READERS)
+def test_weights_come_back_from_their_file_and_only_for_their_kit(decoder: str, tmp_path: Path) -> None:
+    model = random_model(decoder=decoder)
     path = tmp_path / "weights.safetensors"
     path.write_bytes(checkpoint_bytes(model.module.state_dict(), model.header))
     (encoded,) = strings(0)
@@ -238,7 +238,7 @@ def test_strings_of_other_spanning_trees_vote_for_a_shape_if_all_that_they_tell_
     trees = KitStrings(kit(), "tree")
     strings = trees.strings(trees.graph(ring), 5, np.random.default_rng(0))
     truth = [each.categories for each in space().label(ring, strings, either_hand=True)]
-    model = random_model(reader="walker")
+    model = random_model(decoder="autoregressive")
     (ballot,) = model.vote(strings, truth)
     for read, wanted in zip(ballot.categories, truth, strict=True):
         np.testing.assert_array_equal(read, wanted)

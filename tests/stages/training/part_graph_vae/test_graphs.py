@@ -19,7 +19,7 @@ from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.part_graph_vae.training import PartGraphVaeTask, new_model, reconstruction
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
-ENTRY = PartGraphVaeConfig(name="tiny", kind="part_graph_vae", latent=8, hidden=48, batch=2, kl_weight=0.0)
+ENTRY = PartGraphVaeConfig(name="tiny", kind="part_graph_vae", latent=8, hidden=48, batch_size=2, kl_weight=0.0)
 
 
 @cache

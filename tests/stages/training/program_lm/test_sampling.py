@@ -20,7 +20,7 @@ from stages.training.program_lm.training import FIRST_NUMBER_WORD, ProgramLmTask
 from stages.training.program_vae.lines import START
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
-ENTRY = ProgramLmConfig(name="tiny", kind="program_lm", width=32, layers=2, batch=2)
+ENTRY = ProgramLmConfig(name="tiny", kind="program_lm", width=32, layers=2, batch_size=2)
 PROGRAMS = [parse(text) for text in (BOX, STOOL)]
 WORDED = [program_words(each, 1.2) for each in PROGRAMS]
 VALUES = step_values(WORDED)

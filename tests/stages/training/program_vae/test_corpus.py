@@ -40,4 +40,4 @@ def test_models_that_learn_the_same_share_what_is_made_ready() -> None:
         return ProgramVaeConfig(name="any", kind="program_vae", without=without)
 
     assert entry("nothing").prepared == {}
-    assert entry("macros").prepared == {"without": "macros"}
+    assert entry("macros").prepared == {"ablate": "macros"}

@@ -20,7 +20,7 @@ from stages.training.program_vae.trained import TrainedProgramVae
 from stages.training.program_vae.training import ProgramVaeTask, new_model, reconstruction
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
-ENTRY = ProgramVaeConfig(name="tiny", kind="program_vae", latent=16, hidden=48, kl_weight=0.0, batch=2)
+ENTRY = ProgramVaeConfig(name="tiny", kind="program_vae", latent=16, hidden=48, kl_weight=0.0, batch_size=2)
 PROGRAMS = ProgramCorpus.of([assembly_lines(parse(text)) for text in (BOX, STOOL)])
 
 

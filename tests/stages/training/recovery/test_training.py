@@ -45,7 +45,15 @@ def test_each_round_learns_from_shapes_of_its_own_and_of_those_before(tmp_path: 
 @pytest.mark.slow
 def test_it_learns_what_a_stool_is(tmp_path: Path) -> None:
     wanted = config(
-        learning_rate=0.01, points=128, widths=[16, 16], embedding=32, batch=16, steps=80, rounds=1, noise=0, dropout=0
+        learning_rate=0.01,
+        points=128,
+        widths=[16, 16],
+        embedding=32,
+        batch_size=16,
+        steps=80,
+        max_rounds=1,
+        noise=0,
+        dropout=0,
     )
     train(wanted, tmp_path)
     rows = list(csv.DictReader((tmp_path / FOLDER / "curves.csv").read_text().splitlines()))

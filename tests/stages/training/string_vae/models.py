@@ -29,8 +29,18 @@ def rules() -> CompiledGrammar:
 
 def entry(**changes: Any) -> StringVaeConfig:
     """Settings of a model that learns in seconds."""
-    settings = {"name": "tiny", "latent": 8, "embedding": 8, "hidden": 64, "batch": 20, "steps": 300, "rounds": 1}
-    return StringVaeConfig.model_validate({**settings, "anneal": 50, "kl_weight": 0.01, "word_dropout": 0.1, **changes})
+    settings = {
+        "name": "tiny",
+        "latent": 8,
+        "embedding": 8,
+        "hidden": 64,
+        "batch_size": 20,
+        "steps": 300,
+        "max_rounds": 1,
+    }
+    return StringVaeConfig.model_validate(
+        {**settings, "anneal_steps": 50, "kl_weight": 0.01, "word_dropout": 0.1, **changes}
+    )
 
 
 @cache
