@@ -9,7 +9,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.shape.physics.polygons import cut, polygon_area
+from stages.shape.geometry.polygons import cut, polygon_area
 
 SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 EDGES = np.array([[a, b] for a in range(8) for b in range(a + 1, 8) if np.abs(SIGNS[a] - SIGNS[b]).sum() == 2])

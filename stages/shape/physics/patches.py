@@ -6,7 +6,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.physics.polygons import convex_hull, cut
+from stages.shape.geometry.polygons import convex_hull, cut
 
 OPPOSED = 0.98
 """Faces press on each other if their normals are opposed within about 11 degrees (cosine)."""

@@ -15,7 +15,7 @@ from heapq import heappop, heappush
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.physics.polygons import convex_hull, inside_margin
+from stages.shape.geometry.polygons import convex_hull, inside_margin
 
 FALL = 0.025
 """Change of the height of the centre of mass, as a share of it, by which a component has fallen: that of the programs'

@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.shape.geometry.polygons import convex_hull
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.physics.boxes import box_corners, recognise_boxes
-from stages.shape.physics.polygons import convex_hull
 
 
 class MeshSolids:

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.polygons import convex_hull, inside_margin
 from stages.shape.physics.contacts import ContactPatches, PairContacts
 from stages.shape.physics.equilibrium import load_limits
-from stages.shape.physics.polygons import convex_hull, inside_margin
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.physics.solids import PlacedParts
 from stages.shape.physics.tableau import TIE_TOLERANCE

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.polygons import convex_hull
 from stages.shape.physics.contacts import ContactPatches
-from stages.shape.physics.polygons import convex_hull
 from stages.shape.physics.solids import PlacedParts
 
 ALIKE = 0.02

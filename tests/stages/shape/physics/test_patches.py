@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stages.shape.geometry.polygons import convex_hull, inside_margin
 from stages.shape.physics.contacts import PairContacts
-from stages.shape.physics.polygons import convex_hull, inside_margin
 from stages.shape.physics.solids import MeshSolids, PlacedParts
 from stages.shape.shape import Shape
 from tests.stages.shape.geometry.bodies import box, prism, sphere
