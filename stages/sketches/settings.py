@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from pipeline.config import StrictModel
 from stages.shape.views.buffers import RendererName
@@ -124,13 +124,6 @@ class SketchesConfig(StrictModel):
         "same everywhere; egl: OpenGL, always by Mesa's llvmpipe, at the system's version. Their pictures differ in a "
         "few pixels",
     )
-
-    @field_validator("backend", mode="before")
-    @classmethod
-    def _casts_no_rays(cls, backend: object) -> object:
-        if backend == "raycast":
-            raise ValueError("raycast draws no more: write raster, or leave this key out")
-        return backend
 
     @model_validator(mode="after")
     def _names_differ(self) -> SketchesConfig:
