@@ -1,92 +1,78 @@
-"""The command line: `python -m pipeline run|plan|status|verify|inspect|doctor|cluster|keys|clean`.
+"""The command line, `shapemill` or `python -m pipeline`: the engine's commands, and those of every `commands.py`.
 
-Exit codes: 0 all is well; 1 shards were set aside, or something that was checked is not as it should be; 2 nothing
-started, because of a mistake in the config or the command; 3 everything had to stop (disk full, no permission);
-130 stopped by Ctrl-C; 143 by SIGTERM, 129 by SIGHUP.
+Exit codes: 0 all is well; 1 shards failed, or something that was checked is not as it should be; 2 nothing started,
+because of a mistake in the config or the command; 3 everything had to stop (disk full, no permission); 130 stopped by
+Ctrl-C; 143 by SIGTERM, 129 by SIGHUP.
 """
 
 from __future__ import annotations
 
 import importlib
-import os
 import re
 import shutil
 import sys
-from collections.abc import Callable, Mapping
-from pathlib import Path
+from collections.abc import Iterator
+from importlib.util import find_spec
 from typing import Annotated
 
 import typer
 
-from pipeline.config import Config, load_config, nearest_word
+from pipeline.config import nearest_word
 from pipeline.errors import ConfigError, Fatal
-from pipeline.paths import DatasetPaths
-from pipeline.registry import find_stages
-from pipeline.stage import Stage
-from pipeline.stall_timeout import DEFAULT_STALL_MINUTES
-from pipeline.termination import exit_on_signals
-
-app = typer.Typer(
-    name="pipeline",
-    help="The mill of Shapemill.",
-    no_args_is_help=True,
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
+from pipeline.options import (
+    DATASETS,
+    DEFAULT_CONFIG,
+    DEFAULT_OUT,
+    DEFAULT_WORKERS,
+    SYSTEM,
+    ClusterOption,
+    ConfigOption,
+    OnlyOption,
+    OutOption,
+    SeedOption,
+    StallOption,
+    WorkersOption,
+    load_dataset,
+    run_stages,
 )
+from pipeline.registry import find_stages, folders_with, upstream
+from pipeline.stall_timeout import DEFAULT_STALL_MINUTES
 
-_PASS_ON = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
-
-DEFAULT_CONFIG = Path("configs/default.yaml")
-DEFAULT_OUT = Path("datasets")
-DEFAULT_WORKERS = os.cpu_count() or 1
-
-ConfigOption = Annotated[Path, typer.Option("--config", help="the dataset's YAML")]
-OutOption = Annotated[Path, typer.Option("--out", help="folder that datasets are made in")]
-WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="worker processes")]
-SeedOption = Annotated[int | None, typer.Option("--seed", min=0, help="instead of the config's seed")]
+DATASET_COMMANDS = typer.Typer()
+SYSTEM_COMMANDS = typer.Typer()
 
 
-@app.command()
+@DATASET_COMMANDS.command(rich_help_panel=DATASETS)
 def run(
     context: typer.Context,
-    stage: Annotated[str, typer.Argument(help="the stage to run")],
+    stage: Annotated[str, typer.Argument(help="one stage; without, the whole dataset", show_default=False)] = "",
     config: ConfigOption = DEFAULT_CONFIG,
     out: OutOption = DEFAULT_OUT,
     workers: WorkersOption = DEFAULT_WORKERS,
     seed: SeedOption = None,
-    shards: Annotated[str, typer.Option(help="make part i of n, from 1, as one job of a job array: i/n")] = "1/1",
-    retries: Annotated[int, typer.Option(min=0, help="how often a shard that failed is tried again")] = 2,
-    only: Annotated[str, typer.Option(help="make the shards called so, or so-..., and what they read")] = "",
-    patience: Annotated[
-        float, typer.Option(min=0, help="minutes without progress after which a shard has failed; 0: never")
-    ] = DEFAULT_STALL_MINUTES,
-    cluster: Annotated[str, typer.Option(help="scheduler of a cluster whose workers make the shards: tcp://...")] = "",
+    shards: Annotated[str, typer.Option(help="part i of n, from 1, as one job of a job array: i/n")] = "1/1",
+    retries: Annotated[int, typer.Option(min=0, help="how often a failed shard is tried again")] = 2,
+    only: OnlyOption = "",
+    stall_timeout: StallOption = DEFAULT_STALL_MINUTES,
+    cluster: ClusterOption = "",
 ) -> None:
-    """Make what is missing of one stage."""
-    from pipeline.run import run_stage
+    """Make a dataset, or one stage of it: whatever is missing or outdated."""
     from pipeline.slices import Slice
 
     part = Slice(*_slice(shards))
     stages = find_stages(context.obj)
-    if stage not in stages:
+    if stage and stage not in stages:
         close = nearest_word(stage, stages)
         hint = f"did you mean {close}?" if close else f"stages are {', '.join(stages)}"
         raise ConfigError(f"there is no stage {stage}; {hint}")
-    with exit_on_signals():
-        loaded, places = _load(stages, config, out, seed)
-        result = run_stage(
-            *(stage, stages, loaded, places, workers, part, retries), only=only, patience=patience, cluster=cluster
-        )
-    if result.failed:
-        print(
-            f"{stage}: set aside: {', '.join(result.failed)}; run again once what was said of them is mended",
-            file=sys.stderr,
-        )
-        raise typer.Exit(1)
+    _, loaded, paths = load_dataset(context, config, out, seed)
+    last = next(name for name in reversed(stages) if not stages[name].publishes_incomplete)
+    names = [stage] if stage else upstream(stages, last)
+    how = {"part": part, "retries": retries, "only": only, "stall_minutes": stall_timeout, "cluster": cluster}
+    run_stages(names, stages, loaded, paths, workers, **how)
 
 
-@app.command()
+@DATASET_COMMANDS.command(rich_help_panel=DATASETS)
 def plan(
     context: typer.Context,
     config: ConfigOption = DEFAULT_CONFIG,
@@ -94,16 +80,15 @@ def plan(
     workers: WorkersOption = DEFAULT_WORKERS,
     seed: SeedOption = None,
 ) -> None:
-    """Show what the whole dataset will take: shards, samples, disk and time, from a short trial where need be."""
+    """Estimate shards, samples, disk and time of a dataset before it starts; runs a short trial where needed."""
     from pipeline.estimate import plan_lines
 
-    stages = find_stages(context.obj)
-    loaded, places = _load(stages, config, out, seed)
-    for line in plan_lines(loaded, stages, places, workers):
+    stages, loaded, paths = load_dataset(context, config, out, seed)
+    for line in plan_lines(loaded, stages, paths, workers):
         print(line, flush=True)
 
 
-@app.command()
+@DATASET_COMMANDS.command(rich_help_panel=DATASETS)
 def status(
     context: typer.Context,
     config: ConfigOption = DEFAULT_CONFIG,
@@ -111,81 +96,48 @@ def status(
     workers: WorkersOption = DEFAULT_WORKERS,
     seed: SeedOption = None,
 ) -> None:
-    """Show for each stage what is done, failed, rejected and left, from the records."""
+    """Show what is done, failed, rejected and left, stage by stage."""
     from pipeline.status import status_lines
 
-    stages = find_stages(context.obj)
-    loaded, places = _load(stages, config, out, seed)
-    for line in status_lines(loaded, stages, places, workers):
+    stages, loaded, paths = load_dataset(context, config, out, seed)
+    for line in status_lines(loaded, stages, paths, workers):
         print(line)
 
 
-@app.command(context_settings=_PASS_ON)
-def verify(
-    context: typer.Context,
-    config: ConfigOption = DEFAULT_CONFIG,
-    out: OutOption = DEFAULT_OUT,
-    seed: SeedOption = None,
-    workers: WorkersOption = 1,
-) -> None:
-    """Check every byte against the records, then the finished dataset from its meshes."""
-    from pipeline.integrity import corrupted_shards
-
-    stages = find_stages(context.obj)
-    loaded, places = _load(stages, config, out, seed)
-    damages = list(corrupted_shards(loaded, stages, places))
-    for line in damages:
-        print(line)
-    arguments = ["--config", str(config), "--out", str(out), "--workers", str(workers), *context.args]
-    if seed is not None:
-        arguments += ["--seed", str(seed)]
-    code = _entry(context, "package.verify")(arguments)
-    raise typer.Exit(code or int(bool(damages)))
+@DATASET_COMMANDS.command(rich_help_panel=DATASETS)
+def clean(context: typer.Context, config: ConfigOption = DEFAULT_CONFIG, out: OutOption = DEFAULT_OUT) -> None:
+    """Delete a dataset's work folder, its records and shards; the finished dataset stays."""
+    _, _, paths = load_dataset(context, config, out)
+    if paths.work.is_dir():
+        shutil.rmtree(paths.work)
+    print(f"removed {paths.work}")
 
 
-@app.command(context_settings=_PASS_ON)
-def inspect(context: typer.Context) -> None:
-    """Show what Shapemill sees in some meshes and what it can make of them, and write a config for it."""
-    raise typer.Exit(_entry(context, "inspection.inspect")(context.args))
-
-
-@app.command()
+@SYSTEM_COMMANDS.command(rich_help_panel=SYSTEM)
 def doctor(out: OutOption = DEFAULT_OUT) -> None:
-    """Try everything that Shapemill needs on this machine, and say how to mend what fails."""
+    """Try everything that Shapemill needs on this machine, with the mend for what fails."""
     from pipeline.doctor import examine
 
     raise typer.Exit(examine(out))
 
 
-@app.command()
+@SYSTEM_COMMANDS.command(rich_help_panel=SYSTEM)
 def cluster(
     workers: WorkersOption = DEFAULT_WORKERS,
-    port: Annotated[
-        int, typer.Option(min=1, max=65535, help="where the scheduler listens, on this machine alone")
-    ] = 8786,
+    port: Annotated[int, typer.Option(min=1, max=65535, help="port of the scheduler, on this machine alone")] = 8786,
 ) -> None:
-    """Start a scheduler and workers of a cluster on this machine, for runs with --cluster; Ctrl-C ends them."""
+    """Start a scheduler and workers on this machine, for runs with --cluster; Ctrl-C ends them."""
     from pipeline.local_cluster import serve_cluster
 
     raise typer.Exit(serve_cluster(workers, port))
 
 
-@app.command()
-def keys(context: typer.Context) -> None:
+@SYSTEM_COMMANDS.command(rich_help_panel=SYSTEM)
+def config_docs(context: typer.Context) -> None:
     """Print the table of all config keys as Markdown."""
     from pipeline.config_docs import config_tables
 
     print(config_tables(find_stages(context.obj)), end="")
-
-
-@app.command()
-def clean(context: typer.Context, config: ConfigOption = DEFAULT_CONFIG, out: OutOption = DEFAULT_OUT) -> None:
-    """Remove the work folder of a dataset: records and shards, not the finished dataset."""
-    _, places = _load(find_stages(context.obj), config, out, None)
-    work = places.work
-    if work.is_dir():
-        shutil.rmtree(work)
-    print(f"removed {work}")
 
 
 def _slice(text: str) -> tuple[int, int]:
@@ -196,28 +148,37 @@ def _slice(text: str) -> tuple[int, int]:
     return index, count
 
 
-def _load(stages: Mapping[str, Stage], config: Path, out: Path, seed: int | None) -> tuple[Config, DatasetPaths]:
-    """The dataset's config, which every stage has checked, and its folders."""
-    overrides = {} if seed is None else {"seed": seed}
-    loaded = load_config(config, {name: stage.config for name, stage in stages.items()}, overrides)
-    for stage in stages.values():
-        stage.check(loaded)
-    return loaded, DatasetPaths(out, loaded.name)
+def command_line(*packages: str) -> typer.Typer:
+    """Return the whole command line: the engine's commands and those that the packages' folders hold."""
+    app = typer.Typer(
+        name="shapemill",
+        help="Make large, verified datasets of structured 3D shapes from a handful of examples.",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    for commands in (DATASET_COMMANDS, *_commands_of(packages), SYSTEM_COMMANDS):
+        app.add_typer(commands)
+    return app
 
 
-def _entry(context: typer.Context, module: str) -> Callable[[list[str]], int]:
-    # By name: the mill imports no stage, and finds this as it finds their STAGE.
-    entry: Callable[[list[str]], int] = importlib.import_module(f"{context.obj}.{module}").main
-    return entry
+def _commands_of(packages: tuple[str, ...]) -> Iterator[typer.Typer]:
+    """The commands of every `commands.py` in the packages and their folders; one with a name is a group."""
+    for package in packages:
+        modules = [f"{package}.{folder}.commands" for folder in folders_with(package, "commands.py")]
+        if find_spec(f"{package}.commands"):
+            modules.append(f"{package}.commands")
+        for module in modules:
+            yield importlib.import_module(module).COMMANDS
 
 
 def main(package: str = "stages") -> None:
     """Run the command line on the stages of a package, and exit with its code."""
     try:
-        app(obj=package)
+        command_line(package, *(["eval"] if package == "stages" else []))(obj=package, prog_name="shapemill")
     except ConfigError as error:
         print(error, file=sys.stderr)
         sys.exit(2)
     except Fatal as error:
-        print(f"stopped: {error}\nwhat is done is kept; run again to go on", file=sys.stderr)
+        print(f"stopped: {error}\nfinished shards are kept; run again to go on", file=sys.stderr)
         sys.exit(3)

@@ -53,7 +53,7 @@ def run_stage(
     retries: int = 2,
     waits: bool = False,
     only: str = "",
-    patience: float = DEFAULT_STALL_MINUTES,
+    stall_minutes: float = DEFAULT_STALL_MINUTES,
     cluster: str = "",
 ) -> RunResult:
     """Make all shards of stage `name` that have no matching record; the stages that these read must be finished.
@@ -62,7 +62,7 @@ def run_stage(
     `only`: make no more than the shards called so, or `<only>-<anything>`, and those of the stage that they read.
 
     A shard that raises is tried again `retries` times, then set aside; one that has killed its worker three times
-    is run once more with nothing beside it, then set aside. One that makes no progress for `patience` minutes has
+    is run once more with nothing beside it, then set aside. One that makes no progress for `stall_minutes` minutes has
     failed like one that raises, and its worker is ended; 0 waits for ever. The rest goes on. An input that is found
     damaged is made again first, of whatever stage it is. `waits`: another run that is at work here is waited for.
 
@@ -75,9 +75,9 @@ def run_stage(
     journal = EventLog(name, places.log)
     try:
         with locked(own, part, waits) as lock:
-            return _Run(name, stages, config, places, workers, part, retries, journal, only, patience, cluster).through(
-                lock
-            )
+            return _Run(
+                name, stages, config, places, workers, part, retries, journal, only, stall_minutes, cluster
+            ).through(lock)
     except OSError as error:
         if fatal_cause(error) is None:
             raise
@@ -98,7 +98,7 @@ class _Run:
         retries: int,
         journal: EventLog,
         only: str,
-        patience: float,
+        stall_minutes: float,
         cluster: str,
     ) -> None:
         self._name = name
@@ -116,7 +116,7 @@ class _Run:
         self._damaged: dict[str, str] = {}
         self._mended: set[str] = set()
         self._failures = Failures(places.stage(name), journal, retries, self._result.failed)
-        self._patience = StallWatch(patience, places.stage(name))
+        self._stall_watch = StallWatch(stall_minutes, places.stage(name))
         self._shown = 0.0
 
     def through(self, lock: BinaryIO) -> RunResult:
@@ -263,7 +263,7 @@ class _Run:
                     *(each, self._stages, self._survey.config, self._places, self._workers),
                     retries=self._retries,
                     waits=True,
-                    patience=self._patience.seconds / 60,
+                    stall_minutes=self._stall_watch.seconds / 60,
                     cluster=self._cluster,
                 )
                 self._survey.reread()
@@ -278,9 +278,9 @@ class _Run:
             if alone and not workers.jobs:
                 workers.submit(alone.popleft())
             for job, report in workers.finished(_LOOK_EVERY):
-                self._patience.begin_anew(job.shard.name)
+                self._stall_watch.begin_anew(job.shard.name)
                 self._take_in(job, report, ready)
-            for job in self._patience.lost_with(workers.jobs):
+            for job in self._stall_watch.lost_with(workers.jobs):
                 self._give_up(job, workers, ready)
             if time.monotonic() - self._shown >= _LOOK_EVERY:
                 self._shown = time.monotonic()
@@ -302,8 +302,8 @@ class _Run:
     def _give_up(self, job: Job, workers: Workers | ClusterWorkers, ready: deque[Job]) -> None:
         """End a shard that shows no sign of work, with its worker."""
         workers.end(job)
-        self._patience.begin_anew(job.shard.name)
-        message = f"it made no progress for {duration_text(self._patience.seconds)}, and its worker was ended"
+        self._stall_watch.begin_anew(job.shard.name)
+        message = f"it made no progress for {duration_text(self._stall_watch.seconds)}, and its worker was ended"
         self._journal.say(f"shard {job.shard.name}: {message}")
         self._failures.failure(job, Report(job.shard.name, "failed", message), ready)
 

@@ -10,9 +10,12 @@ import os
 import time
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pipeline.paths import StagePaths
-from pipeline.task import Job
+
+if TYPE_CHECKING:
+    from pipeline.task import Job
 
 DEFAULT_STALL_MINUTES = 60.0
 """Minutes. A shard is minutes of work at most; on a machine that is too busy, some that tell nothing take many."""

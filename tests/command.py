@@ -1,4 +1,4 @@
-"""`python -m pipeline` in this process: its workers are real, and Python starts once, not once for each stage."""
+"""`shapemill` in this process: its workers are real, and Python starts once, not once for each stage."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pipeline.cli import main
 
 
 def shapemill(*arguments: object) -> tuple[int, str]:
-    """The exit code of `python -m pipeline` with these arguments, and all that it printed."""
+    """Return the exit code of `shapemill` with these arguments, and all that it printed."""
     printed, before, code = io.StringIO(), sys.argv, 0
-    sys.argv = ["pipeline", *map(str, arguments)]
+    sys.argv = ["shapemill", *map(str, arguments)]
     try:
         with redirect_stdout(printed), redirect_stderr(printed):
             main()

@@ -33,23 +33,15 @@ pytestmark = pytest.mark.slow
 
 WHOLE_WAY = """
 import sys
-from pathlib import Path
-from pipeline.config import load_config
-from pipeline.paths import Places
+from pipeline.cli import command_line
 from pipeline.registry import find_stages
-from pipeline.run import run_stage
-from stages.verification.verify import main
 
-config, out = Path(sys.argv[1]), Path(sys.argv[2])
-stages = find_stages()
-loaded = load_config(config, {name: stage.config for name, stage in stages.items()})
-for stage in stages.values():
-    stage.check(loaded)
-for name in stages:
-    result = run_stage(name, stages, loaded, Places(out, loaded.name), workers=1)
-    assert not result.failed, result.failed
-print("stages:", *stages)
-sys.exit(main([str(out / loaded.name), "--samples", "6"]))
+config, out = sys.argv[1:]
+print("stages:", *find_stages())
+for arguments in (["run", "--workers", "1"], ["verify", "--samples", "6"]):
+    options = ["--config", config, "--out", out]
+    code = command_line("stages")([*arguments, *options], obj="stages", standalone_mode=False)
+    assert not code, code
 """
 
 
@@ -59,7 +51,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("heaps")
     config = folder / "heaps.yaml"
     config.write_text(yaml.safe_dump(CONFIG))
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "tests" / "house")}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "tests" / "example_project")}
     command = [sys.executable, "-c", WHOLE_WAY, str(config), str(folder / "out")]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -100,7 +92,7 @@ def test_what_they_say_of_themselves_stands_in_card_croissant_index_and_manifest
 
 
 def test_a_table_of_theirs_is_found_and_stands_in_the_report(made: tuple[Path, str]) -> None:
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "tests" / "house")}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "tests" / "example_project")}
     command = [
         sys.executable,
         "-m",

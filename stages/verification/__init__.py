@@ -1,1 +1,1 @@
-"""TODO: what this folder holds."""
+"""Verification of a finished dataset: files, every sample, and some samples by independent means."""

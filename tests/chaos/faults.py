@@ -156,7 +156,7 @@ def second_run(arena: Sandbox, run: Run, _: np.random.Generator) -> InjectedFaul
 
 BLOWS: dict[str, Fault] = {
     "kill a worker": Fault(kill_worker, frozenset({0}), needs_worker=True),
-    "stop a worker": Fault(stop_worker, frozenset({0}), ("--patience", STALL_MINUTES), needs_worker=True),
+    "stop a worker": Fault(stop_worker, frozenset({0}), ("--stall-timeout", STALL_MINUTES), needs_worker=True),
     "end the driver": Fault(end_driver, frozenset({0, -9, -2, -15, 130, 143})),
     "fill the disk": Fault(fill_disk, frozenset({0, 2, 3}), needs_disk=True),
     "take rights": Fault(take_rights, frozenset({0, 3}), prepare=_obey_permissions),

@@ -94,7 +94,7 @@ def test_shard_ends_with_the_run_that_wanted_it_and_the_cluster_stays(
         run.kill()
     assert makers
     wait_until(lambda: not set(makers) <= set(cluster.pids("LokyProcess")), seconds=30)
-    result = run_toy_stages(config, out, "flour", cluster=cluster.address, patience=0.1, retries=0)["flour"]
+    result = run_toy_stages(config, out, "flour", cluster=cluster.address, stall_minutes=0.1, retries=0)["flour"]
     assert result.failed == {"harvest0-0": "it made no progress for 6s, and its worker was ended"}
     assert not run_toy_stages(write_config(grain=small), out, "flour", cluster=cluster.address)["flour"].failed
 

@@ -17,7 +17,7 @@ VARIABLES = (
     "OUT",
     "WORKERS",
     "SEED",
-    "PATIENCE",
+    "STALL_TIMEOUT",
     "CLUSTER",
     "MESH",
     "PROGRAM",
@@ -60,43 +60,31 @@ def nasty(folder: Path) -> str:
     )
 
 
-def test_dataset_runs_each_stage_once_after_what_it_reads() -> None:
-    runs = calls("dataset", "CONFIG=c.yaml", "OUT=/data", "WORKERS=3", "SEED=7")
-    assert [run[3] for run in runs] == [
-        "autoconfig", "exemplars", "variations", "proportions", "programs", "grammars", "program_sampling",
-"shapeassembly",
-        "string_sampling",
-        "validity", "abstraction", "strings", "points", "sketches", "package",
-    ]  # fmt: skip
-    asked = ["--config", "c.yaml", "--out", "/data", "--seed", "7", "--workers", "3"]
-    assert all(run == ["-m", "pipeline", "run", run[3], *asked] for run in runs)
+OPTIONS = ["--config", "c.yaml", "--out", "/data", "--seed", "7", "--workers", "3"]
 
 
-def test_train_runs_what_its_samples_come_from_then_the_model_that_was_asked_for() -> None:
-    first, *runs = calls("train", "MODEL=masked-castle", "CONFIG=c.yaml")
-    assert first == ["-m", "stages.training", "--config", "c.yaml", "--only", "masked-castle"]
+def test_dataset_is_one_call_and_each_stage_runs_after_its_inputs() -> None:
+    given = ("CONFIG=c.yaml", "OUT=/data", "WORKERS=3", "SEED=7")
+    assert calls("dataset", *given) == [["-m", "pipeline", "run", *OPTIONS]]
+    runs = calls("package", *given)
     assert [run[3] for run in runs] == [
         "autoconfig", "exemplars", "variations", "proportions", "programs", "grammars", "program_sampling",
-"shapeassembly",
-        "string_sampling",
-        "strings", "training",
+        "shapeassembly", "string_sampling", "validity", "abstraction", "strings", "points", "sketches", "package",
     ]  # fmt: skip
-    assert all(run[4:6] == ["--config", "c.yaml"] for run in runs)
-    assert runs[-1][-2:] == ["--only", "masked-castle"]
+    assert all(run == ["-m", "pipeline", "run", run[3], *OPTIONS] for run in runs)
+
+
+def test_train_names_the_model_that_was_asked_for() -> None:
+    assert calls("train", "MODEL=masked-castle", "CONFIG=c.yaml", "OUT=/data", "WORKERS=3", "SEED=7") == [
+        ["-m", "pipeline", "train", *OPTIONS, "--only", "masked-castle"]
+    ]
     assert not any("--only" in run for run in calls("train"))
-
-
-def test_train_makes_no_samples_for_models_that_make_their_own_shapes() -> None:
-    say_no = f"{SAY_ARGUMENTS}; sys.exit('stages.training' in sys.argv)"
-    done = make(f"PYTHON={shlex.join([sys.executable, '-c', say_no])}", "train")
-    assert done.returncode == 0, done.stderr
-    assert [json.loads(line)[1] for line in done.stdout.splitlines()] == ["stages.training", "pipeline"]
 
 
 def test_recover_looks_at_the_input_that_was_given() -> None:
     (run,) = calls("recover", "PROGRAM=chair", "INPUT=-odd name.ply", "OUT=/data")
-    assert run[1:] == [
-        "stages.recovery", "--out", "/data", "--program", "chair", "--up", "", "--", "-odd name.ply",
+    assert run[2:] == [
+        "recover", "--out", "/data", "--program", "chair", "--up", "", "--", "-odd name.ply",
     ]  # fmt: skip
     assert make("recover").returncode != 0
 
@@ -114,19 +102,19 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     assert all(len(row) > 2 for row in rows.values()), "each is explained"
     values = {name: rows[name][1] for name in VARIABLES}
     assert values == {
-        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "PATIENCE": "-", "CLUSTER": "-",
-        "MESH": "-", "PROGRAM": "-", "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-",
+        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "STALL_TIMEOUT": "-",
+        "CLUSTER": "-", "MESH": "-", "PROGRAM": "-", "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-",
         "SAMPLES": "100", "ROUNDS": "20",
     }  # fmt: skip
 
 
 def test_every_target_gets_every_value_as_it_was_said(tmp_path: Path) -> None:
     said = nasty(tmp_path)
-    targets = ("dataset", "plan", "status", "verify", "inspect", "eval", "doctor", "clean")
+    targets = ("package", "plan", "status", "verify", "inspect", "eval", "doctor", "clean")
     arguments = [f"{name}={said}" for name in VARIABLES]
     reached = calls(*targets, *arguments)
-    assert len(reached) == 15 + len(targets[1:]) + 1, "15 stages of dataset; inspect looks at a program and a model"
-    assert all(any(said in each for each in call) for call in reached)
+    assert len(reached) == 15 + len(targets[1:]) + 1, "15 stages; inspect looks at a program and a model"
+    assert all(any(said in argument for argument in call) for call in reached)
     assert sum(call.count(said) for call in reached if call[2] == "run") == 15 * 6
     assert make("help", *arguments).stdout.count(said) == len(VARIABLES)
     assert not list(tmp_path.iterdir())

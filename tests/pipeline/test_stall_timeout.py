@@ -40,7 +40,9 @@ def test_shard_without_progress_is_ended_tried_again_and_set_aside_and_the_rest_
         grain={"fields": 2, "wanted": 1}, flour={"trouble": {"harvest0-0": "stops once", "harvest0-1": "sleeps"}}
     )
     before = descendants(os.getpid())
-    results = run_toy_stages(config, tmp_path / "out", "salt", "grain", "flour", workers=2, patience=0.12, retries=1)
+    results = run_toy_stages(
+        config, tmp_path / "out", "salt", "grain", "flour", workers=2, stall_minutes=0.12, retries=1
+    )
     message = "it made no progress for 7s, and its worker was ended"
     assert results["flour"].failed == {"harvest0-1": message}
     assert results["flour"].made == 1
@@ -55,34 +57,34 @@ def test_shard_without_progress_is_ended_tried_again_and_set_aside_and_the_rest_
 
 def test_what_counts_as_progress_is_that_something_changes(bag: Job) -> None:
     places = bag.paths.stage("salt")
-    patience, start, growing = StallWatch(0.025, places), time.monotonic(), places.root / ".bag-0.txt.tmp"
+    watch, start, growing = StallWatch(0.025, places), time.monotonic(), places.root / ".bag-0.txt.tmp"
     (places.progress / "bag-0").write_text("1 4")
     while time.monotonic() - start < 4:
         growing.write_bytes(b"a" * int(10 * (time.monotonic() - start)))
-        assert not patience.lost_with([bag])
+        assert not watch.lost_with([bag])
         time.sleep(0.1)
-    while not patience.lost_with([bag]):
+    while not watch.lost_with([bag]):
         (places.progress / "bag-0").write_text("1 4")
         assert time.monotonic() - start < 20, "the same words again are no progress"
         time.sleep(0.1)
-    patience.begin_anew("bag-0")
+    watch.begin_anew("bag-0")
     start = time.monotonic()
-    while not patience.lost_with([bag]):
+    while not watch.lost_with([bag]):
         time.sleep(0.1)
     assert time.monotonic() - start >= 1.4, "a shard that is tried again has all its time again"
 
 
-def test_patience_of_0_has_no_end(bag: Job) -> None:
-    patience = StallWatch(0, bag.paths.stage("salt"))
+def test_timeout_of_0_never_ends_a_shard(bag: Job) -> None:
+    watch = StallWatch(0, bag.paths.stage("salt"))
     time.sleep(0.6)
-    assert not patience.lost_with([bag])
+    assert not watch.lost_with([bag])
 
 
 def test_time_in_which_the_mill_was_stopped_is_not_counted(bag: Job) -> None:
-    patience = StallWatch(0.05, bag.paths.stage("salt"))
-    patience.lost_with([bag])
+    watch = StallWatch(0.05, bag.paths.stage("salt"))
+    watch.lost_with([bag])
     time.sleep(4)
-    assert not patience.lost_with([bag])
+    assert not watch.lost_with([bag])
 
 
 def test_idle_worker_that_was_stopped_does_not_hold_the_end(bag: Job, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stages.verification.verify import main, verify_dataset
+from stages.verification.verify import verify_dataset
+from tests.command import shapemill
 from tests.stages.verification.forge import FOLDER_FORGERIES, FORGERIES, copy_dataset, forge
 
 SHARD = "data/val/toy-1_2_0-val-000002.tar"
@@ -19,6 +20,13 @@ SHARD = "data/val/toy-1_2_0-val-000002.tar"
 def folder(toy_folder: Path, tmp_path: Path) -> Path:
     """A copy of the toy dataset, its index and its kits, to be damaged."""
     return copy_dataset(toy_folder, tmp_path, with_work=False)
+
+
+def verified(*arguments: object) -> int:
+    """The exit code of `shapemill verify`, whose output is printed."""
+    code, printed = shapemill("verify", *arguments)
+    print(printed)
+    return code
 
 
 def flip(path: Path, place: int) -> None:
@@ -38,7 +46,7 @@ def rewrite(folder: Path, file: str, change: Callable[[str], str]) -> None:
 
 
 def test_a_finished_dataset_is_good(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([str(folder), "--samples", "0"]) == 0
+    assert verified(folder, "--samples", "0") == 0
     printed = capsys.readouterr().out
     assert "23 looked at   good" in printed
     assert "faults" not in printed
@@ -50,20 +58,20 @@ def test_a_corrupted_byte_is_found_and_its_file_named(
     folder: Path, capsys: pytest.CaptureFixture[str], file: str, place: int
 ) -> None:
     flip(folder / file, place)
-    assert main([str(folder), "--samples", "0"]) == 1
+    assert verified(folder, "--samples", "0") == 1
     assert f"checksums: {file}: is corrupted" in capsys.readouterr().out
 
 
 def test_a_missing_shard_is_found_and_named(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / SHARD).unlink()
-    assert main([str(folder), "--samples", "0"]) == 1
+    assert verified(folder, "--samples", "0") == 1
     assert f"missing files: {SHARD}: is missing" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("file", ["data/val/extra.tar", "notes.txt", "../toy-index/old.parquet"])
 def test_a_foreign_file_is_found_and_named(folder: Path, capsys: pytest.CaptureFixture[str], file: str) -> None:
     (folder / file).write_bytes(b"mine")
-    assert main([str(folder), "--samples", "0"]) == 1
+    assert verified(folder, "--samples", "0") == 1
     assert f"foreign files: {file}: does not belong" in capsys.readouterr().out
 
 
@@ -113,14 +121,14 @@ def test_samples_that_break_the_rules_are_found(folder: Path) -> None:
 def test_a_folder_without_a_dataset_is_refused_with_the_mend(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main([str(tmp_path)]) == 1
+    assert verified(tmp_path) == 1
     assert "make dataset" in capsys.readouterr().out
 
 
-def test_geometry_of_random_samples_is_computed_anew_from_their_meshes(
+def test_geometry_of_random_samples_is_computed_again_from_their_meshes(
     toy_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main([str(toy_folder), "--samples", "10"]) == 0
+    assert verified(toy_folder, "--samples", "10") == 0
     assert "geometry              10 looked at   good" in capsys.readouterr().out
 
 
@@ -148,9 +156,11 @@ def test_the_dataset_can_be_named_by_its_config(
     toy_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = tmp_path / "toy.yaml"
-    config.write_text("name: toy\n")
-    assert main(["--config", str(config), "--out", str(toy_folder.parent), "--samples", "0"]) == 0
-    assert "faults" not in capsys.readouterr().out
+    config.write_text("name: toy\nprograms: {program: chair}\n")
+    verified("--config", config, "--out", toy_folder.parent, "--samples", "0")
+    printed = capsys.readouterr().out
+    assert "looked at   good" in printed
+    assert "faults" not in printed
 
 
 BY_STATICS_OR_DRAWING = {"a mirrored sketch", "the sketch of another sample", "a blank sketch", "a truncated sketch"}
@@ -186,7 +196,7 @@ def test_a_dataset_without_its_kits_says_what_it_could_not_look_at(
 ) -> None:
     for name in ("toy", "toy-index"):
         shutil.copytree(toy_folder.parent / name, tmp_path / name)
-    assert main([str(tmp_path / "toy")]) == 0
+    assert verified(tmp_path / "toy") == 0
     assert "not looked at: 12 samples: kit blocks is not beside the dataset" in capsys.readouterr().out
 
 

@@ -1,0 +1,89 @@
+"""What commands share: options, panels of `shapemill --help`, and the dataset that `--config` and `--out` name.
+
+A room adds commands by a file `commands.py` that holds `COMMANDS = typer.Typer()`: each `@COMMANDS.command()` becomes
+a command of `shapemill`, and a Typer with a name a group of commands. It imports what is heavy inside its functions.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from pipeline.config import Config, load_config
+from pipeline.paths import DatasetPaths
+from pipeline.registry import find_stages
+from pipeline.stage import Stage
+
+DATASETS = "Make a dataset"
+INSPECTION = "Look at a dataset, a mesh or a program"
+MODELS = "Train models and use them"
+EVALUATION = "Measure"
+SYSTEM = "Machine and project"
+
+DEFAULT_CONFIG = Path("configs/default.yaml")
+DEFAULT_OUT = Path("datasets")
+DEFAULT_WORKERS = os.cpu_count() or 1
+
+ConfigOption = Annotated[Path, typer.Option("--config", help="config of the dataset, a YAML file")]
+OutOption = Annotated[Path, typer.Option("--out", help="folder that datasets are written to")]
+WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="number of worker processes")]
+SeedOption = Annotated[int | None, typer.Option("--seed", min=0, help="seed in place of the config's")]
+OnlyOption = Annotated[str, typer.Option("--only", help="only the shards named so or so-..., and those they read")]
+StallOption = Annotated[
+    float, typer.Option("--stall-timeout", min=0, help="minutes without progress after which a shard fails; 0: never")
+]
+ClusterOption = Annotated[str, typer.Option("--cluster", help="scheduler whose workers make the shards: tcp://...")]
+
+PASS_ON = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
+"""Settings of a command that reads its arguments itself."""
+
+
+def load_dataset(
+    context: typer.Context, config: Path, out: Path, seed: int | None = None
+) -> tuple[dict[str, Stage], Config, DatasetPaths]:
+    """Return the stages, the dataset's config, checked by every stage, and its folders. Raises ConfigError."""
+    stages = find_stages(context.obj)
+    overrides = {} if seed is None else {"seed": seed}
+    loaded = load_config(config, {name: stage.config for name, stage in stages.items()}, overrides)
+    for stage in stages.values():
+        stage.check(loaded)
+    return stages, loaded, DatasetPaths(out, loaded.name)
+
+
+def forward(commands: typer.Typer, name: str, panel: str, text: str, main: Callable[[list[str]], int]) -> None:
+    """Add a command that hands all its arguments to `main` and exits with its code."""
+
+    def command(context: typer.Context) -> None:
+        raise typer.Exit(main(context.args))
+
+    commands.command(name, help=text, rich_help_panel=panel, context_settings=PASS_ON)(command)
+
+
+def run_stages(
+    names: Iterable[str], stages: Mapping[str, Stage], config: Config, paths: DatasetPaths, workers: int, **how: Any
+) -> None:
+    """Run stages in order, with `how` for `run_stage`; exit with 1 after the first in which a shard failed."""
+    from pipeline.run import run_stage
+    from pipeline.termination import exit_on_signals
+
+    with exit_on_signals():
+        for name in names:
+            result = run_stage(name, stages, config, paths, workers, **how)
+            if result.failed:
+                print(f"{name}: failed: {', '.join(result.failed)}; mend the cause, then run again", file=sys.stderr)
+                raise typer.Exit(1)
+
+
+def print_corrupted(stages: Mapping[str, Stage], config: Config, paths: DatasetPaths) -> bool:
+    """Print a line for each finished file that is not what its record says; return whether there is one."""
+    from pipeline.integrity import corrupted_shards
+
+    lines = list(corrupted_shards(config, stages, paths))
+    for line in lines:
+        print(line)
+    return bool(lines)
