@@ -12,9 +12,9 @@ from torch import Tensor, nn
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from eval.engine.table import Cell
-from stages.recovery.recover import PRETRAINED_FOLDER, find_models
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import frame_of, subsample
+from stages.training.recovery.trained import PRETRAINED_FOLDER, find_models
 
 FEATURES = ("chair", "points")
 """The frozen network whose features are compared is the encoder of the recovery model of this program and input that

@@ -17,14 +17,15 @@ from pipeline.errors import ConfigError
 from stages.programs.movement import MIN_CLASS_MOVEMENT, surface_movements
 from stages.programs.program import Program
 from stages.programs.schema import Values
-from stages.recovery.reading import RecoveryInput
-from stages.recovery.recover import PRETRAINED_FOLDER, RecoveryModels, RecoveryResult, find_models, recover_input
+from stages.recovery.inputs import RecoveryInput
+from stages.recovery.recover import recover_input
+from stages.recovery.result import RecoveryResult
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.drawings import draw_fitted
 from stages.training.recovery.shapes import TEST_INTERVAL, TRAIN_INTERVAL, RandomShape, random_shapes
 from stages.training.recovery.surface import sample_points, shape_points, squared_chamfer_distance
-from stages.training.recovery.trained import TrainedRecovery
+from stages.training.recovery.trained import PRETRAINED_FOLDER, RecoveryModels, TrainedRecovery, find_models
 
 MEASURED = 10_000
 """Points that Chamfer distances are measured with."""
@@ -225,8 +226,8 @@ def baselines_table(found: Sequence[Found], steps: Mapping[str, int]) -> Table:
     notes = (
         f"First guesses, without search, of {len(found[0].distances)} held-out shapes, the same for all models. "
         "chamfer, exact, near: as in the table of recovery. p: of a paired t-test against the first row. classes: a "
-        "class for each value; values: continuous parameters are regressed; apart: and by a network of their own "
-        "(Huang et al. 2017); unmarked: nothing is learnt of what is hidden, there is no existence label.",
+        "class for each value; regression: continuous parameters are regressed; two-encoders: by a network of their "
+        "own (Huang et al. 2017); no-hidden-class: there is no class for hidden parameters (no existence label).",
     )
     published = [each for each in PUBLISHED if "Table 3" in each.source]
     columns = ("model", "steps", "chamfer", "median", "exact %", "near %", "p")

@@ -11,14 +11,16 @@ import numpy as np
 from eval.engine.table import Cell, Table
 from eval.recovery.accuracy import MEASURED, Found, published_chamfer
 from pipeline.errors import ConfigError
-from stages.recovery.reading import InputError, RecoveryInput, read_inputs
-from stages.recovery.recover import RecoveryModels, RecoveryResult, recover_input
+from stages.recovery.inputs import InputError, RecoveryInput
+from stages.recovery.reading import read_inputs
+from stages.recovery.recover import recover_input
+from stages.recovery.result import RecoveryResult
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.training.recovery.clouds import frame_of, subsample
 from stages.training.recovery.drawings import draw_fitted
 from stages.training.recovery.shapes import RandomShape
 from stages.training.recovery.surface import sample_points
-from stages.training.recovery.trained import TrainedRecovery
+from stages.training.recovery.trained import RecoveryModels, TrainedRecovery
 
 WAYS = ("network", "network, refined")
 

@@ -26,7 +26,7 @@ def _parts(subject: DatasetRun, asked: Namespace) -> Iterator[TableSection]:
     """One for each program and kind of input."""
     from eval.recovery.accuracy import usable_models
     from stages.programs.program import program_module
-    from stages.recovery.recover import PRETRAINED_FOLDER
+    from stages.training.recovery.trained import PRETRAINED_FOLDER
 
     reads = [*weights_of_kind(subject.models, "recovery"), *weights_of_kind(PRETRAINED_FOLDER, "recovery")]
     for (program, kind), model in sorted(usable_models(subject.models, asked.programs).items()):

@@ -15,8 +15,8 @@ from eval.engine.results_cache import TableSection, cached_sections
 from stages.training.checkpoint import weights_of_kind
 
 if TYPE_CHECKING:
-    from stages.recovery.reading import RecoveryInput
-    from stages.recovery.recover import RecoveryResult
+    from stages.recovery.inputs import RecoveryInput
+    from stages.recovery.result import RecoveryResult
     from stages.training.recovery.trained import TrainedRecovery
 
 SHOWN = 8
@@ -28,7 +28,7 @@ def _parts(subject: DatasetRun, asked: Namespace) -> Iterator[TableSection]:
     from eval.recovery.accuracy import usable_models
     from eval.recovery.robustness import foreign_inputs, ways_to_spoil
     from stages.programs.program import program_module
-    from stages.recovery.recover import PRETRAINED_FOLDER
+    from stages.training.recovery.trained import PRETRAINED_FOLDER
 
     weights = [*weights_of_kind(subject.models, "recovery"), *weights_of_kind(PRETRAINED_FOLDER, "recovery")]
     models, seed = usable_models(subject.models, asked.programs), subject.config.seed

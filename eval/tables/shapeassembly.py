@@ -33,7 +33,7 @@ def _parts(subject: DatasetRun, asked: Namespace) -> Iterator[TableSection]:
     """One for each model, and one for the shapes of val of each category; what a category's share is read once."""
     from eval.programs.models import program_models, program_shards
     from eval.programs.reference import read_reference
-    from stages.recovery.recover import PRETRAINED_FOLDER
+    from stages.training.recovery.trained import PRETRAINED_FOLDER
 
     reads = [*program_shards(subject, "train"), *program_shards(subject, "val")]
     reads += weights_of_kind(PRETRAINED_FOLDER, "recovery")  # one of them is the network whose features are compared

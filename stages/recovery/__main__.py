@@ -12,30 +12,33 @@ from pathlib import Path
 from pipeline.errors import ConfigError
 from stages.programs.program import find_program
 from stages.recovery.files import write_recovery
-from stages.recovery.reading import InputError, read_inputs
-from stages.recovery.recover import PRETRAINED_FOLDER, find_models, recover_input
+from stages.recovery.inputs import InputError
+from stages.recovery.reading import read_inputs
+from stages.recovery.recover import DEFAULT_BUDGET_SHAPES, recover_input
+from stages.training.recovery.trained import PRETRAINED_FOLDER, find_models
 
 
 def main(arguments: list[str]) -> int:
-    """Recover all inputs. Returns the exit code: 0, 1 where some were none, 2 for a mistake in what was asked."""
-    asked = _parser().parse_args(arguments)
+    """Recover all inputs. Returns the exit code: 0, 1 where inputs were refused, 2 for a mistake in the command."""
+    options = _parser().parse_args(arguments)
     refused = 0
     try:
-        if asked.program:
-            find_program(asked.program)
-        models, wrong = find_models(asked.out, PRETRAINED_FOLDER)
-        for text in wrong:
-            print(f"left out: {text}", file=sys.stderr)
-        for given in read_inputs(asked.input):
-            if isinstance(given, InputError):
-                print(given, file=sys.stderr)
+        if options.program:
+            find_program(options.program)
+        models, problems = find_models(options.out, PRETRAINED_FOLDER)
+        for problem in problems:
+            print(f"left out: {problem}", file=sys.stderr)
+        for source in read_inputs(options.input):
+            if isinstance(source, InputError):
+                print(source, file=sys.stderr)
                 refused += 1
                 continue
-            found = recover_input(given, asked.program, models, asked.up, asked.budget, asked.seed)
-            print(f"{given.name}: {found.program.name}, distance {found.distance:.2g}, base {found.base_distance:.2g}")
-            for warning in found.warnings:
-                print(f"{given.name}: {warning}", file=sys.stderr)
-            for path in write_recovery(asked.out / "recovered", given, found):
+            result = recover_input(source, options.program, models, options.up, options.budget, options.seed)
+            distances = f"distance {result.distance:.2g}, base {result.base_distance:.2g}"
+            print(f"{source.name}: {result.program.name}, {distances}")
+            for warning in result.warnings:
+                print(f"{source.name}: {warning}", file=sys.stderr)
+            for path in write_recovery(options.out / "recovered", source, result):
                 print(f"  {path}")
     except (ConfigError, InputError) as error:
         print(error, file=sys.stderr)
@@ -46,11 +49,11 @@ def main(arguments: list[str]) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="stages.recovery", description=__doc__)
     parser.add_argument("input", type=Path, metavar="INPUT")
-    parser.add_argument("--program", default="", help="name of the program; the likeliest unless you say")
+    parser.add_argument("--program", default="", help="name of the program; the likeliest by default")
     parser.add_argument("--up", default="", choices=["", "x", "y", "z"], help="the axis of clouds that points up")
     parser.add_argument("--out", type=Path, default=Path("datasets"), help="where models are, and results go")
-    parser.add_argument("--budget", type=_count, default=600, help="shapes that are made for an input at most")
-    parser.add_argument("--seed", type=_seed, default=0, help="where chance starts")
+    parser.add_argument("--budget", type=_count, default=DEFAULT_BUDGET_SHAPES, help="most shapes built for an input")
+    parser.add_argument("--seed", type=_seed, default=0, help="seed of the search")
     return parser
 
 

@@ -1,5 +1,4 @@
-"""Points of a scan that lie beside the shape: a few of them make the box around it larger, by which everything else is
-measured."""
+"""Outliers of a scan: a few of them enlarge its bounding box, which everything else is measured by."""
 
 from __future__ import annotations
 
@@ -7,43 +6,45 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
 
-NEIGHBORS = 4
-LONELY = 2.0
-"""A point stands alone whose neighbors are so many times farther than theirs are from them,"""
-LOST = 4.0
-"""or than those of a point in the middle of all; a cloud that was scanned from one side is three times as sparse at
-its far end."""
-ROUNDS = 4
-"""So often what is left is looked at again: strays are each other's neighbors."""
-FEWEST = 0.01
-"""Of a clean cloud, a smaller share stands alone by chance: it is left as it is."""
+OUTLIER_NEIGHBORS = 4
+MAX_REACH_OVER_NEIGHBORS = 2.0
+"""Distance to the fourth neighbour, relative to the median of the neighbours' own."""
+MAX_REACH_OVER_MEDIAN = 4.0
+"""The same, relative to the median of all points; a one-sided scan is three times as sparse at its far end."""
+OUTLIER_ROUNDS = 4
+"""Outliers are each other's neighbours, so what is left is tested again."""
+MIN_OUTLIER_SHARE = 0.01
+"""A smaller share of a clean cloud passes for outliers by chance."""
 
 
 def find_outliers(points: FloatArray) -> BoolArray:
-    """Which points (n, 3) of a cloud are outliers: by the distance to the fourth neighbor, beside that of the neighbors
-    (after the local outlier factor, Breunig et al. 2000) and beside the median of all. None where fewer than one in a
-    hundred are."""
-    # not `point_neighbourhoods`: it holds all points against the median of all, which costs nothing
-    # beside the planes of a million points and finds 98 % of a wall's strays, but of those of chairs, vases, tables and
-    # lamps 56 to 75 % where this finds 92 to 95; this would take a fifth more of the time of such a scan
-    places, where = np.unique(points, axis=0, return_inverse=True)
-    kept = np.ones(len(places), np.bool_)
-    for _ in range(ROUNDS):
+    """Mark the outliers of a cloud (n, 3), bool (n,); none where fewer than one point in a hundred is one.
+
+    The distance to the fourth neighbour is compared with the neighbours' (after the local outlier factor, Breunig et
+    al. 2000) and with the median of all points.
+    """
+    # `stages.symmetry` compares with the median alone, which costs nothing next to the planes of a million points. It
+    # finds 98 % of a wall's outliers, but 56 to 75 % of those of chairs, vases, tables and lamps. This finds 92 to 95 %
+    # of these and would take a fifth more of the time of such a scan.
+    positions, inverse = np.unique(points, axis=0, return_inverse=True)
+    kept = np.ones(len(positions), np.bool_)
+    for _ in range(OUTLIER_ROUNDS):
         left = np.flatnonzero(kept)
-        alone = _alone(places[left])
-        if not alone.any():
+        isolated = _isolated(positions[left])
+        if not isolated.any():
             break
-        kept[left[alone]] = False
-    strays: BoolArray = ~kept[where.reshape(-1)]
-    return strays if strays.mean() >= FEWEST else np.zeros(len(points), np.bool_)
+        kept[left[isolated]] = False
+    outliers: BoolArray = ~kept[inverse.reshape(-1)]
+    return outliers if outliers.mean() >= MIN_OUTLIER_SHARE else np.zeros(len(points), np.bool_)
 
 
-def _alone(points: FloatArray) -> BoolArray:
+def _isolated(points: FloatArray) -> BoolArray:
     from scipy.spatial import cKDTree
 
-    if len(points) <= NEIGHBORS:
+    if len(points) <= OUTLIER_NEIGHBORS:
         return np.zeros(len(points), np.bool_)
-    distances, neighbors = cKDTree(points).query(points, NEIGHBORS + 1)
+    distances, neighbors = cKDTree(points).query(points, OUTLIER_NEIGHBORS + 1)
     reach = distances[:, -1]
-    alone: BoolArray = (reach > LONELY * np.median(reach[neighbors[:, 1:]], axis=1)) | (reach > LOST * np.median(reach))
-    return alone
+    over_neighbors = reach > MAX_REACH_OVER_NEIGHBORS * np.median(reach[neighbors[:, 1:]], axis=1)
+    isolated: BoolArray = over_neighbors | (reach > MAX_REACH_OVER_MEDIAN * np.median(reach))
+    return isolated

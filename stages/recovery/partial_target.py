@@ -1,9 +1,10 @@
-"""Scans of which a piece is missing: they lie on the shape, and beyond their edge the shape may go on (geocode §4.4).
+"""A partial scan as the target of a search: the shape may go on beyond the edge of the scan (geocode §4.4).
 
-A scan is taken to be what lies on one side of a plane. The planes asked about are the faces of the hull around it, for
-a cut leaves a large one: what a shape has beyond one of them costs nothing, what it has on this side has to be there in
-the scan. So a box that is fitted to the rest is no explanation, and neither is a shape whose leg the scan should show.
-A box says no longer how large the shape is and where it stands; these are searched for, too.
+The scan is taken for what lies on one side of a plane. The candidate planes are the largest faces of its convex hull,
+since a cut leaves a large face. The part of a shape beyond the plane costs nothing; the part on this side must be in
+the scan. So neither a box fitted to the rest explains the scan, nor a shape with a leg that the scan should show.
+
+The scan's box tells neither the size nor the position of the shape; the search covers these too.
 """
 
 from __future__ import annotations
@@ -16,36 +17,40 @@ from typing import Any
 import numpy as np
 
 from stages.programs.curves.part import Part
+from stages.recovery.cloud_target import QUERY_POINTS, SEARCHED_POINTS
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import Frame, frame_of
 from stages.training.recovery.surface import sample_points, shape_points
 
-COMPARED, LOOKED_AT = 1024, 2048
-"""Points of each side that look for the nearest of the other, and among which it is looked for."""
-PLANES = 64
-"""The largest faces of the hull, beyond which something may be missing."""
-EDGE = 0.005
-"""What lies so little beyond a face, in sides of the scan's box, lies on it."""
-PRICE = 1e-4
-"""What it costs that the whole shape is missing: no plane is asked for where that explains nothing."""
-SHARES = (1.0, 0.85, 0.7, 0.6, 0.5)
-"""Sizes of the scan's box, in longest sides of the shape's, that are tried beside those by which a side fits."""
-SMALLEST, LARGEST = 0.4, 1.08
-GLIMPSE = 128
-"""Points of the scan by which places are told apart at first; the best CLOSER are looked at closely, and from the best
-FINAL the scan is moved to where it lies best."""
-CLOSER, FINAL = 16, 2
-MOVES = 6
-NEAR = 0.9
-"""The share of its points that a scan is moved by: those that are nearest to the shape."""
+MAX_CUT_PLANES = 64
+CUT_TOLERANCE = 0.005
+"""Points this far beyond a plane count as on it, in sides of the scan's box."""
+MISSING_SHARE_PENALTY = 1e-4
+"""Cost where the whole shape is missing: no plane is used that explains nothing."""
+SCAN_SIZES = (1.0, 0.85, 0.7, 0.6, 0.5)
+"""Sizes of the scan's box to try, in longest sides of the shape's, besides those at which a side fits."""
+MIN_SCAN_SIZE, MAX_SCAN_SIZE = 0.4, 1.08
+COARSE_POINTS = 128
+"""Points of the scan in the first comparison of positions."""
+FINE_POSITIONS = 16
+"""Positions compared with all points."""
+ALIGNED_POSITIONS = 2
+"""Positions from which the scan is aligned."""
+MAX_ALIGNMENT_STEPS = 6
+ALIGNED_POINTS_SHARE = 0.9
+"""The nearest points are aligned, the others ignored."""
 
 
 @dataclass(frozen=True)
 class PartialTarget:
-    """A torn scan that stands somewhere beside a program's shapes: `points` float64 (n, 3) in the box from -0.5 to 0.5,
-    in random order, and `tree`, a search tree of them; `planes` float64 (k, 4), normals and offsets of its hull's
-    largest faces; `frame` puts them into the program's coordinates, where the shape that it was placed for has the box
-    `box`, float64 (2, 3); None before it is placed at all."""
+    """A partial scan, placed in a program's coordinates.
+
+    points: float64 (n, 3) in the box from -0.5 to 0.5, in random order
+    tree: a search tree of the first of them
+    planes: float64 (k, 4), normals and offsets of the largest faces of the convex hull
+    frame: puts the points into the program's coordinates
+    box: float64 (2, 3), the box of the shape that the scan was placed for; None before
+    """
 
     points: FloatArray
     tree: Any
@@ -54,127 +59,142 @@ class PartialTarget:
     box: FloatArray | None
 
     def compared(self, parts: Sequence[Part]) -> tuple[float, PartialTarget]:
-        """Where it stands; and, if the shape's box is another than before, moved with its lower or its upper corner,
-        and as large as before beside it."""
+        """Compare where the scan is; also moved with a corner of the shape's box, where that has changed."""
         surface = _Surface.of(parts)
         return self._best(surface, [self.frame, *self._moved_with(surface.box)])
 
     def aligned(self, parts: Sequence[Part]) -> PartialTarget:
-        """From where it stands, and from any of the shape's sides with any size, moved to where it lies best."""
+        """Align from the present position, and from any side of the shape with any size."""
         surface = _Surface.of(parts)
-        starts = [*([self.frame] if self.box is not None else []), *self._places(surface)]
-        return self._best(surface, [self._settled(surface, each) for each in starts])[1]
+        starts = [*([self.frame] if self.box is not None else []), *self._positions(surface)]
+        return self._best(surface, [self._aligned_frame(surface, start) for start in starts])[1]
 
     def floor(self, parts: Sequence[Part], rng: np.random.Generator) -> float:
-        """Of as many random points on what the scan shows of the shape."""
+        """The distance of as many random points on the visible part of the shape."""
         from scipy.spatial import cKDTree
 
         missing = self.missing(parts)
-        drawn = self.frame.normalized(sample_points(parts, round(len(self.points) / (1.0 - min(missing, 0.9))), rng))
+        count = round(len(self.points) / (1.0 - min(missing, 0.9)))
+        points = self.frame.normalized(sample_points(parts, count, rng))
         if missing > 0.0:
-            plane = self.planes[self._judged(_Surface.of(parts), self.frame)[1]]
-            drawn = drawn[drawn @ plane[:3] + plane[3] <= EDGE]
-        if not len(drawn):
+            plane = self.planes[self._compare(_Surface.of(parts), self.frame)[1]]
+            points = points[points @ plane[:3] + plane[3] <= CUT_TOLERANCE]
+        if not len(points):
             return 0.0
-        own = replace(self, points=drawn, tree=cKDTree(drawn[:LOOKED_AT]))
-        return own._distance(_Surface.of(parts), self.frame)
+        sampled = replace(self, points=points, tree=cKDTree(points[:SEARCHED_POINTS]))
+        return sampled._distance(_Surface.of(parts), self.frame)
 
     def missing(self, parts: Sequence[Part]) -> float:
-        """The share of a shape's surface that lies where the scan has nothing to say; 0 where it explains nothing."""
-        return self._judged(_Surface.of(parts), self.frame)[2]
+        """The share of a shape's surface beyond the cut; 0 where a cut explains nothing."""
+        return self._compare(_Surface.of(parts), self.frame)[2]
 
     def _distance(self, surface: _Surface, frame: Frame) -> float:
-        return self._judged(surface, frame)[0]
+        return self._compare(surface, frame)[0]
 
-    def _judged(self, surface: _Surface, frame: Frame) -> tuple[float, int, float]:
-        """How far a shape is from the scan at a place: the mean squared distance from the scan to it, and from what the
-        scan should show of it; the face beyond which the scan shows nothing, and the share of the shape there."""
-        back, _ = surface.tree.query(frame.placed(self.points[:COMPARED]))
-        seen_from = frame.normalized(surface.points[:: LOOKED_AT // COMPARED])
-        there = self.tree.query(seen_from)[0] ** 2
-        shown = seen_from @ self.planes[:, :3].T + self.planes[:, 3] <= EDGE
-        share = 1.0 - shown.mean(axis=0)
-        costs = (there @ shown) / np.maximum(shown.sum(axis=0), 1) + PRICE * share
-        face = int(np.argmin(costs))
-        cost, missing = (float(costs[face]), float(share[face]))
-        if there.mean() <= cost:
-            cost, missing = float(there.mean()), 0.0
-        return float((back**2).mean()) / frame.size**2 + cost, face, missing
+    def _compare(self, surface: _Surface, frame: Frame) -> tuple[float, int, float]:
+        """Distance of a shape from the scan at a position, index of the best plane, and missing share of the shape.
+
+        The distance is the mean squared distance from the scan to the shape, plus that from the shape's part on this
+        side of the plane to the scan.
+        """
+        to_surface, _ = surface.tree.query(frame.placed(self.points[:QUERY_POINTS]))
+        points = frame.normalized(surface.points[:: SEARCHED_POINTS // QUERY_POINTS])
+        to_scan = self.tree.query(points)[0] ** 2
+        visible = points @ self.planes[:, :3].T + self.planes[:, 3] <= CUT_TOLERANCE
+        missing = 1.0 - visible.mean(axis=0)
+        costs = (to_scan @ visible) / np.maximum(visible.sum(axis=0), 1) + MISSING_SHARE_PENALTY * missing
+        plane = int(np.argmin(costs))
+        cost, share = float(costs[plane]), float(missing[plane])
+        if to_scan.mean() <= cost:
+            cost, share = float(to_scan.mean()), 0.0
+        return float((to_surface**2).mean()) / frame.size**2 + cost, plane, share
 
     def _best(self, surface: _Surface, frames: Sequence[Frame]) -> tuple[float, PartialTarget]:
-        distance, frame = min(((self._distance(surface, each), each) for each in frames), key=lambda each: each[0])
-        return distance, replace(self, frame=frame, box=surface.box)
+        distances = [self._distance(surface, frame) for frame in frames]
+        best = int(np.argmin(distances))
+        return distances[best], replace(self, frame=frames[best], box=surface.box)
 
     def _moved_with(self, box: FloatArray) -> Iterator[Frame]:
+        """Frames that follow the lower or the upper corner of a changed box, with the old size and scaled."""
         if self.box is None:
             return
-        moved = box - self.box
-        if np.abs(moved).max() <= 1e-4 * self.frame.size:
+        shifts = box - self.box
+        if np.abs(shifts).max() <= 1e-4 * self.frame.size:
             return
-        for corner in moved:
-            yield Frame(self.frame.centre + corner, self.frame.size)
-        grown = float(np.ptp(box, axis=0).max() / np.ptp(self.box, axis=0).max())
+        for shift in shifts:
+            yield Frame(self.frame.centre + shift, self.frame.size)
+        growth = float(np.ptp(box, axis=0).max() / np.ptp(self.box, axis=0).max())
         for before, after in zip(self.box, box, strict=True):
-            yield Frame(after + (self.frame.centre - before) * grown, self.frame.size * grown)
+            yield Frame(after + (self.frame.centre - before) * growth, self.frame.size * growth)
 
-    def _places(self, surface: _Surface) -> list[Frame]:
-        """Where the scan may stand: as large as one of the shape's sides says, or by SHARES; along each axis at the
-        lower end, the upper end, or in the middle. Those where it lies nearest to the shape."""
+    def _positions(self, surface: _Surface) -> list[Frame]:
+        """The most promising positions of the scan.
+
+        Sizes: one that fits each of the shape's sides, and SCAN_SIZES. Along each axis: lower end, upper end, middle.
+        """
         low, high = self.points.min(axis=0), self.points.max(axis=0)
-        sides, own = np.ptp(surface.box, axis=0), high - low
+        sides, scan_sides = np.ptp(surface.box, axis=0), high - low
         longest = float(sides.max())
-        sizes = {float(sides[axis] / own[axis]) for axis in range(3) if own[axis] > 0.05}
-        found = []
-        for size in sorted(sizes | {longest * share for share in SHARES}):
-            if not SMALLEST * longest <= size <= LARGEST * longest:
+        sizes = {float(sides[axis] / scan_sides[axis]) for axis in range(3) if scan_sides[axis] > 0.05}
+        candidates = []
+        for size in sorted(sizes | {longest * share for share in SCAN_SIZES}):
+            if not MIN_SCAN_SIZE * longest <= size <= MAX_SCAN_SIZE * longest:
                 continue
             ends = surface.box - np.array([low, high]) * size
             for centre in product(*np.vstack([ends, ends.mean(axis=0)]).T):
                 frame = Frame(np.array(centre), size)
-                near, _ = surface.tree.query(frame.placed(self.points[:GLIMPSE]))
-                found.append((float((near**2).mean()) / size**2, frame))
-        closer = [frame for _, frame in sorted(found, key=lambda each: each[0])[:CLOSER]]
-        return sorted(closer, key=lambda each: self._distance(surface, each))[:FINAL]
+                to_surface, _ = surface.tree.query(frame.placed(self.points[:COARSE_POINTS]))
+                candidates.append((float((to_surface**2).mean()) / size**2, frame))
+        fine = [frame for _, frame in sorted(candidates, key=lambda candidate: candidate[0])[:FINE_POSITIONS]]
+        return sorted(fine, key=lambda frame: self._distance(surface, frame))[:ALIGNED_POSITIONS]
 
-    def _settled(self, surface: _Surface, frame: Frame) -> Frame:
-        """Moved, and made larger or smaller, so that pairs of nearest points lie on each other, while that is nearer.
+    def _aligned_frame(self, surface: _Surface, frame: Frame) -> Frame:
+        """Align by pairs of nearest points while the distance falls.
 
-        Least squares make a scan smaller than it is: the size is also tried that keeps how far its points are spread.
+        Least squares shrink a scan, so the size that keeps the spread of its points is tried as well.
         """
         distance = self._distance(surface, frame)
-        for _ in range(MOVES):
-            points = self.points[:COMPARED]
-            reach, back = surface.tree.query(frame.placed(points))
-            near = reach <= np.quantile(reach, NEAR)
-            points, onto = points[near], surface.points[back[near]]
-            centre, other = points.mean(axis=0), onto.mean(axis=0)
+        for _ in range(MAX_ALIGNMENT_STEPS):
+            points = self.points[:QUERY_POINTS]
+            reach, nearest = surface.tree.query(frame.placed(points))
+            near = reach <= np.quantile(reach, ALIGNED_POINTS_SHARE)
+            points, onto = points[near], surface.points[nearest[near]]
+            centre, onto_centre = points.mean(axis=0), onto.mean(axis=0)
             spread = float(((points - centre) ** 2).sum())
-            sizes = [frame.size, float(np.sqrt(((onto - other) ** 2).sum() / spread))] if spread > 0.0 else [frame.size]
-            moved = [Frame(other - size * centre, size) for size in sizes if size > 0.0]
-            nearer, best = min(((self._distance(surface, each), each) for each in moved), key=lambda each: each[0])
-            if nearer >= distance:
+            sizes = [frame.size]
+            if spread > 0.0:
+                sizes.append(float(np.sqrt(((onto - onto_centre) ** 2).sum() / spread)))
+            moved = [Frame(onto_centre - size * centre, size) for size in sizes if size > 0.0]
+            distances = [self._distance(surface, candidate) for candidate in moved]
+            best = int(np.argmin(distances))
+            if distances[best] >= distance:
                 break
-            distance, frame = nearer, best
+            distance, frame = distances[best], moved[best]
         return frame
 
 
 def partial_target(points: FloatArray, rng: np.random.Generator) -> PartialTarget:
-    """The target of a torn scan (n, 3) that stands upright. It is not placed yet."""
+    """Make the target of an upright partial scan (n, 3). It is not placed yet."""
     from scipy.spatial import ConvexHull, cKDTree
 
-    chosen = rng.permutation(len(points))[: 2 * LOOKED_AT]
+    chosen = rng.permutation(len(points))[: 2 * SEARCHED_POINTS]
     normalized = frame_of(points).normalized(points)[chosen]
-    # joggled, for a scan may be flat
+    # joggled, since a scan may be flat
     hull = ConvexHull(normalized, qhull_options="QJ Pp")
     corners = normalized[hull.simplices]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    planes = hull.equations[np.argsort(-areas, kind="stable")[:PLANES]]
-    return PartialTarget(normalized, cKDTree(normalized[:LOOKED_AT]), planes, Frame(np.zeros(3), 1.0), None)
+    planes = hull.equations[np.argsort(-areas, kind="stable")[:MAX_CUT_PLANES]]
+    return PartialTarget(normalized, cKDTree(normalized[:SEARCHED_POINTS]), planes, Frame(np.zeros(3), 1.0), None)
 
 
 @dataclass(frozen=True)
 class _Surface:
-    """points: float64 (LOOKED_AT, 3) on a shape; tree: a search tree of them; box: float64 (2, 3) around them."""
+    """Even points on a shape.
+
+    points: float64 (n, 3)
+    tree: a search tree of them
+    box: float64 (2, 3), around them
+    """
 
     points: FloatArray
     tree: Any
@@ -184,5 +204,5 @@ class _Surface:
     def of(cls, parts: Sequence[Part]) -> _Surface:
         from scipy.spatial import cKDTree
 
-        points = shape_points(parts, LOOKED_AT)
+        points = shape_points(parts, SEARCHED_POINTS)
         return cls(points, cKDTree(points), np.array([points.min(axis=0), points.max(axis=0)]))

@@ -1,8 +1,7 @@
-"""Refinement by synthesis: from a first guess, the parameters whose shape lies nearest to a target.
+"""Refinement by synthesis: search the parameters whose shape is nearest to a target, from an initial estimate.
 
-A program makes a shape in about a millisecond, so hundreds can be tried. Where the network is least sure is looked
-first: each parameter alone, from value to value; then several discrete ones at once, by chance; then continuous ones
-between the values that the network tells apart.
+A program builds a shape in about a millisecond, so hundreds can be tried. Uncertain parameters come first: each alone,
+from value to value; then several discrete ones at once, at random; then continuous ones off the grid of their values.
 """
 
 from __future__ import annotations
@@ -16,31 +15,38 @@ import numpy as np
 from stages.programs.parameters import Parameter, Value
 from stages.programs.program import BuildError, Program
 from stages.programs.schema import Values
-from stages.recovery.targets import RecoveryTarget
+from stages.recovery.target import RecoveryTarget
 from stages.training.recovery.estimate import ParameterEstimate
 from stages.training.recovery.shapes import nearest_valid_values
 
-EVOLUTION = 60
-"""Shapes in which several discrete parameters are changed at once, before each alone is looked at again."""
-OTHERWISE, FITTED = 2, 6
-"""So many values of a choice are tried, and so many of the parameters that it brings into view are fitted, at most."""
-SURE = 0.8
-"""A choice that the network gives such a probability is not made otherwise."""
-WEAK = 0.01
-"""A parameter that has not changed the distance by such a share is left until the end."""
-TINY = 1e-12
-"""Nearer than this nothing is: a drawing of the shape itself has distance 0."""
-HOPELESS = 3.0
-"""What is so many times farther at first is not fitted."""
-MUTATED = 3
-"""So many are changed at once at most."""
-SMALLEST_STEP = 0.1
-"""Where no step of this share between two values is any better, a continuous value is found."""
+EVOLUTION_SHAPES = 60
+"""Shapes tried with several changed discrete parameters, between passes over single parameters."""
+MAX_MUTATED_PARAMETERS = 3
+MAX_CHOICE_VALUES = 2
+"""Values of a choice that are tried, where it brings other parameters into view."""
+MAX_REVEALED_PARAMETERS = 6
+"""Parameters that are fitted after a choice has brought them into view."""
+MAX_REVEALED_COST_RATIO = 3.0
+"""They are not fitted where the choice has made the cost this much higher."""
+MAX_CHOICE_CERTAINTY = 0.8
+"""A choice is left as estimated where its probability is higher."""
+MIN_EFFECT = 0.01
+"""A parameter that has changed the distance by a smaller share is left until the end."""
+MIN_DISTANCE = 1e-12
+"""Avoids a division by zero: a drawing of the shape itself has distance 0."""
+MIN_OFF_GRID_STEP = 0.1
+"""Smallest step of a continuous parameter, in steps between its listed values."""
 
 
 @dataclass(frozen=True)
 class RefinedShape:
-    """values: settled and valid; distance: from the target; target: as it was aligned; tried: shapes that were made."""
+    """The result of a search.
+
+    values: canonical and valid
+    distance: from the target
+    target: as it was aligned
+    tried: shapes that were built
+    """
 
     values: dict[str, Value]
     distance: float
@@ -50,45 +56,51 @@ class RefinedShape:
 
 def refine(
     program: Program,
-    guess: ParameterEstimate,
+    estimate: ParameterEstimate,
     target: RecoveryTarget,
     budget: int,
     rng: np.random.Generator,
-    prior: float = 0.0,
-    near: float = 0.0,
+    surprise_cost: float = 0.0,
+    chance_distance: float = 0.0,
 ) -> RefinedShape:
-    """The nearest shape that is found with `budget` shapes at most; never farther than that of the guess itself, as the
-    target was aligned to it. prior: the share of its distance that a shape costs for each nat of surprise; near:
-    what is nearer is no better, but by chance."""
-    search = _Search(program, guess, target, budget, rng, prior, near, guess.values(program))
+    """Find the nearest shape with at most `budget` shapes, never farther than that of the estimate itself.
+
+    surprise_cost: cost of a nat of surprise, as a share of the distance
+    chance_distance: distances below this do not differ
+    """
+    search = _Search(program, estimate, target, budget, rng, surprise_cost, chance_distance, estimate.values(program))
     search.begin()
     while search.tried < budget:
         before = search.cost
-        search.by_classes(1)
-        search.by_structure()
-        search.by_classes(2)
-        search.by_evolution(EVOLUTION)
-        search.by_classes(None)
-        search.between_classes()
+        search.vary_single(1)
+        search.vary_choices()
+        search.vary_single(2)
+        search.evolve(EVOLUTION_SHAPES)
+        search.vary_single(None)
+        search.vary_off_grid()
         if search.cost >= before:
             break
-    return RefinedShape(search.canonical, search.distance, search.target, search.tried)
+    return RefinedShape(search.values, search.distance, search.target, search.tried)
 
 
 @dataclass
 class _Search:
-    """wanted: a value for each parameter, also of those that are hidden now: what comes into view has what was guessed
-    of it. settled: the valid values that it stands for; distance: theirs; cost: what is made less."""
+    """The state of a search.
+
+    wanted: a value of each parameter, hidden ones included, so that a parameter that comes into view has its estimate
+    values: the canonical valid values for `wanted`
+    distance, cost: of these values; the cost is minimised
+    """
 
     program: Program
     estimate: ParameterEstimate
     target: RecoveryTarget
     budget: int
     rng: np.random.Generator
-    prior: float
-    near: float
+    surprise_cost: float
+    chance_distance: float
     wanted: dict[str, Value]
-    canonical: dict[str, Value] = field(default_factory=dict)
+    values: dict[str, Value] = field(default_factory=dict)
     distance: float = float("inf")
     cost: float = float("inf")
     tried: int = 0
@@ -96,147 +108,155 @@ class _Search:
     _known: set[str] = field(default_factory=set)
 
     def begin(self) -> None:
-        self.canonical = nearest_valid_values(self.program, self.wanted)
+        self.values = nearest_valid_values(self.program, self.wanted)
         self._align()
 
-    def by_classes(self, passes: int | None) -> None:
-        """Each visible parameter in turn to other values that datasets have, until none is better; but first those that
-        have moved the shape at all."""
-        better = True
-        while better and self.tried < self.budget and passes != 0:
-            better = False
-            passes = None if passes is None else passes - 1
-            for parameter in self._unsure_first():
-                if parameter.name in self._visible() and self._effects.get(parameter.name, 1.0) >= WEAK:
-                    for values in self._ways(parameter):
-                        better |= self._walk(parameter, values)
-            if better:
+    def vary_single(self, max_passes: int | None) -> None:
+        """Move each visible parameter alone along its listed values, until none improves the cost."""
+        improved, passes = True, 0
+        while improved and self.tried < self.budget and passes != max_passes:
+            improved = False
+            passes += 1
+            for parameter in self._uncertain_first():
+                if parameter.name in self._visible() and self._effects.get(parameter.name, 1.0) >= MIN_EFFECT:
+                    for path in self._value_paths(parameter):
+                        improved |= self._walk(parameter, path)
+            if improved:
                 self._align()
 
-    def by_structure(self) -> None:
-        """Each choice that brings other parameters into view is made otherwise, and these are fitted before the two
-        shapes are compared: an arm rest of a wrong height is no better than none."""
-        choices = {name for each in self.program.parameters if each.visible_if for name in each.visible_if.names}
-        for parameter in self._unsure_first():
+    def vary_choices(self) -> None:
+        """Change each choice that brings other parameters into view, and fit these before comparing.
+
+        An arm rest of the wrong height is no better than none.
+        """
+        choices = {
+            name for parameter in self.program.parameters if parameter.visible_if for name in parameter.visible_if.names
+        }
+        for parameter in self._uncertain_first():
             if parameter.kind == "continuous" or parameter.name not in choices:
                 continue
-            if self.estimate.certainty(parameter.name) > SURE:
+            if self.estimate.certainty(parameter.name) > MAX_CHOICE_CERTAINTY:
                 return
-            chances = self.estimate.probabilities[parameter.name]
-            for index in np.argsort(-chances, kind="stable")[:OTHERWISE].tolist():
-                if self.tried < self.budget and parameter.values[index] != self.canonical[parameter.name]:
-                    self._leap(parameter.name, parameter.values[index])
+            probabilities = self.estimate.probabilities[parameter.name]
+            for index in np.argsort(-probabilities, kind="stable")[:MAX_CHOICE_VALUES].tolist():
+                if self.tried < self.budget and parameter.values[index] != self.values[parameter.name]:
+                    self._choose(parameter.name, parameter.values[index])
 
-    def by_evolution(self, shapes: int) -> None:
-        """Several discrete parameters at once, drawn by their probabilities; what is nearer is kept."""
-        discrete = [each for each in self.program.parameters if each.kind != "continuous"]
+    def evolve(self, shapes: int) -> None:
+        """Change several discrete parameters at once, drawn by their probabilities; keep what is nearer."""
+        discrete = [parameter for parameter in self.program.parameters if parameter.kind != "continuous"]
         if not discrete:
             return
-        doubt = np.array([1.02 - self.estimate.certainty(each.name) for each in discrete])
+        doubts = np.array([1.02 - self.estimate.certainty(parameter.name) for parameter in discrete])
         for _ in range(shapes):
-            count = int(self.rng.integers(1, min(MUTATED, len(discrete)) + 1))
+            count = int(self.rng.integers(1, min(MAX_MUTATED_PARAMETERS, len(discrete)) + 1))
             change = {}
-            for place in self.rng.choice(len(discrete), count, replace=False, p=doubt / doubt.sum()).tolist():
-                chances = np.sqrt(self.estimate.probabilities[discrete[place].name] + 1e-3)
-                index = int(self.rng.choice(len(chances), p=chances / chances.sum()))
-                change[discrete[place].name] = discrete[place].values[index]
+            for row in self.rng.choice(len(discrete), count, replace=False, p=doubts / doubts.sum()).tolist():
+                weights = np.sqrt(self.estimate.probabilities[discrete[row].name] + 1e-3)
+                index = int(self.rng.choice(len(weights), p=weights / weights.sum()))
+                change[discrete[row].name] = discrete[row].values[index]
             self._try(change)
 
-    def between_classes(self) -> None:
-        """Continuous parameters off the values that datasets have, in steps that get smaller."""
-        continuous = [each for each in self._unsure_first() if each.kind == "continuous"]
-        step = 0.5
-        while step >= SMALLEST_STEP and self.tried < self.budget:
+    def vary_off_grid(self) -> None:
+        """Move continuous parameters off their listed values, in steps that get smaller."""
+        continuous = [parameter for parameter in self._uncertain_first() if parameter.kind == "continuous"]
+        share = 0.5
+        while share >= MIN_OFF_GRID_STEP and self.tried < self.budget:
             for parameter in continuous:
                 if parameter.name not in self._visible():
                     continue
-                size = step * (float(parameter.values[-1]) - float(parameter.values[0])) / (len(parameter.values) - 1)
+                step = share * (float(parameter.values[-1]) - float(parameter.values[0])) / (len(parameter.values) - 1)
                 for sign in (1.0, -1.0):
-                    if self.tried >= self.budget or self._walk(parameter, _steps(parameter, self.wanted, sign * size)):
+                    path = _off_grid_values(parameter, self.wanted, sign * step)
+                    if self.tried >= self.budget or self._walk(parameter, path):
                         break
             self._align()
-            step /= 2.0
+            share /= 2.0
 
-    def _ways(self, parameter: Parameter) -> list[Iterator[Value]]:
-        """Ways from the present value: up and down step by step, and to the likeliest others."""
-        place = parameter.class_of(self.wanted[parameter.name])
+    def _value_paths(self, parameter: Parameter) -> list[Iterator[Value]]:
+        """Paths from the present value: up and down step by step, and jumps to the likeliest others."""
+        index = parameter.class_of(self.wanted[parameter.name])
         if parameter.kind == "binary":
-            return [iter(parameter.values[1 - place : 2 - place])]
-        likely = np.argsort(-self.estimate.probabilities[parameter.name], kind="stable")[:2].tolist()
-        others = [[parameter.values[index]] for index in likely if abs(index - place) > 1]
-        return [iter(parameter.values[place + 1 :]), iter(parameter.values[:place][::-1]), *map(iter, others)]
+            return [iter(parameter.values[1 - index : 2 - index])]
+        likeliest = np.argsort(-self.estimate.probabilities[parameter.name], kind="stable")[:2].tolist()
+        jumps = [[parameter.values[other]] for other in likeliest if abs(other - index) > 1]
+        return [iter(parameter.values[index + 1 :]), iter(parameter.values[:index][::-1]), *map(iter, jumps)]
 
-    def _leap(self, name: str, value: Value) -> None:
+    def _choose(self, name: str, value: Value) -> None:
+        """Set a choice, fit the parameters that it brings into view, and undo all of it where the cost is no lower."""
         if name not in self._visible():
             return
-        before = self.wanted, self.canonical, self.distance, self.cost, self.target
-        seen, share = self._visible(), self.cost
+        before = self.wanted, self.values, self.distance, self.cost, self.target
+        visible_before, cost_before = self._visible(), self.cost
         self.distance = self.cost = 1e9
         if self._try({name: value}):
-            fresh = [each for each in self._unsure_first() if each.name in self._visible() - seen]
-            for parameter in fresh[:FITTED] if self.cost < HOPELESS * share else []:
-                for values in self._ways(parameter):
-                    self._walk(parameter, values)
-        if self.cost >= share:
-            self.wanted, self.canonical, self.distance, self.cost, self.target = before
+            revealed = self._visible() - visible_before
+            fitted = [parameter for parameter in self._uncertain_first() if parameter.name in revealed]
+            if self.cost >= MAX_REVEALED_COST_RATIO * cost_before:
+                fitted = []
+            for parameter in fitted[:MAX_REVEALED_PARAMETERS]:
+                for path in self._value_paths(parameter):
+                    self._walk(parameter, path)
+        if self.cost >= cost_before:
+            self.wanted, self.values, self.distance, self.cost, self.target = before
 
-    def _walk(self, parameter: Parameter, values: Iterator[Value]) -> bool:
-        """Go on while it gets better."""
+    def _walk(self, parameter: Parameter, path: Iterator[Value]) -> bool:
+        """Follow a path of values while the cost falls. Whether it fell."""
         moved = False
-        for value in values:
+        for value in path:
             if not self._try({parameter.name: value}):
                 break
             moved = True
         return moved
 
     def _try(self, change: dict[str, Value]) -> bool:
-        """Whether the shape with a change is nearer; then it is taken."""
+        """Apply a change where it lowers the cost. Whether it did."""
         if self.tried >= self.budget:
             return False
         wanted = {**self.wanted, **change}
-        settled = nearest_valid_values(self.program, wanted)
-        text = self.program.schema.to_text(settled)
+        values = nearest_valid_values(self.program, wanted)
+        text = self.program.schema.to_text(values)
         if text in self._known:
             return False
         self._known.add(text)
         self.tried += 1
         try:
-            parts = self.program.parts(settled)
+            parts = self.program.parts(values)
         except BuildError:
             return False
         distance, target = self.target.compared(parts)
         for name in change if len(change) == 1 else ():
-            effect = abs(distance - self.distance) / max(self.distance, TINY)
+            effect = abs(distance - self.distance) / max(self.distance, MIN_DISTANCE)
             self._effects[name] = max(self._effects.get(name, 0.0), effect)
-        cost = self._cost(distance, settled)
+        cost = self._cost(distance, values)
         if cost >= self.cost:
             return False
-        self.distance, self.cost, self.canonical, self.target = distance, cost, settled, target
-        self.wanted = {**wanted, **{name: settled[name] for name in self._visible()}}
+        self.distance, self.cost, self.values, self.target = distance, cost, values, target
+        self.wanted = {**wanted, **{name: values[name] for name in self._visible()}}
         return True
 
     def _align(self) -> None:
-        """Place the target anew on the best shape, and forget which others were farther."""
-        parts = self.program.parts(self.canonical)
+        """Align the target to the best shape, and forget which others were farther."""
+        parts = self.program.parts(self.values)
         self.target = self.target.aligned(parts)
         self.distance, self.target = self.target.compared(parts)
-        self.cost = self._cost(self.distance, self.canonical)
+        self.cost = self._cost(self.distance, self.values)
         self.tried += 1
-        self._known = {self.program.schema.to_text(self.canonical)}
+        self._known = {self.program.schema.to_text(self.values)}
 
-    def _cost(self, distance: float, settled: Values) -> float:
-        surprise = self.estimate.surprise(self.program, settled) if self.prior else 0.0
-        return max(distance, self.near) * (1.0 + self.prior * surprise)
+    def _cost(self, distance: float, values: Values) -> float:
+        surprise = self.estimate.surprise(self.program, values) if self.surprise_cost else 0.0
+        return max(distance, self.chance_distance) * (1.0 + self.surprise_cost * surprise)
 
     def _visible(self) -> frozenset[str]:
-        return self.program.schema.canonical(self.canonical)[1]
+        return self.program.schema.canonical(self.values)[1]
 
-    def _unsure_first(self) -> Sequence[Parameter]:
-        return sorted(self.program.parameters, key=lambda each: self.estimate.certainty(each.name))
+    def _uncertain_first(self) -> Sequence[Parameter]:
+        return sorted(self.program.parameters, key=lambda parameter: self.estimate.certainty(parameter.name))
 
 
-def _steps(parameter: Parameter, wanted: Values, step: float) -> Iterator[Any]:
-    """Values from the present one on, as far as the range goes."""
+def _off_grid_values(parameter: Parameter, wanted: Values, step: float) -> Iterator[Any]:
+    """Values from the present one on in steps, to the end of the range."""
     low, high = float(parameter.values[0]), float(parameter.values[-1])
     value = float(wanted[parameter.name])
     while True:

@@ -194,8 +194,8 @@ def _program_shards(plan: Plan, entry: RecoveryModelConfig, program: str) -> lis
     if entry.input == "sketch":
         params["sketches"] = plan.config.section(SketchesConfig).model_dump(mode="json")
     name, code = model_name(entry, program, 0).removesuffix("0"), (kind_module(entry.kind), program_module(program))
-    judged = {**params, "split": "val", "shapes": entry.validation}
-    learnt = {**params, "split": "train", "shapes": entry.pool}
+    judged = {**params, "split": "val", "shapes": entry.validation_shapes}
+    learnt = {**params, "split": "train", "shapes": entry.shapes_per_round}
     pools = (Shard(f"{name}pool{number:04}", learnt, (), code) for number in range(entry.max_rounds))
     return [Shard(f"{name}data", judged, (), code), *pools]
 

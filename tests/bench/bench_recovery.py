@@ -58,7 +58,8 @@ def bench() -> Iterator[Measure]:
 
 def _recoveries() -> float:
     """Clouds a second that the model which ships recovers."""
-    from stages.recovery.recover import PRETRAINED_FOLDER, find_models, recover
+    from stages.recovery.recover import recover
+    from stages.training.recovery.trained import PRETRAINED_FOLDER, find_models
 
     models, _ = find_models(PRETRAINED_FOLDER)
     cloud = _clouds(2048)[0]

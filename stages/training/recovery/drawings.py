@@ -1,4 +1,4 @@
-"""Drawings as a network sees them: ink on a square, brought to one place and size."""
+"""Drawings as a network sees them: ink fitted to a square."""
 
 from __future__ import annotations
 
@@ -12,21 +12,23 @@ from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.settings import SketchesConfig, SketchView
 
 DRAWING_SIDE_PIXELS = 224
-"""Pixels of a side."""
-MARGIN = 8
-"""Pixels that are left free around the ink."""
-INK = 128
-"""A pixel of a dark drawing on white below this is ink."""
+MARGIN_PIXELS = 8
+"""Free around the ink."""
+INK_THRESHOLD = 128
+"""A darker pixel is ink."""
 
 
 def fit_to_square(ink: BoolArray) -> BoolArray:
-    """Ink (h, w) of any size in the middle of a square (SIDE, SIDE), as large as the margin allows: a pixel there is
-    ink where any is that it covers, and lines of small drawings stay whole. Raises ValueError without ink."""
+    """Fit ink (h, w) of any size into the middle of a square, bool (side, side).
+
+    A pixel is ink where any pixel that it covers is, and lines of small drawings stay whole. Raises ValueError without
+    ink.
+    """
     rows, columns = np.nonzero(ink)
     if not len(rows):
         raise ValueError("a drawing without a line")
     height, width = np.ptp(rows) + 1, np.ptp(columns) + 1
-    scale = (DRAWING_SIDE_PIXELS - 2 * MARGIN) / max(height, width)
+    scale = (DRAWING_SIDE_PIXELS - 2 * MARGIN_PIXELS) / max(height, width)
     if scale > 1.0:
         # each pixel of a small drawing is a square of the large one
         grown = int(np.ceil(scale))
@@ -44,9 +46,9 @@ def fit_to_square(ink: BoolArray) -> BoolArray:
 def draw_fitted(
     program: Program, parts: tuple[Part, ...], view: SketchView, config: SketchesConfig, rng: np.random.Generator
 ) -> BoolArray:
-    """A shape as stage `sketches` draws it, fitted."""
+    """Draw a shape as stage `sketches` does, bool (side, side), fitted."""
     scene = scene_of(shape_from_parts(program, parts))
     camera = jittered_camera(view, rng)
     drawing: ByteArray
     drawing, _ = draw_sketch(scene, camera, config.size, config.supersample, config.strokes, config.renderer)
-    return fit_to_square(drawing < INK)
+    return fit_to_square(drawing < INK_THRESHOLD)

@@ -17,15 +17,15 @@ from stages.training.recovery.neighbors import edge_maximum, nearest_neighbors
 from stages.training.recovery.outputs import regressed
 from stages.training.recovery.settings import RecoveryModelConfig
 
-SLOPE = 0.2
+LEAKY_SLOPE = 0.2
 
 
 class RecoveryNet(nn.Module):
-    """Inputs to outputs float (n, parameters, most classes): of each parameter the logits of its classes, the hidden
-    one the last, or what `Answers` says. Outputs beyond the classes of a parameter are minus infinity.
+    """Inputs to outputs float (n, parameters, most classes), as `ParameterOutputs` reads them.
 
-    With answers `apart` an encoder of its own sees for the parameters that are regressed: but for the step they share,
-    two networks (Huang et al. 2017).
+    A classified parameter has the logits of its classes, the hidden one last. Outputs beyond the classes of a parameter
+    are minus infinity. With `separate_regression`, regressed parameters have an encoder of their own (Huang et al.
+    2017).
     """
 
     continuous: Tensor
@@ -34,14 +34,16 @@ class RecoveryNet(nn.Module):
         super().__init__()
         encoder = Dgcnn if entry.input == "points" else Vgg
         self.encoder: nn.Module = encoder(entry)
-        self.other: nn.Module | None = encoder(entry) if entry.answers == "apart" else None
-        classes = [each.classes for each in parameters]
+        self.other: nn.Module | None = encoder(entry) if entry.prediction == "separate_regression" else None
+        classes = [parameter.classes for parameter in parameters]
         self.decoders = Decoders(classes, 2 * entry.embedding, entry.decoder, entry.dropout)
         self.register_buffer("continuous", torch.tensor(regressed(entry, parameters)), persistent=False)
 
     def forward(self, inputs: Tensor, noise: Generator | None = None) -> Tensor:
-        """Of clouds float (n, points, 3), normalised, or drawings float (n, 1, SIDE, SIDE), ink 1 on 0; `noise` says
-        what is dropped, and nothing is without."""
+        """Outputs for normalized clouds float (n, points, 3), or drawings float (n, 1, side, side), ink 1 on 0.
+
+        noise: draws the dropout; None: no dropout
+        """
         embeddings = self.encoder(inputs)[None]
         if self.other is not None:
             embeddings = torch.where(self.continuous[:, None, None], self.other(inputs), embeddings)
@@ -50,38 +52,39 @@ class RecoveryNet(nn.Module):
 
 
 class Dgcnn(nn.Module):
-    """Clouds float (n, points, 3) to embeddings (n, 2 embedding): edge convolutions over the neighbours in space, all
-    their features together, and of these the greatest and the mean over the points.
+    """Clouds float (n, points, 3) to embeddings (n, 2 embedding).
 
-    Published is a graph that is made anew of the features before each convolution.
+    Edge convolutions over the neighbours in space; their features are concatenated and pooled over the points, by
+    maximum and by mean. The published network rebuilds the graph from the features before each convolution.
     """
 
     def __init__(self, entry: RecoveryModelConfig) -> None:
         super().__init__()
         self.neighbors = entry.neighbors
-        self.convolutions = nn.ModuleList(EdgeConvolution(a, b) for a, b in pairwise((3, *entry.widths)))
+        widths = pairwise((3, *entry.widths))
+        self.convolutions = nn.ModuleList(EdgeConvolution(before, after) for before, after in widths)
         self.mixed = nn.Linear(sum(entry.widths), entry.embedding, bias=False)
         self.norm = nn.BatchNorm1d(entry.embedding)
 
     def forward(self, points: Tensor) -> Tensor:
         neighbors = nearest_neighbors(points, min(self.neighbors, points.shape[1]))
         first, *others = self.convolutions
-        # bfloat16 would move points by up to a thousandth of the box, a good part of the way to the next
+        # bfloat16 would move points by up to a thousandth of the box, much of the distance to the next point
         with torch.autocast(points.device.type, enabled=False):
             features = first(points, neighbors)
-        found = [features]
+        layers = [features]
         for convolution in others:
             features = convolution(features, neighbors)
-            found.append(features)
-        mixed = leaky_relu(_normed(self.norm, self.mixed(torch.cat(found, dim=-1))), SLOPE)
+            layers.append(features)
+        mixed = leaky_relu(_normed(self.norm, self.mixed(torch.cat(layers, dim=-1))), LEAKY_SLOPE)
         return torch.cat([mixed.amax(dim=1), mixed.mean(dim=1)], dim=-1)
 
 
 class EdgeConvolution(nn.Module):
-    """The greatest over the neighbours j of `W1 x_i + W2 (x_j - x_i)`, normed.
+    """The maximum over the neighbours j of `W1 x_i + W2 (x_j - x_i)`, normed.
 
-    The linear part is the same for all that look at a point, so it is done once a point: the first half of `linear` is
-    W1 - W2, the second W2.
+    The linear part depends on single points, so it is computed once for each: the first half of `linear` is W1 - W2,
+    the second W2.
     """
 
     def __init__(self, before: int, after: int) -> None:
@@ -90,39 +93,39 @@ class EdgeConvolution(nn.Module):
         self.norm = nn.BatchNorm1d(after)
 
     def forward(self, features: Tensor, neighbors: Tensor) -> Tensor:
-        return leaky_relu(_normed(self.norm, edge_maximum(self.linear(features), neighbors)), SLOPE)
+        return leaky_relu(_normed(self.norm, edge_maximum(self.linear(features), neighbors)), LEAKY_SLOPE)
 
 
 class Vgg(nn.Module):
-    """Drawings float (n, 1, SIDE, SIDE) to embeddings (n, 2 embedding): a VGG with few features, whose first
-    convolution reads squares of PATCH by PATCH pixels, each pixel a feature.
+    """Drawings float (n, 1, side, side) to embeddings (n, 2 embedding).
 
-    Published are convolutions of single pixels from the start. With few features nearly all of the time goes there,
-    for lines that no more than a few pixels tell: at equal time this learns more.
+    A VGG with few features, whose first convolution reads patches, each pixel a feature. The published network begins
+    with single pixels. With few features that takes nearly all of the time, although a few pixels tell a line: at equal
+    time this one learns more.
     """
 
-    PATCH = 4
+    PATCH_PIXELS = 4
 
     def __init__(self, entry: RecoveryModelConfig) -> None:
         super().__init__()
-        layers: list[nn.Module] = [nn.PixelUnshuffle(self.PATCH)]
-        for place, (before, after) in enumerate(pairwise((self.PATCH**2, *entry.channels))):
+        layers: list[nn.Module] = [nn.PixelUnshuffle(self.PATCH_PIXELS)]
+        for index, (before, after) in enumerate(pairwise((self.PATCH_PIXELS**2, *entry.channels))):
             layers += [nn.Conv2d(before, after, 3, padding=1, bias=False), nn.BatchNorm2d(after), nn.ReLU()]
-            if place % 2:
+            if index % 2:
                 layers.append(HalveResolution())
         # twice as fast with so few features
         self.layers = convert_conv2d_weight_memory_format(nn.Sequential(*layers), torch.channels_last)
-        side = DRAWING_SIDE_PIXELS // self.PATCH // 2 ** (len(entry.channels) // 2)
+        side = DRAWING_SIDE_PIXELS // self.PATCH_PIXELS // 2 ** (len(entry.channels) // 2)
         self.embedding = nn.Linear(entry.channels[-1] * side * side, 2 * entry.embedding)
 
     def forward(self, drawings: Tensor) -> Tensor:
-        seen = self.layers(drawings.contiguous(memory_format=torch.channels_last))
-        embedded: Tensor = self.embedding(seen.flatten(1)).relu()
+        features = self.layers(drawings.contiguous(memory_format=torch.channels_last))
+        embedded: Tensor = self.embedding(features.flatten(1)).relu()
         return embedded
 
 
 class HalveResolution(nn.Module):
-    """Of each four pixels the greatest, (n, features, h, w) to (n, features, h / 2, w / 2) rounded down."""
+    """Max pooling of 2 by 2 pixels, (n, features, h, w) to (n, features, h / 2, w / 2) rounded down."""
 
     def forward(self, features: Tensor) -> Tensor:
         if features.device.type == "cpu":
@@ -131,48 +134,50 @@ class HalveResolution(nn.Module):
 
 
 def halve_resolution(features: Tensor) -> Tensor:
-    """What `HalveResolution` says, for a GPU, where the gradient of `max_pool2d` is added up in any order."""
+    """Max pooling for a GPU, where the gradient of `max_pool2d` depends on the order of its sums."""
     even = features[..., : features.shape[-2] // 2 * 2, : features.shape[-1] // 2 * 2]
     rows = torch.maximum(even[..., ::2, :], even[..., 1::2, :])
     return torch.maximum(rows[..., ::2], rows[..., 1::2])
 
 
 class Decoders(nn.Module):
-    """One perceptron of three layers for each parameter, all of them at once: embeddings (1 or parameters, n, before)
-    to outputs (n, parameters, most classes)."""
+    """A perceptron of three layers for each parameter, all computed at once.
 
-    there: Tensor
+    Embeddings (1 or parameters, n, before) to outputs (n, parameters, most classes).
+    """
 
-    def __init__(self, classes: Sequence[int], before: int, sizes: tuple[int, int], dropped: float) -> None:
+    exists: Tensor
+
+    def __init__(self, classes: Sequence[int], before: int, sizes: tuple[int, int], dropout: float) -> None:
         super().__init__()
-        self.dropped = dropped
+        self.dropout = dropout
         widths = (before, *sizes, max(classes))
         self.weights = nn.ParameterList(_uniform(len(classes), a, b, a) for a, b in pairwise(widths))
         self.biases = nn.ParameterList(_uniform(len(classes), 1, b, a) for a, b in pairwise(widths))
-        there = torch.arange(max(classes)) < torch.tensor(classes)[:, None]
-        self.register_buffer("there", there, persistent=False)
+        exists = torch.arange(max(classes)) < torch.tensor(classes)[:, None]
+        self.register_buffer("exists", exists, persistent=False)
 
     def forward(self, embeddings: Tensor, noise: Generator | None) -> Tensor:
         features = embeddings.expand(len(self.weights[0]), *embeddings.shape[1:])
         last = len(self.weights) - 1
-        for place, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             features = torch.baddbmm(bias, features, weight)
-            if place < last:
-                features = leaky_relu(features, SLOPE)
-                if noise is not None and self.dropped:
-                    kept = torch.rand(features.shape, generator=noise, device=features.device) >= self.dropped
-                    features = features * kept / (1.0 - self.dropped)
+            if layer < last:
+                features = leaky_relu(features, LEAKY_SLOPE)
+                if noise is not None and self.dropout:
+                    kept = torch.rand(features.shape, generator=noise, device=features.device) >= self.dropout
+                    features = features * kept / (1.0 - self.dropout)
         logits = features.transpose(0, 1).float()
-        return logits.masked_fill(~self.there, -torch.inf)
+        return logits.masked_fill(~self.exists, -torch.inf)
 
 
 def _uniform(parameters: int, before: int, after: int, inputs: int) -> nn.Parameter:
-    """As a linear layer of torch begins."""
-    reach = 1.0 / math.sqrt(inputs)
-    return nn.Parameter(torch.empty(parameters, before, after).uniform_(-reach, reach))
+    """Initial weights as those of torch's linear layers."""
+    bound = 1.0 / math.sqrt(inputs)
+    return nn.Parameter(torch.empty(parameters, before, after).uniform_(-bound, bound))
 
 
 def _normed(norm: nn.Module, features: Tensor) -> Tensor:
-    """`norm` over clouds and points together."""
+    """Apply `norm` over clouds and points together."""
     normed: Tensor = norm(features.flatten(0, 1)).view(features.shape)
     return normed

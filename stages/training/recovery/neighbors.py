@@ -1,7 +1,7 @@
-"""Nearest neighbours and what they say at most, compiled: what an edge convolution is made of.
+"""Nearest neighbours and maxima over them, compiled: the parts of an edge convolution.
 
-A graph network as published makes a tensor (points, neighbours, 2 features) for each convolution. Here the linear part
-is done once a point, and only the greatest of each feature over the neighbours is ever written.
+The published graph network makes a tensor (points, neighbours, 2 features) for each convolution. Here the linear part
+is computed once for each point, and only the maximum of each feature over the neighbours is written.
 """
 
 from __future__ import annotations
@@ -15,38 +15,44 @@ import numpy as np
 import torch
 from torch import Tensor
 
-CELL_POINTS = 2
-"""Points in a cell of the grid that the neighbours of points in space are looked for in."""
+POINTS_PER_CELL = 2
+"""Of the grid in which neighbours are searched."""
 
 
 def nearest_neighbors(points: Tensor, k: int) -> Tensor:
-    """The `k` nearest of each point in its own cloud, the point itself the first, int64 (clouds, n, k) for float
-    (clouds, n, features).
+    """Find the `k` nearest of each point in its own cloud, itself first.
 
-    Exact. In space each cloud is sorted into a grid; elsewhere, and on a GPU, all distances are asked. Of points that
-    are equally far any may be taken.
+    Exact; points at equal distances are in any order. In space each cloud is sorted into a grid. In other dimensions
+    and on a GPU, all distances are computed.
+
+    points: float (clouds, n, features)
+    returns: int64 (clouds, n, k)
     """
-    found = points.detach()
-    if found.device.type == "cpu" and found.shape[-1] == 3:
-        return torch.from_numpy(_nearest_in_space(found.float().contiguous().numpy(), k)).long()
-    # in bfloat16 points a hundredth apart are one
-    with torch.autocast(found.device.type, enabled=False):
-        found = found.float()
-        squares = (found * found).sum(dim=-1)
-        closeness = 2.0 * found @ found.transpose(1, 2) - squares[:, None, :]
+    detached = points.detach()
+    if detached.device.type == "cpu" and detached.shape[-1] == 3:
+        return torch.from_numpy(_nearest_in_space(detached.float().contiguous().numpy(), k)).long()
+    # in bfloat16, points at a hundredth's distance coincide
+    with torch.autocast(detached.device.type, enabled=False):
+        exact = detached.float()
+        squares = (exact * exact).sum(dim=-1)
+        closeness = 2.0 * exact @ exact.transpose(1, 2) - squares[:, None, :]
         return closeness.topk(k, dim=-1).indices
 
 
 def edge_maximum(features: Tensor, neighbors: Tensor) -> Tensor:
-    """For each point the first half of its own features plus the greatest of each feature of the second half over its
-    neighbours: float (clouds, n, width) of `features` (clouds, n, 2 width) and `neighbors` int64 (clouds, n, k)."""
-    way = _EdgeMaximum if features.device.type == "cpu" else _EdgeMaximumAtOnce
-    edges: Tensor = way.apply(features, neighbors)  # type: ignore[no-untyped-call]
+    """Add to the first half of each point's features the maximum of the second half over its neighbours.
+
+    features: float (clouds, n, 2 width)
+    neighbors: int64 (clouds, n, k)
+    returns: float (clouds, n, width)
+    """
+    function = _EdgeMaximum if features.device.type == "cpu" else _EdgeMaximumOnGpu
+    edges: Tensor = function.apply(features, neighbors)  # type: ignore[no-untyped-call]
     return edges
 
 
 class _EdgeMaximum(torch.autograd.Function):
-    """The gradient goes to the neighbour that was the greatest, the first of several."""
+    """The gradient goes to the neighbour with the maximum, the first of several."""
 
     @staticmethod
     def forward(ctx: Any, features: Tensor, neighbors: Tensor) -> Tensor:
@@ -62,41 +68,41 @@ class _EdgeMaximum(torch.autograd.Function):
         incoming = gradient.float().contiguous().numpy()
         clouds, n, width = incoming.shape
         outgoing = np.zeros((clouds, n, 2 * width), np.float32)
-        _returned(incoming, ctx.chosen, outgoing)
+        _scatter_gradient(incoming, ctx.chosen, outgoing)
         return torch.from_numpy(outgoing).to(gradient.dtype), None
 
 
-class _EdgeMaximumAtOnce(torch.autograd.Function):
-    """The same for a GPU, of tensors of all edges.
+class _EdgeMaximumOnGpu(torch.autograd.Function):
+    """The same for a GPU, from tensors of all edges.
 
-    A sum that many threads add to hangs on their order, unless its terms are whole numbers: gradients are rounded to
-    a millionth of the greatest and added as such.
+    A sum over many threads depends on their order, unless its terms are integers. Gradients are rounded to a millionth
+    of the greatest and added as integers.
     """
 
-    FINEST = 2**20
-    """The greatest gradient in whole numbers: of up to 2,000 points at once it is within an int32."""
+    MAX_GRADIENT_STEPS = 2**20
+    """The sum over 2,000 points still fits into an int32."""
 
     @staticmethod
     def forward(ctx: Any, features: Tensor, neighbors: Tensor) -> Tensor:
         own, others = features.chunk(2, dim=-1)
         clouds = torch.arange(len(features), device=features.device)[:, None, None]
-        greatest, place = others[clouds, neighbors].max(dim=2)
-        ctx.save_for_backward(neighbors.gather(-1, place))
-        return own + greatest
+        maximum, index = others[clouds, neighbors].max(dim=2)
+        ctx.save_for_backward(neighbors.gather(-1, index))
+        return own + maximum
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
         (chosen,) = ctx.saved_tensors
-        step = gradient.detach().float().abs().amax().clamp(min=1e-30) / _EdgeMaximumAtOnce.FINEST
-        whole = (gradient.float() / step).round().to(torch.int32)
-        with _any_order():
-            sums = torch.zeros_like(whole).scatter_add_(1, chosen, whole)
+        step = gradient.detach().float().abs().amax().clamp(min=1e-30) / _EdgeMaximumOnGpu.MAX_GRADIENT_STEPS
+        steps = (gradient.float() / step).round().to(torch.int32)
+        with _nondeterministic():
+            sums = torch.zeros_like(steps).scatter_add_(1, chosen, steps)
         return torch.cat([gradient, (sums * step).to(gradient.dtype)], dim=-1), None
 
 
 @contextmanager
-def _any_order() -> Iterator[None]:
-    """Whole numbers are added in whatever order, which is many times faster than one by one."""
+def _nondeterministic() -> Iterator[None]:
+    """Sums of integers do not depend on their order, and any order is many times faster than a fixed one."""
     strict = torch.are_deterministic_algorithms_enabled()
     torch.use_deterministic_algorithms(False)
     try:
@@ -125,7 +131,7 @@ def _maximum(features, neighbors, edges, chosen):
 
 
 @numba.njit(cache=True)
-def _returned(incoming, chosen, outgoing):
+def _scatter_gradient(incoming, chosen, outgoing):
     clouds, n, width = incoming.shape
     for cloud in range(clouds):
         for i in range(n):
@@ -139,15 +145,15 @@ def _returned(incoming, chosen, outgoing):
 @numba.njit(cache=True)
 def _nearest_in_space(points, k):
     clouds, n, _ = points.shape
-    found = np.empty((clouds, n, k), np.int32)
+    nearest = np.empty((clouds, n, k), np.int32)
     for cloud in range(clouds):
-        _nearest_of_cloud(points[cloud], k, found[cloud])
-    return found
+        _nearest_of_cloud(points[cloud], k, nearest[cloud])
+    return nearest
 
 
 @numba.njit(cache=True)
-def _nearest_of_cloud(points, k, found):
-    """Rings of cells around a point are looked at until the k-th nearest is nearer than any cell that is left."""
+def _nearest_of_cloud(points, k, nearest):
+    """Search rings of cells around a point until the k-th nearest is nearer than any cell that is left."""
     n = len(points)
     low = np.empty(3, np.float32)
     side = np.float32(0.0)
@@ -155,7 +161,7 @@ def _nearest_of_cloud(points, k, found):
         low[axis] = points[:, axis].min()
         side = max(side, points[:, axis].max() - low[axis])
     # a surface passes through about 3 r^2 of r^3 cells
-    r = min(max(int(np.sqrt(n / (3.0 * CELL_POINTS))), 1), 64)
+    r = min(max(int(np.sqrt(n / (3.0 * POINTS_PER_CELL))), 1), 64)
     size = side / r if side > 0.0 else np.float32(1.0)
     cell = np.empty((n, 3), np.int32)
     first = np.zeros(r * r * r + 1, np.int32)
@@ -163,17 +169,17 @@ def _nearest_of_cloud(points, k, found):
         for axis in range(3):
             cell[i, axis] = min(int((points[i, axis] - low[axis]) / size), r - 1)
         first[(cell[i, 0] * r + cell[i, 1]) * r + cell[i, 2] + 1] += 1
-    for place in range(r * r * r):
-        first[place + 1] += first[place]
+    for flat_cell in range(r * r * r):
+        first[flat_cell + 1] += first[flat_cell]
     filled = first[:-1].copy()
     order = np.empty(n, np.int32)
     sorted_points = np.empty((n, 3), np.float32)
     for i in range(n):
-        place = (cell[i, 0] * r + cell[i, 1]) * r + cell[i, 2]
-        order[filled[place]] = i
+        flat_cell = (cell[i, 0] * r + cell[i, 1]) * r + cell[i, 2]
+        order[filled[flat_cell]] = i
         for axis in range(3):
-            sorted_points[filled[place], axis] = points[i, axis]
-        filled[place] += 1
+            sorted_points[filled[flat_cell], axis] = points[i, axis]
+        filled[flat_cell] += 1
     near = np.empty(k, np.float32)
     which = np.empty(k, np.int32)
     for i in range(n):
@@ -182,7 +188,7 @@ def _nearest_of_cloud(points, k, found):
         cx, cy, cz = cell[i, 0], cell[i, 1], cell[i, 2]
         for ring in range(r):
             if count == k:
-                # the nearest that a cell of this ring can be
+                # the least distance of a cell of this ring
                 gap = np.float32(ring - 1) * size
                 inside = min(
                     min(x - low[0] - cx * size, (cx + 1) * size - x + low[0]),
@@ -199,8 +205,8 @@ def _nearest_of_cloud(points, k, found):
                     c = cz - ring
                     while c <= cz + ring:
                         if 0 <= c < r:
-                            place = (a * r + b) * r + c
-                            for s in range(first[place], first[place + 1]):
+                            flat_cell = (a * r + b) * r + c
+                            for s in range(first[flat_cell], first[flat_cell + 1]):
                                 dx = sorted_points[s, 0] - x
                                 dy = sorted_points[s, 1] - y
                                 dz = sorted_points[s, 2] - z
@@ -216,4 +222,4 @@ def _nearest_of_cloud(points, k, found):
                                     count = min(count + 1, k)
                         c += step
         for slot in range(k):
-            found[i, slot] = which[slot]
+            nearest[i, slot] = which[slot]

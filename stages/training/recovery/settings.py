@@ -1,4 +1,4 @@
-"""What the config says of a model that recovers the parameters of a program."""
+"""Config of a model that recovers the parameters of a program."""
 
 from __future__ import annotations
 
@@ -18,28 +18,24 @@ class RecoveryModelConfig(ModelConfig):
 
     kind: Literal["recovery"] = Field("recovery", description="parameters of a program from a cloud or a drawing")
     programs: tuple[str, ...] = Field(
-        (), description="the programs that it is trained on, each by itself; that of the dataset if empty"
+        (), description="the programs to train for, one model each; empty: the program of the dataset"
     )
     input: Literal["points", "sketch"] = Field(
         "points", description="`points`: a DGCNN reads clouds; `sketch`: a small VGG reads line drawings"
     )
-    answers: Literal["classes", "values", "apart"] = Field(
+    prediction: Literal["classes", "regression", "separate_regression"] = Field(
         "classes",
-        description="`classes`: the network tells classes of all parameters apart; for comparison, `values`: "
-        "continuous ones are regressed, `apart`: and by an encoder of their own",
+        description="`classes`: every parameter is classified; for comparison, `regression`: continuous ones are "
+        "regressed, `separate_regression`: with an encoder of their own",
     )
-    existence: bool = Field(True, description="whether that a parameter is hidden is a class that is learnt, too")
+    learn_hidden: bool = Field(True, description="whether hidden parameters have a class of their own to learn")
     views: tuple[str, ...] = Field(
-        (),
-        strict=False,
-        description="the views of `sketches.views`, by name, that drawings are learnt from; all if empty",
+        (), strict=False, description="names of the views of `sketches.views` to draw from; empty: all"
     )
     learning_rate: float = Field(2e-3, gt=0, le=1, description="of Adam at the start; it falls to a twentieth")
     batch_size: int = Field(32, ge=2, le=65_536, description="inputs that a step of the optimiser sees; unit: inputs")
-    points: int = Field(512, ge=64, le=100_000, description="points of a cloud that are looked at; unit: points")
-    neighbors: int = Field(
-        20, ge=1, le=256, description="nearest neighbours that an edge convolution looks at; unit: points"
-    )
+    points: int = Field(512, ge=64, le=100_000, description="points of a cloud that the network sees; unit: points")
+    neighbors: int = Field(20, ge=1, le=256, description="nearest neighbours in an edge convolution; unit: points")
     widths: tuple[Size, ...] = Field(
         (16, 16, 32, 64), min_length=1, strict=False, description="features of each edge convolution"
     )
@@ -48,29 +44,30 @@ class RecoveryModelConfig(ModelConfig):
         min_length=2,
         max_length=10,
         strict=False,
-        description="features of each convolution of the VGG; after each two of them four pixels become one",
+        description="features of each convolution of the VGG; every second one is followed by pooling",
     )
     embedding: int = Field(
-        64, ge=1, le=4096, description="features that are pooled over the points: their greatest and their mean"
+        64, ge=1, le=4096, description="features that are pooled over the points, by maximum and by mean"
     )
     decoder: tuple[Size, Size] = Field((128, 64), strict=False, description="sizes of the two layers in each decoder")
-    dropout: float = Field(0.1, ge=0, lt=1, description="share of a decoder's features that are left out in a step")
-    noise: float = Field(
+    dropout: float = Field(0.1, ge=0, lt=1, description="share of a decoder's features that are dropped in a step")
+    augmented_share: float = Field(
         0.5,
         ge=0,
         le=1,
-        description="share of the inputs that are spoilt as scans and hand drawings are; unit: share",
+        description="share of the inputs that are corrupted as scans and hand drawings are; unit: share",
     )
-    validation: int = Field(256, ge=1, le=100_000, description="shapes that a round is judged by; unit: shapes")
-    pool: int = Field(
+    validation_shapes: int = Field(
+        256, ge=1, le=100_000, description="shapes that a round is validated on; unit: shapes"
+    )
+    shapes_per_round: int = Field(
         1600,
         ge=1,
         le=1_000_000,
-        description="shapes that are made for each round, beside those of the rounds before: it learns from all of "
-        "them; unit: shapes",
+        description="new shapes of each round, which learns from those of the rounds before as well; unit: shapes",
     )
 
     @property
     def is_baseline(self) -> bool:
-        """Whether it is there to be compared with alone (geocode Table 3)."""
-        return self.answers != "classes" or not self.existence
+        """Whether the model exists only for comparison (geocode Table 3)."""
+        return self.prediction != "classes" or not self.learn_hidden

@@ -1,7 +1,7 @@
-"""Shapes to learn from, made while a model learns: there is no end of them, and none comes from a dataset.
+"""Random shapes to train on, built while a model learns; none comes from a dataset.
 
-Every shape of a program has a place in [0, 1) (`stages/programs/draws.py`). What is learnt from, what a training is
-judged by and what tables are made of lie in intervals that do not meet, so no shape stands in two of them.
+The hash of a shape is in [0, 1) (`stages/programs/draws.py`). Training, validation and tests use disjoint intervals, so
+they share no shape.
 """
 
 from __future__ import annotations
@@ -25,14 +25,19 @@ TRAIN_INTERVAL: Interval = (0.0, 0.8)
 VALIDATION_INTERVAL: Interval = (0.8, 0.9)
 TEST_INTERVAL: Interval = (0.9, 1.0)
 
-AT_ONCE = 64
-"""Draws at a time, of which the first that is valid is taken."""
-FAILURES = 100
+DRAWS_PER_BATCH = 64
+"""The first valid draw of a batch is used."""
+MAX_CONSECUTIVE_FAILURES = 100
 
 
 @dataclass(frozen=True)
 class RandomShape:
-    """values: settled; classes: int64 (parameters,), the hidden class where a parameter is hidden; parts: the shape."""
+    """A shape of a program.
+
+    values: canonical
+    classes: int64 (parameters,), the hidden class for hidden parameters
+    parts: the shape
+    """
 
     values: dict[str, Value]
     classes: npt.NDArray[np.int64]
@@ -40,17 +45,18 @@ class RandomShape:
 
 
 def random_shapes(program: Program, interval: Interval, rng: np.random.Generator) -> Iterator[RandomShape]:
-    """Valid shapes without end, each with one value of one parameter that is visible, all others random: every value
-    of every parameter is fixed as often (geocode §4). Where the program fails, the next is taken.
+    """Yield valid shapes without end, each with one value of a visible parameter fixed and all others random.
 
-    Raises BuildError where it fails FAILURES times without a shape between."""
-    schema, every, share = program.schema, all_value_indices(program), Share(shapes=interval)
+    Every value of every parameter is fixed equally often (geocode §4). Shapes that the program fails to build are
+    skipped. Raises BuildError after MAX_CONSECUTIVE_FAILURES of them.
+    """
+    schema, indices, share = program.schema, all_value_indices(program), Share(shapes=interval)
     rows = {name: row for row, name in enumerate(schema.by_name)}
     failures = 0
     while True:
-        name, value = every[int(rng.integers(len(every)))]
-        fixed = (name, float(schema.by_name[name].values[value]))
-        draws = draw(schema, AT_ONCE, rng, off_grid=False, fixed=fixed)
+        name, index = indices[int(rng.integers(len(indices)))]
+        fixed = (name, float(schema.by_name[name].values[index]))
+        draws = draw(schema, DRAWS_PER_BATCH, rng, off_grid=False, fixed=fixed)
         for column in draws.owned(share).tolist():
             if not draws.visible[rows[name], column]:
                 continue
@@ -61,7 +67,7 @@ def random_shapes(program: Program, interval: Interval, rng: np.random.Generator
                 parts = tuple(program.parts(values))
             except BuildError:
                 failures += 1
-                if failures == FAILURES:
+                if failures == MAX_CONSECUTIVE_FAILURES:
                     raise
                 continue
             failures = 0
@@ -71,6 +77,6 @@ def random_shapes(program: Program, interval: Interval, rng: np.random.Generator
 
 
 def nearest_valid_values(program: Program, values: Values) -> dict[str, Value]:
-    """The nearest values that keep the program's constraints, or, where there are none, its base."""
-    found = repair(program, values)
-    return program.schema.canonical(program.schema.base)[0] if found is None else found
+    """The nearest values that keep the program's constraints, or its base where there are none."""
+    valid = repair(program, values)
+    return program.schema.canonical(program.schema.base)[0] if valid is None else valid

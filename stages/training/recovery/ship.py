@@ -1,7 +1,6 @@
 """Make trained models come with Shapemill: `python -m stages.training.recovery.ship OUT/chairs-models/clouds-chair-0`.
 
-For maintainers: what is put below `datasets/exemplars/models/` is committed, so that `make recover` works at once from
-a fresh clone.
+For maintainers: models below `datasets/exemplars/models/` are committed, so that `make recover` works in a fresh clone.
 """
 
 from __future__ import annotations
@@ -11,33 +10,30 @@ import sys
 from pathlib import Path
 
 from pipeline.paths import write_file
-from stages.recovery.recover import PRETRAINED_FOLDER
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes, load_checkpoint
-from stages.training.recovery.trained import RECOVERY_KIND, load_recovery, quantized_to_bytes
+from stages.training.recovery.trained import PRETRAINED_FOLDER, RECOVERY_KIND, load_recovery, quantized_to_bytes
 
 MAX_SHIPPED_BYTES = 4_000_000
-"""Bytes of a model that comes with a clone."""
-MOST_OF_BYTES = 2
-"""So many tensors may become bytes, which are coarser than halves."""
+MAX_BYTE_TENSORS = 2
+"""Bytes are coarser than half precision."""
 
 
 def slim_bytes(path: Path) -> bytes:
-    """The file of weights `path` with numbers of half precision, which answers nearly the same; where that is too
-    large, the largest of its tensors, one after the other, as bytes.
+    """Make the weights `path` smaller: half precision, and the largest tensors as bytes where that is too large.
 
-    Raises CheckpointError for weights that are not of a recovery model that can be used now, or too large still.
+    The model answers nearly the same. Raises CheckpointError for unusable weights and for those still too large.
     """
     load_recovery(path)
     tensors, header = load_checkpoint(path, {"kind": RECOVERY_KIND})
-    slim = {name: each.half() if each.is_floating_point() else each for name, each in tensors.items()}
+    slim = {name: tensor.half() if tensor.is_floating_point() else tensor for name, tensor in tensors.items()}
     content = checkpoint_bytes(slim, header)
-    for name in sorted(slim, key=lambda each: -slim[each].numel())[:MOST_OF_BYTES]:
+    for name in sorted(slim, key=lambda name: -slim[name].numel())[:MAX_BYTE_TENSORS]:
         if len(content) > MAX_SHIPPED_BYTES:
             slim |= quantized_to_bytes(name, tensors[name])
             content = checkpoint_bytes(slim, header)
     if len(content) > MAX_SHIPPED_BYTES:
         raise CheckpointError(
-            f"{path} takes {len(content):,} bytes at least, more than {MAX_SHIPPED_BYTES:,}: train a smaller one"
+            f"{path} takes at least {len(content):,} bytes, more than {MAX_SHIPPED_BYTES:,}: train a smaller model"
         )
     return content
 
@@ -46,9 +42,9 @@ def main(arguments: list[str]) -> int:
     """Put models where they are committed. Returns the exit code: 0, or 2 where one cannot be used."""
     parser = argparse.ArgumentParser(prog="stages.training.recovery.ship", description=__doc__.splitlines()[0])
     parser.add_argument("models", nargs="+", type=Path, metavar="MODEL", help="the folder of a published model")
-    asked = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     try:
-        for folder in asked.models:
+        for folder in options.models:
             weights = slim_bytes(folder / "weights.safetensors")
             card = (folder / "README.md").read_bytes()
             for name, content in (("weights.safetensors", weights), ("README.md", card)):

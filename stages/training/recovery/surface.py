@@ -1,4 +1,4 @@
-"""Points that lie evenly on a surface, and how far two clouds are apart."""
+"""Points on the surface of a shape, and the Chamfer distance of clouds."""
 
 from __future__ import annotations
 
@@ -10,22 +10,24 @@ from stages.points.area_sampling import sample_surface
 from stages.programs.curves.part import Part, joined
 from stages.shape.arrays import FloatArray, IntArray
 
-PLASTIC = 1.32471795724474602596
+PLASTIC_NUMBER = 1.32471795724474602596
 """Multiples of its inverse powers fill a square evenly (Roberts 2018)."""
 
 
 def even_points(vertices: FloatArray, faces: IntArray, n: int) -> FloatArray:
-    """`n` points on a mesh, float64 (n, 3), as many on each triangle as its area says, without any chance: a surface
-    that changes a little has points that move a little.
+    """Place `n` points on a mesh by area, float64 (n, 3), without randomness.
 
-    vertices: float64 (v, 3); faces: int32 (f, 3).
+    Where the surface changes a little, the points move a little.
+
+    vertices: float64 (v, 3)
+    faces: int32 (f, 3)
     """
     corners = vertices[faces]
     first, along, across = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    reach = np.cumsum(np.linalg.norm(np.cross(along, across), axis=1))
+    cumulative = np.cumsum(np.linalg.norm(np.cross(along, across), axis=1))
     steps = np.arange(n) + 0.5
-    hit = np.minimum(np.searchsorted(reach, steps / n * reach[-1]), len(faces) - 1)
-    a, b = (steps / PLASTIC) % 1.0, (steps / PLASTIC**2) % 1.0
+    hit = np.minimum(np.searchsorted(cumulative, steps / n * cumulative[-1]), len(faces) - 1)
+    a, b = (steps / PLASTIC_NUMBER) % 1.0, (steps / PLASTIC_NUMBER**2) % 1.0
     a, b = np.where(a + b > 1.0, 1.0 - a, a), np.where(a + b > 1.0, 1.0 - b, b)
     points: FloatArray = first[hit] + a[:, None] * along[hit] + b[:, None] * across[hit]
     return points
@@ -38,14 +40,14 @@ def shape_points(parts: Sequence[Part], n: int) -> FloatArray:
 
 
 def sample_points(parts: Sequence[Part], n: int, rng: np.random.Generator) -> FloatArray:
-    """`n` points on all parts of a shape together by chance, float64 (n, 3)."""
+    """Draw `n` random points from all parts of a shape together, float64 (n, 3)."""
     mesh = joined(parts).mesh
     return sample_surface(mesh.vertices, mesh.triangles, n, rng)[0]
 
 
 def squared_chamfer_distance(first: FloatArray, second: FloatArray) -> float:
-    """The mean squared distance from each point of a cloud (n, 3) to the nearest of the other (m, 3), and the same the
-    other way, added (geocode §4.2)."""
+    """The mean squared distance from each point of a cloud (n, 3) to the nearest of the other (m, 3), both ways, added
+    (geocode §4.2)."""
     from scipy.spatial import cKDTree
 
     there, _ = cKDTree(second).query(first)

@@ -1,4 +1,4 @@
-"""How a recovery model learns: shapes made meanwhile, the losses of all parameters, its validation (geocode §3.3)."""
+"""Training of a recovery model: prepared shapes, losses and validation (geocode §3.3)."""
 
 from __future__ import annotations
 
@@ -31,22 +31,20 @@ from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.shapes import TRAIN_INTERVAL, VALIDATION_INTERVAL, nearest_valid_values, random_shapes
 from stages.training.recovery.surface import sample_points, shape_points, squared_chamfer_distance
 
-JUDGED = 64
+VALIDATED_SHAPES = 64
 """Validation shapes whose recovery is measured."""
-MEASURED = 2048
-"""Points that it is measured with."""
+CHAMFER_POINTS = 2048
 
 Batch = tuple[Tensor, Tensor]
 """Inputs, and classes int64 (n, parameters)."""
 
 
 def prepare(task: Task) -> Outcome:
-    """Inputs of a program: those that its models are judged by, or those that they learn from in one round and all
-    after it.
+    """Prepare inputs of a program: the validation inputs, or those that training gets in a round and all after it.
 
     Files of the shard: `.safetensors`, with `inputs`, and `classes` int16 (n, parameters); `.json`, what they are.
-    Inputs to be judged by are clouds float32 (n, points, 3), training: `quantized_cloud` ones of twice as many points;
-    drawings are their bits uint8 (n, bytes).
+    Validation clouds are float32 (n, points, 3). Training clouds are quantized and have twice as many points. Drawings
+    are their bits, uint8 (n, bytes).
     """
     from safetensors.numpy import save
 
@@ -86,41 +84,45 @@ def entry(settings: Mapping[str, Any]) -> RecoveryModelConfig:
 
 
 def learner(task: Task, entry: RecoveryModelConfig, seed: int) -> RecoveryTask:
-    """A network with fresh weights beside what it learns from."""
+    """Make a network with fresh weights, and read its training and validation inputs."""
     from safetensors.numpy import load_file
 
     params = task.shard.params
     program, data, pools = find_program(params["program"]), params["data"], params["pools"]
     described = json.loads(task.input("training", f"{data}.json").read_bytes())
-    judged = task.input("training", f"{data}.safetensors")
+    validation = task.input("training", f"{data}.safetensors")
     header = {
         "parameters": parameter_descriptions(program),
-        # of every round the same: the rounds before are read again by it
-        "counts": {"train, a round": {"shapes": entry.pool}, "val": {"shapes": entry.validation}},
+        # the same in every round, since a round reads the weights of the round before by it
+        "counts": {"train, a round": {"shapes": entry.shapes_per_round}, "val": {"shapes": entry.validation_shapes}},
         "sketches": described["views"],
-        "data": {"val": file_digest(judged)},
+        "data": {"val": file_digest(validation)},
     }
-    learnt = [load_file(task.input("training", f"{pool}.safetensors")) for pool in pools]
-    train = {key: np.concatenate([each[key] for each in learnt]) for key in ("inputs", "classes")}
+    pooled = [load_file(task.input("training", f"{pool}.safetensors")) for pool in pools]
+    train = {key: np.concatenate([arrays[key] for arrays in pooled]) for key in ("inputs", "classes")}
     module = new_network(entry, program, seed).to(resolve_device(entry.device))
-    return RecoveryTask(module, header, entry, program, train, load_file(judged), described["texts"])
+    return RecoveryTask(module, header, entry, program, train, load_file(validation), described["texts"])
 
 
 def new_network(entry: RecoveryModelConfig, program: Program, seed: int) -> RecoveryNet:
-    """A network for a program with random weights, by its seed alone."""
+    """Make a network for a program with random weights, by its seed alone."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         return RecoveryNet(entry, program.parameters)
 
 
 def parameter_descriptions(program: Program) -> list[list[Any]]:
-    """Name, values and number of classes of each parameter: weights are of no use where any is another."""
-    return [[each.name, list(each.values), each.classes] for each in program.parameters]
+    """Name, values and number of classes of each parameter. Weights are of no use where any of it has changed."""
+    return [[parameter.name, list(parameter.values), parameter.classes] for parameter in program.parameters]
 
 
 @dataclass(frozen=True)
 class RecoveryTask:
-    """The `Learner` of a recovery model. train, val: their `inputs` and `classes`; texts: the validation shapes."""
+    """The `Learner` of a recovery model.
+
+    train, val: their `inputs` and `classes`
+    texts: the validation shapes
+    """
 
     module: RecoveryNet
     header: Mapping[str, Any]
@@ -132,60 +134,59 @@ class RecoveryTask:
 
     @property
     def device(self) -> torch.device:
-        """Where it learns."""
         return next(self.module.parameters()).device
 
     @cached_property
-    def answers(self) -> ParameterOutputs:
-        """What the outputs of the network say, on its device."""
+    def outputs(self) -> ParameterOutputs:
+        """How the outputs of the network are read, on its device."""
         return ParameterOutputs.of(self.entry, self.program.parameters).to(self.device)
 
     def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
-        """Inputs of shapes by chance, changed by chance; all there are lie on the device."""
+        """Yield augmented inputs of random shapes; all inputs are on the device."""
         noise = Generator(self.device).manual_seed(int(rng.integers(2**63)))
         inputs = torch.from_numpy(self.train["inputs"]).to(self.device)
         classes = torch.from_numpy(self.train["classes"].astype(np.int64)).to(self.device)
         while True:
             rows = torch.from_numpy(rng.integers(len(classes), size=self.entry.batch_size)).to(self.device)
             if self.entry.input == "points":
-                seen = augment_clouds(inputs[rows], self.entry.points, self.entry.noise, noise)
+                augmented = augment_clouds(inputs[rows], self.entry.points, self.entry.augmented_share, noise)
             else:
-                seen = augment_drawings(inputs[rows], self.entry.noise, rng, noise)
-            yield seen, classes[rows]
+                augmented = augment_drawings(inputs[rows], self.entry.augmented_share, rng, noise)
+            yield augmented, classes[rows]
 
     def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
-        """That of all parameters together, in nats of an input."""
+        """The loss of all parameters together, in nats of an input."""
         inputs, classes = batch
-        return {"loss": self.answers.loss_in_nats(self.module(inputs, noise), classes)}
+        return {"loss": self.outputs.loss_in_nats(self.module(inputs, noise), classes)}
 
     def validate(self, noise: Generator) -> dict[str, float]:
-        """On shapes that are never learnt from: nats; of the parameters that are visible, the share that is right and
-        that within one class; and the mean and the 95th percentile of how far the shapes with which a search begins are
-        from the true ones, squared, in sides of their boxes."""
+        """Figures on the validation shapes.
+
+        loss: in nats
+        accuracy, accuracy_within_one: share of the visible parameters with the right class, and within one class
+        chamfer, chamfer_p95: mean and 95th percentile of the squared Chamfer distances of the shapes where a search
+        begins, in sides of their boxes
+        """
         inputs = torch.from_numpy(self.val["inputs"]).to(self.device)
         read = unpack_drawings if self.entry.input == "sketch" else Tensor.float
-        found = torch.cat([self.module(read(each)) for each in torch.split(inputs, self.entry.batch_size)])
+        logits = torch.cat([self.module(read(batch)) for batch in torch.split(inputs, self.entry.batch_size)])
         classes = torch.from_numpy(self.val["classes"].astype(np.int64)).to(self.device)
-        counts = self.answers.counts
-        chances, visible = self.answers.probabilities(found), classes < counts
-        best = chances.argmax(dim=-1)
-        near = (best - classes).abs() <= 1
-        distances = [
-            self._distance(each, text)
-            for each, text in zip(chances[:JUDGED].double().cpu().numpy(), self.texts, strict=False)
-        ]
+        counts = self.outputs.counts
+        probabilities, visible = self.outputs.probabilities(logits), classes < counts
+        best = probabilities.argmax(dim=-1)
+        within_one = ((best - classes).abs() <= 1) & (best < counts)
+        rows = probabilities[:VALIDATED_SHAPES].double().cpu().numpy()
+        distances = [self._distance(row, text) for row, text in zip(rows, self.texts, strict=False)]
         return {
-            "loss": float(self.answers.loss_in_nats(found, classes)),
-            "right": float((best == classes)[visible].float().mean()),
-            "near": float((near & (best < counts))[visible].float().mean()),
+            "loss": float(self.outputs.loss_in_nats(logits, classes)),
+            "accuracy": float((best == classes)[visible].float().mean()),
+            "accuracy_within_one": float(within_one[visible].float().mean()),
             "chamfer": float(np.mean(distances)),
-            "chamfer_high": float(np.quantile(distances, 0.95)),
+            "chamfer_p95": float(np.quantile(distances, 0.95)),
         }
 
-    def _distance(self, chances: FloatArray, text: str) -> float:
-        schema = self.program.schema
-        recovered = nearest_valid_values(
-            self.program, estimate_from_probabilities(self.program, chances).values(self.program)
-        )
-        clouds = (shape_points(self.program.parts(each), MEASURED) for each in (recovered, schema.from_text(text)))
-        return squared_chamfer_distance(*(frame_of(each).normalized(each) for each in clouds))
+    def _distance(self, probabilities: FloatArray, text: str) -> float:
+        start = estimate_from_probabilities(self.program, probabilities).values(self.program)
+        shapes = (nearest_valid_values(self.program, start), self.program.schema.from_text(text))
+        clouds = (shape_points(self.program.parts(values), CHAMFER_POINTS) for values in shapes)
+        return squared_chamfer_distance(*(frame_of(cloud).normalized(cloud) for cloud in clouds))

@@ -22,8 +22,8 @@ from eval.recovery.accuracy import (
 )
 from stages.programs.program import find_program
 from stages.programs.schema import Values
-from stages.recovery.reading import RecoveryInput
-from stages.recovery.recover import RecoveryResult
+from stages.recovery.inputs import RecoveryInput
+from stages.recovery.result import RecoveryResult
 from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.shapes import TEST_INTERVAL, random_shapes
 from stages.training.recovery.trained import TrainedRecovery
@@ -36,7 +36,7 @@ STOOL = find_program(PROGRAM)
 def model(**settings: str) -> TrainedRecovery:
     small = {**SMALL, "widths": (8, 8), "channels": (2,) * 8, "decoder": (16, 8)}
     entry = RecoveryModelConfig.model_validate({**small, **settings})
-    header = {"program": PROGRAM, "figures": {"val_loss": 1.0, "val_chamfer_high": 0.01}}
+    header = {"program": PROGRAM, "figures": {"val_loss": 1.0, "val_chamfer_p95": 0.01}}
     return TrainedRecovery(new_network(entry, STOOL, 0).eval(), STOOL, entry, header)
 
 

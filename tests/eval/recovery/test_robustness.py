@@ -21,7 +21,7 @@ from eval.recovery.robustness import (
 )
 from eval.tables.recovery_robustness import _parts
 from pipeline.errors import ConfigError
-from stages.recovery.reading import RecoveryInput
+from stages.recovery.inputs import RecoveryInput
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.shapes import TEST_INTERVAL, random_shapes
 from stages.training.recovery.surface import sample_points

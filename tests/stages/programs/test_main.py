@@ -13,7 +13,7 @@ from PIL import Image
 from stages.programs.__main__ import main
 from stages.programs.program import build_shape
 from stages.programs.sheets import CELL_SIDE_PIXELS, values_showing
-from stages.recovery.recover import RecoveryResult
+from stages.recovery.result import RecoveryResult
 from stages.shape.views.portrait import PAPER
 from tests.stages.programs.stool import PROGRAM
 
@@ -61,7 +61,7 @@ def test_what_recovery_has_written_is_edited_as_it_is(tmp_path: Path, capsys: py
     low, high = ({**PROGRAM.schema.base, "height": height} for height in (0.4, 0.8))
     for name, values in (("low", low), ("high", high)):
         found = RecoveryResult(PROGRAM, values, 0.001, 0.1, 0.0, None, None, None, "y", 1, ())
-        (tmp_path / f"{name}.json").write_text(json.dumps({"input": name, **found.described()}))
+        (tmp_path / f"{name}.json").write_text(json.dumps({"input": name, **found.as_json()}))
     ends = [str(tmp_path / f"{name}.json") for name in ("low", "high")]
     assert main(["interpolate", STOOL, *ends, "--steps", "3", "--group", "seat", "--out", str(tmp_path / "way")]) == 0
     assert PROGRAM.schema.from_text((tmp_path / "way/step-01.json").read_text())["height"] == pytest.approx(0.6)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from stages.recovery.cloud_target import cloud_target
 from stages.recovery.refinement import refine
-from stages.recovery.targets import cloud_target
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.estimate import ParameterEstimate, base_estimate
 from tests.stages.recovery.test_recover import STOOL, TALL, cloud_of

@@ -7,8 +7,8 @@ import pytest
 
 from eval.recovery.robustness import CORRUPTIONS
 from stages.programs.program import find_program
+from stages.recovery.inputs import RecoveryInput
 from stages.recovery.outliers import find_outliers
-from stages.recovery.reading import RecoveryInput
 from stages.recovery.recover import recover
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import frame_of
@@ -54,5 +54,5 @@ def test_points_at_one_place_are_one() -> None:
 def test_one_is_told_how_many_were_left_out() -> None:
     cloud = spoilt("5 % outliers", cloud_of_chair(2048))
     found = recover(cloud, "chair", up="y", budget=1)
-    assert f"{int(find_outliers(cloud).sum())} points of the cloud stand alone" in " ".join(found.warnings)
-    assert "stand alone" not in " ".join(recover(cloud_of_chair(2048), "chair", up="y", budget=1).warnings)
+    assert f"{int(find_outliers(cloud).sum())} points of the cloud are outliers" in " ".join(found.warnings)
+    assert "outliers" not in " ".join(recover(cloud_of_chair(2048), "chair", up="y", budget=1).warnings)

@@ -9,10 +9,10 @@ import pytest
 
 from eval.recovery.robustness import CORRUPTIONS
 from stages.programs.program import find_program
+from stages.recovery.cloud_target import cloud_target
+from stages.recovery.inputs import RecoveryInput
 from stages.recovery.partial_target import PartialTarget, partial_target
-from stages.recovery.reading import RecoveryInput
 from stages.recovery.recover import recover, recover_input
-from stages.recovery.targets import cloud_target
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import Frame, frame_of
 from stages.training.recovery.shapes import TEST_INTERVAL, random_shapes
@@ -85,7 +85,7 @@ def test_a_torn_scan_is_recovered_and_told() -> None:
     found = recover(torn() * 7.0 + 3.0, "tests.stages.programs.stool", up="y", budget=120)
     assert off_by(found.values, TALL) < 0.1
     assert found.missing == pytest.approx(0.5, abs=0.1)
-    assert found.described()["partial"] is True
+    assert found.as_json()["partial"] is True
     assert any("the cloud is partial" in each for each in found.warnings)
     assert found.placement is not None
     # the stool is where the whole scan would have been
@@ -98,7 +98,7 @@ def test_a_torn_scan_is_recovered_and_told() -> None:
 def test_a_whole_scan_is_not_called_partial() -> None:
     found = recover(cloud_of(TALL), "tests.stages.programs.stool", up="y", budget=120)
     assert found.missing == 0.0
-    assert found.described()["partial"] is False
+    assert found.as_json()["partial"] is False
     assert not any("partial" in each for each in found.warnings)
 
 

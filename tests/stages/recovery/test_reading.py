@@ -12,7 +12,8 @@ import trimesh
 from PIL import Image, ImageDraw
 
 from pipeline.shards import ShardWriter, array_bytes
-from stages.recovery.reading import InputError, RecoveryInput, checked_cloud, ink_from_picture, read_inputs
+from stages.recovery.inputs import InputError, RecoveryInput, checked_cloud, ink_from_picture
+from stages.recovery.reading import read_inputs
 from stages.training.recovery.drawings import DRAWING_SIDE_PIXELS, fit_to_square
 
 RNG = np.random.default_rng(0)

@@ -18,10 +18,11 @@ from stages.programs.curves.part import joined
 from stages.programs.program import find_program
 from stages.programs.schema import Values
 from stages.recovery.__main__ import main
-from stages.recovery.reading import InputError, RecoveryInput, read_inputs
-from stages.recovery.recover import PRETRAINED_FOLDER, find_models, recover, recover_input
+from stages.recovery.cloud_target import cloud_target
+from stages.recovery.inputs import InputError, RecoveryInput
+from stages.recovery.reading import read_inputs
+from stages.recovery.recover import recover, recover_input
 from stages.recovery.refinement import refine
-from stages.recovery.targets import cloud_target
 from stages.sketches.settings import SketchesConfig, SketchView
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
 from stages.training.recovery.drawings import draw_fitted
@@ -30,7 +31,7 @@ from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.shapes import TEST_INTERVAL, TRAIN_INTERVAL, VALIDATION_INTERVAL, random_shapes
 from stages.training.recovery.ship import slim_bytes
 from stages.training.recovery.surface import shape_points, squared_chamfer_distance
-from stages.training.recovery.trained import load_recovery
+from stages.training.recovery.trained import PRETRAINED_FOLDER, find_models, load_recovery
 from stages.training.recovery.training import new_network, parameter_descriptions
 from tests.stages.training.recovery.toy import PROGRAM, SMALL, config, train
 
@@ -106,13 +107,13 @@ def test_a_drawing_says_from_where_it_is_seen(azimuth: float, elevation: float) 
     assert found.camera is not None
     assert found.camera.azimuth == pytest.approx(azimuth, abs=12.0)
     assert found.camera.elevation == pytest.approx(elevation, abs=12.0)
-    assert found.described()["camera"]["azimuth"] == found.camera.azimuth
-    assert recover(cloud_of(TALL, n=300), PROGRAM, up="y", budget=1).described()["camera"] is None
+    assert found.as_json()["camera"]["azimuth"] == found.camera.azimuth
+    assert recover(cloud_of(TALL, n=300), PROGRAM, up="y", budget=1).as_json()["camera"] is None
 
 
 def test_equal_questions_have_equal_answers() -> None:
     cloud = cloud_of(TALL, n=300)
-    assert recover(cloud, PROGRAM, budget=80).described() == recover(cloud, PROGRAM, budget=80).described()
+    assert recover(cloud, PROGRAM, budget=80).as_json() == recover(cloud, PROGRAM, budget=80).as_json()
 
 
 def test_what_is_no_stool_is_told() -> None:
@@ -172,7 +173,7 @@ def test_models_that_cannot_be_used_are_told_and_stop_nothing(tmp_path: Path) ->
         "program": PROGRAM,
         "parameters": parameter_descriptions(STOOL),
         "settings": settings,
-        "figures": {"val_loss": 2.0, "val_chamfer_high": 0.1},
+        "figures": {"val_loss": 2.0, "val_chamfer_p95": 0.1},
     }
     without = {name: value for name, value in good.items() if name != "program"}
     headers = {
@@ -208,7 +209,7 @@ def test_own_models_go_before_those_that_ship_and_the_best_before_others(tmp_pat
             "program": PROGRAM,
             "parameters": parameter_descriptions(STOOL),
             "settings": settings,
-            "figures": {"val_loss": loss, "val_chamfer_high": 0.1},
+            "figures": {"val_loss": loss, "val_chamfer_p95": 0.1},
         }
         (tmp_path / folder).mkdir(parents=True)
         (tmp_path / folder / "weights.safetensors").write_bytes(checkpoint_bytes(tensors, header))
@@ -243,7 +244,7 @@ def test_weights_too_large_in_halves_ship_their_largest_tensors_as_bytes(
     there = torch.isfinite(one)
     assert float((one - other)[there].detach().abs().max()) < 0.02 * float(one[there].detach().abs().max())
     monkeypatch.setattr("stages.training.recovery.ship.MAX_SHIPPED_BYTES", 1000)
-    with pytest.raises(CheckpointError, match="train a smaller one"):
+    with pytest.raises(CheckpointError, match="train a smaller model"):
         slim_bytes(path)
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import Tensor
 
-from stages.training.recovery.neighbors import _EdgeMaximumAtOnce, edge_maximum, nearest_neighbors
+from stages.training.recovery.neighbors import _EdgeMaximumOnGpu, edge_maximum, nearest_neighbors
 
 
 def distances(points: Tensor) -> Tensor:
@@ -60,7 +60,7 @@ def test_edge_maximum_and_its_gradient_are_those_of_all_edges() -> None:
     torch.testing.assert_close(found, expected)
     # a neighbour that is listed twice gets its gradient once here, and in two halves there: the same sum
     torch.testing.assert_close(gradient, wanted)
-    at_once = _EdgeMaximumAtOnce.apply(features, neighbors)
+    at_once = _EdgeMaximumOnGpu.apply(features, neighbors)
     (gradient,) = torch.autograd.grad((at_once * weight).sum(), features)
     torch.testing.assert_close(at_once, expected)
     torch.testing.assert_close(gradient, wanted, atol=1e-4, rtol=0)
@@ -71,7 +71,7 @@ def test_gradient_of_all_edges_at_once_leaves_determinism_as_it_was() -> None:
     torch.use_deterministic_algorithms(True)
     try:
         features = torch.randn(1, 9, 4, requires_grad=True)
-        _EdgeMaximumAtOnce.apply(features, torch.arange(9).repeat(1, 9, 1)).sum().backward()
+        _EdgeMaximumOnGpu.apply(features, torch.arange(9).repeat(1, 9, 1)).sum().backward()
         assert torch.are_deterministic_algorithms_enabled()
     finally:
         torch.use_deterministic_algorithms(strict)

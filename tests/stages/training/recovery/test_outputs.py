@@ -35,7 +35,7 @@ def test_classes_are_cross_entropies_summed_over_the_parameters() -> None:
 def test_what_is_regressed_is_a_place_among_the_classes() -> None:
     # 0.5 lies half of a half of the range above its middle, so a class and a half from the first
     outputs = torch.tensor([[[0.5, 9.0, 9.0], [0.0, 0.0, -torch.inf]]])
-    told = answers(answers="values")
+    told = answers(prediction="regression")
     assert told.positions(outputs)[0, 0] == 1.5
     assert told.probabilities(outputs)[0, 0].tolist() == [0.0, 0.5, 0.5]
     assert float(told.loss_in_nats(outputs, torch.tensor([[0, 0]]))) == pytest.approx(1.5**2 / 2 + math.log(2))
@@ -46,12 +46,12 @@ def test_what_is_regressed_is_a_place_among_the_classes() -> None:
 def test_without_the_existence_label_nothing_is_learnt_of_what_is_hidden() -> None:
     outputs = torch.tensor([[[1.0, 2.0, 3.0], [0.0, 5.0, 1.0]]])
     hidden = torch.tensor([[1, 2]])
-    both, one = answers().loss_in_nats(outputs, hidden), answers(existence=False).loss_in_nats(outputs, hidden)
+    both, one = answers().loss_in_nats(outputs, hidden), answers(learn_hidden=False).loss_in_nats(outputs, hidden)
     assert float(both - one) == pytest.approx(-float(torch.log_softmax(outputs[0, 1], dim=0)[2]))
 
 
 def test_two_networks_share_no_weight_but_see_the_same_cloud() -> None:
-    entry = RecoveryModelConfig.model_validate({**SMALL, "answers": "apart"}, strict=False)
+    entry = RecoveryModelConfig.model_validate({**SMALL, "prediction": "separate_regression"}, strict=False)
     net = new_network(entry, STOOL, 0)
     told = ParameterOutputs.of(entry, STOOL.parameters)
     outputs = net(torch.rand(4, 64, 3))
@@ -61,9 +61,9 @@ def test_two_networks_share_no_weight_but_see_the_same_cloud() -> None:
     assert any(each.grad is not None and each.grad.any() for each in net.other.parameters())
 
 
-@pytest.mark.parametrize("answer", ["classes", "values"])
-def test_a_guess_is_the_mean_of_what_is_likely(answer: str) -> None:
-    entry = RecoveryModelConfig.model_validate({**SMALL, "answers": answer}, strict=False)
+@pytest.mark.parametrize("prediction", ["classes", "regression"])
+def test_a_guess_is_the_mean_of_what_is_likely(prediction: str) -> None:
+    entry = RecoveryModelConfig.model_validate({**SMALL, "prediction": prediction}, strict=False)
     trained = TrainedRecovery(new_network(entry, STOOL, 0).eval(), STOOL, entry, {})
     guess = trained.estimate_from_cloud(np.random.default_rng(0).random((100, 3)), np.random.default_rng(0))
     values = guess.values(STOOL)
