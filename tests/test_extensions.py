@@ -26,7 +26,7 @@ CONFIG = {
     "pebbles": {"heaps": 2},
     "mass": {"density": 2.5},
     "points": {"uniform": 64},
-    "sketches": {"size": 64, "backend": "raster", "views": [{"name": "front"}]},
+    "sketches": {"size": 64, "renderer": "raster", "views": [{"name": "front"}]},
     "package": {"previewed": 4},
 }
 pytestmark = pytest.mark.slow

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
+from stages.shape.geometry.triangles import triangle_areas
 from stages.shape.graphs.neighbourhoods import admits
 from stages.shape.kit import Assembly, Kit
 from stages.variations.substructures.alignments import find_region_swaps
@@ -55,9 +56,7 @@ def known_exchanges(kit: Kit) -> list[Exchange]:
 def _areas(kit: Kit, assembly: Assembly) -> FloatArray:
     """Share of the surface that each part has, float64 (n,)."""
     corners = [kit.types[each].vertices[kit.types[each].faces] for each in assembly.types.tolist()]
-    areas = np.array(
-        [np.linalg.norm(np.cross(each[:, 1] - each[:, 0], each[:, 2] - each[:, 0]), axis=1).sum() for each in corners]
-    )
+    areas = np.array([triangle_areas(part).sum() for part in corners])
     shares: FloatArray = areas / areas.sum()
     return shares
 

@@ -15,6 +15,7 @@ import numpy as np
 from eval.engine.table import Cell, Table
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.pose import transform_points
+from stages.shape.geometry.triangles import area_vectors
 from stages.shape.shape import Shape
 
 COLUMNS = ("shapes of", "exemplars", "shapes", "radius", "similar %", "probes", "matched %", "worst", "motions")
@@ -166,7 +167,7 @@ class _Surface:
     def __init__(self, corners: FloatArray, radius: float, rng: np.random.Generator) -> None:
         import open3d as o3d
 
-        ways = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        ways = area_vectors(corners)
         doubled = np.linalg.norm(ways, axis=1)
         # slivers, such as cuts leave, have normals of rounding
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)

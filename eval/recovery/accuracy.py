@@ -21,10 +21,11 @@ from stages.recovery.inputs import RecoveryInput
 from stages.recovery.recover import recover_input
 from stages.recovery.result import RecoveryResult
 from stages.shape.arrays import BoolArray, FloatArray
+from stages.shape.geometry.clouds import chamfer_squared
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.drawings import draw_fitted
 from stages.training.recovery.shapes import TEST_INTERVAL, TRAIN_INTERVAL, RandomShape, random_shapes
-from stages.training.recovery.surface import sample_points, shape_points, squared_chamfer_distance
+from stages.training.recovery.surface import sample_points, shape_points
 from stages.training.recovery.trained import PRETRAINED_FOLDER, RecoveryModels, TrainedRecovery, find_models
 
 MEASURED = 10_000
@@ -79,7 +80,7 @@ class Found:
 def published_chamfer(first: FloatArray, second: FloatArray) -> float:
     """The mean squared distance to the nearest, the mean of both ways, of clouds (n, 3) that are each brought into the
     unit sphere around the middle of its box: as the published code measures."""
-    return squared_chamfer_distance(_in_sphere(first), _in_sphere(second)) / 2.0
+    return chamfer_squared(_in_sphere(first), _in_sphere(second)) / 2.0
 
 
 def held_out(
@@ -311,7 +312,7 @@ def _nearest(program: Program, rng: np.random.Generator) -> Method:
     def method(given: RecoveryInput) -> RecoveryResult:
         assert given.points is not None
         points = frame_of(given.points).normalized(given.points[:GLIMPSE])
-        distances = [squared_chamfer_distance(points, each) for _, each in known()]
+        distances = [chamfer_squared(points, each) for _, each in known()]
         values, _ = known()[int(np.argmin(distances))]
         return RecoveryResult(
             program, values, min(distances), min(distances), 0.0, None, None, None, "y", NEIGHBORS, ()

@@ -14,6 +14,7 @@ from stages.exemplars.model import Model
 from stages.points.area_sampling import sample_surface
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import rotation_angle, transform_points
+from stages.shape.geometry.triangles import triangle_areas
 
 FOOT = 0.01
 """What lies below this share of the height is the foot."""
@@ -116,7 +117,7 @@ def _foot(corners: FloatArray, axis: int) -> tuple[float, bool]:
     points = corners.reshape(-1, 3)
     height = points[:, axis]
     low = np.delete(points[height <= height.min() + FOOT * np.ptp(height)], axis, axis=1)
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    areas = triangle_areas(corners)
     middle = np.delete(areas @ corners.mean(axis=1) / max(areas.sum(), 1e-300), axis)
     try:
         hull = ConvexHull(low)

@@ -9,6 +9,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import rotation_angle
+from stages.shape.geometry.triangles import triangle_areas
 
 QUICK_CHECK = 24
 CANDIDATES = 4096
@@ -39,7 +40,7 @@ def comparable_mesh(vertices: FloatArray, faces: IntArray) -> ComparableMesh:
     from stages.shape.geometry.mesh_pairs import build_tree
 
     corners = vertices[faces]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    areas = triangle_areas(corners)
     centroid = (corners.mean(axis=1) * areas[:, None]).sum(axis=0) / areas.sum()
     used = vertices[np.unique(faces)] - centroid
     diagonal = float(np.linalg.norm(np.ptp(used, axis=0)))

@@ -12,6 +12,7 @@ from stages.exemplars.congruence import comparable_mesh, congruences
 from stages.exemplars.model import STATED_IN_CONFIG, Model
 from stages.exemplars.settings import MAX_CONTACT_TOLERANCE
 from stages.shape.arrays import IntArray
+from stages.shape.geometry.components import connected_components
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
 
@@ -31,12 +32,7 @@ NAMED = 5
 
 def connected_pieces(assembly: Assembly) -> IntArray:
     """The piece that each part belongs to, int32 (n,): parts of one piece are connected; piece 0 is the largest."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    edges = assembly.edges
-    graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(len(assembly), len(assembly)))
-    _, piece = connected_components(graph, directed=False)
+    piece = connected_components(len(assembly), assembly.edges)
     order = np.argsort(-np.bincount(piece), kind="stable")
     rank = np.empty(len(order), dtype=np.int32)
     rank[order] = np.arange(len(order))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.shape.geometry.components import connected_components
 
 
 def face_outward(vertices: FloatArray, faces: IntArray, original: IntArray) -> IntArray:
@@ -37,9 +38,6 @@ def flipped_faces(faces: IntArray, original: IntArray) -> BoolArray:
 
 def _sheets(faces: IntArray) -> tuple[IntArray, BoolArray]:
     """The sheet of each face, connected across edges that two faces share, and whether each sheet has no border."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(len(faces)), 3)
     order = np.lexsort((edges[:, 1], edges[:, 0]))
@@ -47,11 +45,10 @@ def _sheets(faces: IntArray) -> tuple[IntArray, BoolArray]:
     first = np.flatnonzero(np.r_[True, (edges[1:] != edges[:-1]).any(axis=1)])
     size = np.diff(np.r_[first, len(edges)])
     inner = first[size == 2]
-    graph = coo_array((np.ones(len(inner)), (owner[inner], owner[inner + 1])), shape=(len(faces), len(faces)))
-    count, sheet = connected_components(graph, directed=False)
-    closed = np.ones(count, dtype=bool)
+    sheet = connected_components(len(faces), np.column_stack([owner[inner], owner[inner + 1]]))
+    closed = np.ones(sheet.max(initial=-1) + 1, dtype=bool)
     closed[sheet[owner[first[size != 2]]]] = False
-    return sheet.astype(np.int32), closed
+    return sheet, closed
 
 
 def _outermost(vertices: FloatArray, faces: IntArray, sheet: IntArray, solid: BoolArray) -> IntArray:

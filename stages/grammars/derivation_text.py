@@ -13,6 +13,7 @@ from stages.grammars.derivation import START, Derivation, grid_poses
 from stages.grammars.grammar import ShapeGrammar
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, transform_points
+from stages.shape.geometry.triangles import triangle_areas
 from stages.shape.kit import Assembly
 from stages.shape.shape import Shape
 
@@ -174,14 +175,14 @@ def surface_digest(grammar: ShapeGrammar, pieces: list[PlacedTerminal]) -> str:
             for each in pieces
         ]
     )
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    areas = triangle_areas(corners)
     area = float(areas.sum())
     weight = (areas[:, None] * _WEIGHTS).reshape(-1) / area
     points = np.einsum("qk,tkd->tqd", _POINTS, corners).reshape(-1, 3)
     points = (points - weight @ points) / np.sqrt(area)
     squared = (points**2).sum(axis=1)
     own = grammar.exemplar.vertices[grammar.exemplar.faces]
-    whole = np.linalg.norm(np.cross(own[:, 1] - own[:, 0], own[:, 2] - own[:, 0]), axis=1).sum() / 2
+    whole = triangle_areas(own).sum()
     moments = [
         area / whole,
         *np.linalg.eigvalsh((points * weight[:, None]).T @ points),

@@ -22,6 +22,7 @@ from stages.grammars.files import load_grammar
 from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.scans.scanned_grid import ScannedCloud
 from stages.shape.geometry.pose import transform_points
+from stages.shape.geometry.triangles import unit_normals
 
 ROW = np.dtype([("place", "<f8", 3), ("normal", "<f4", 3), ("color", "u1", 3)])
 HEADER = """\
@@ -48,9 +49,8 @@ def cloud_of_text(grammar: ShapeGrammar, text: str) -> ScannedCloud:
     for piece in placed_terminals(grammar, parse_derivation(grammar, text)):
         mesh = grammar.meshes[piece.mesh]
         corners = transform_points(piece.pose, mesh.vertices)[mesh.faces]
-        ways = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         points.append(corners.mean(axis=1))
-        normals.append(ways / np.linalg.norm(ways, axis=1)[:, None])
+        normals.append(unit_normals(corners))
         colors.append(mesh.face_colors)
     return ScannedCloud(np.concatenate(points), np.concatenate(colors), np.concatenate(normals))
 

@@ -21,6 +21,7 @@ from stages.grammars.extraction.extract import ExtractedGrammar
 from stages.grammars.grammar import Grid, ShapeGrammar, site_name
 from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.geometry.pose import transform_points
+from stages.shape.geometry.triangles import area_vectors
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
 from stages.shape.views.camera import Camera, eye_rotation
@@ -131,7 +132,7 @@ def _editing(found: ExtractedGrammar) -> Iterator[list[Cell]]:
 def _facing(soup: Soup, up: Literal["y", "z"]) -> Camera:
     """Of cameras all around that which sees most of a surface, if nothing stands before it."""
     sides = [replace(CAMERA, azimuth=CAMERA.azimuth + 360.0 / SIDES * each) for each in range(SIDES)]
-    ways = np.cross(soup.corners[:, 1] - soup.corners[:, 0], soup.corners[:, 2] - soup.corners[:, 0])
+    ways = area_vectors(soup.corners)
     seen = [np.clip(ways @ eye_rotation(each.azimuth, each.elevation, up)[2], 0.0, None).sum() for each in sides]
     return sides[int(np.argmax(np.round(seen, 9)))]
 

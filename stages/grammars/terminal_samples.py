@@ -11,6 +11,7 @@ import numpy as np
 from stages.grammars.bounded_cache import BoundedCache
 from stages.grammars.grammar import ShapeGrammar
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.triangles import unit_normals
 from stages.shape.kit import PartMesh
 from stages.symmetry.surface.clip import fragments
 from stages.symmetry.surface.grid import CELLS_PER_RADIUS
@@ -64,8 +65,7 @@ class TerminalSamples:
 def sample_surface(part: PartMesh, size: float) -> SurfaceSamples:
     """The samples of a mesh on a lattice of cells of this size."""
     corners = part.vertices[part.faces]
-    ways = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = ways / np.maximum(np.linalg.norm(ways, axis=1), 1e-300)[:, None]
+    normals = unit_normals(corners)
     where, owner, middles = fragments(corners, corners.min(axis=(0, 1)) - size / 3, size)
     _, first = np.unique((pack(where) << FACING) + facing_axis(normals)[owner], return_index=True)
     return SurfaceSamples(np.ascontiguousarray(middles[first, :3]), normals[owner[first]])

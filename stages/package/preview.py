@@ -67,7 +67,7 @@ def draw_preview(task: Task) -> Outcome:
             sections.append(Section(row.title, _rows(cells), row.caption(task.config)))
     with task.output(f"{task.shard.name}.png") as stream:
         stream.write(picture_png(contact_sheet(sections, params["title"], CELL_PIXELS)))
-    return Outcome(samples=0, summary={"backend": backend, "renderer": renderer_version(backend)})
+    return Outcome(samples=0, summary={"renderer": backend, "renderer_version": renderer_version(backend)})
 
 
 def varied(samples: Sequence[tuple[Sample, Shape]], count: int) -> list[tuple[Sample, Shape]]:

@@ -139,7 +139,7 @@ def report(plan: Plan) -> Sequence[str]:
     samples, size = sum(shard["samples"] for shard in shards), sum(shard["bytes"] for shard in shards) / 1e6
     return [
         f"dataset {plan.config.name}: {samples:,} samples in {len(shards)} shards, {size:,.1f} MB",
-        f"preview drawn by {drawn['backend']}, {drawn['renderer']}",
+        f"preview drawn by {drawn['renderer']}, {drawn['renderer_version']}",
     ]
 
 

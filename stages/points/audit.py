@@ -10,6 +10,7 @@ from stages.points.visibility import MIN_HIT_DISTANCE_SHARE, view_directions
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import PackagedSample
+from stages.shape.geometry.triangles import area_vectors, unit_normals
 
 NEAR = 1e-5
 """Points are 32-bit numbers: as a share of the shape's size they lie as near to its surface as this."""
@@ -57,7 +58,7 @@ def _strangers(
     corners, parts = sample.rays.triangles
     nearest, distances = sample.rays.nearest(points)
     own = parts[nearest] == instances
-    along = np.einsum("ij,ij->i", normals, _unit_normals(corners[nearest])) > 1.0 - ALONG
+    along = np.einsum("ij,ij->i", normals, unit_normals(corners[nearest])) > 1.0 - ALONG
     doubtful = np.flatnonzero(~(own & along & (distances <= near)))
     off = turned = 0
     for part in np.unique(instances[doubtful]).tolist():
@@ -66,7 +67,7 @@ def _strangers(
         gaps = _distances(points[mine], triangles)
         touching = gaps <= near
         off += int((~touching.any(axis=1)).sum())
-        fitting = normals[mine] @ _unit_normals(triangles).T > 1.0 - ALONG
+        fitting = normals[mine] @ unit_normals(triangles).T > 1.0 - ALONG
         turned += int((touching.any(axis=1) & ~(touching & fitting).any(axis=1)).sum())
     return off, turned
 
@@ -84,25 +85,18 @@ def _unseen(sample: PackagedSample, points: FloatArray) -> int:
     return len(points)
 
 
-def _unit_normals(corners: FloatArray) -> FloatArray:
-    """Normals of triangles float64 (t, 3, 3) by their winding; zero where a triangle has no area."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    unit: FloatArray = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
-    return unit
-
-
 def _distances(points: FloatArray, corners: FloatArray) -> FloatArray:
     """Distance of each of n points from each of t triangles, float64 (n, t), by barycentric regions."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    inside = _plane_distances(points, a, b, c)
+    inside = _plane_distances(points, corners)
     edges = np.minimum.reduce([_segment_distances(points, *ends) for ends in ((a, b), (b, c), (c, a))])
     return np.minimum(inside, edges)
 
 
-def _plane_distances(points: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+def _plane_distances(points: FloatArray, corners: FloatArray) -> FloatArray:
     """Distance from the plane of a triangle where the foot of the point lies inside, else infinite."""
-    normals = np.cross(b - a, c - a)
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    normals = area_vectors(corners)
     area = np.einsum("ij,ij->i", normals, normals)
     safe = np.where(area > 0, area, 1.0)
     away = points[:, None] - a[None]

@@ -19,6 +19,7 @@ import numpy as np
 from stages.programs.curves.part import Part
 from stages.recovery.cloud_target import QUERY_POINTS, SEARCHED_POINTS
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.triangles import triangle_areas
 from stages.training.recovery.clouds import Frame, frame_of
 from stages.training.recovery.surface import sample_points, shape_points
 
@@ -182,7 +183,7 @@ def partial_target(points: FloatArray, rng: np.random.Generator) -> PartialTarge
     # joggled, since a scan may be flat
     hull = ConvexHull(normalized, qhull_options="QJ Pp")
     corners = normalized[hull.simplices]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    areas = triangle_areas(corners)
     planes = hull.equations[np.argsort(-areas, kind="stable")[:MAX_CUT_PLANES]]
     return PartialTarget(normalized, cKDTree(normalized[:SEARCHED_POINTS]), planes, Frame(np.zeros(3), 1.0), None)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.collection.pairs import CONTACTS, pairs_of
+from stages.shape.geometry.components import connected_components
 from stages.shape.geometry.contact import ContactTest, overlapping_boxes
 from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.penetration import PenetrationTest, depth_bound
@@ -23,7 +24,6 @@ from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.patterns import MAX_UP_DIFFERENCE
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
-from stages.shape.physics.stability import components
 from stages.shape.shape import Shape, kit_shape, mesh_name
 from stages.shape.stretch import STRETCHED_DEPTH, StretchedMesh, split
 
@@ -56,7 +56,7 @@ def assembly_faults(kit: Kit, assembly: Assembly, upright: bool = True) -> list[
     """
     names = [f"{kit.types[kind].name}.{part:03d}" for part, kind in enumerate(assembly.types.tolist())]
     faults = _faults(kit, assembly, [kit.types[kind] for kind in assembly.types.tolist()], names)
-    if components(len(assembly), assembly.edges).any():
+    if connected_components(len(assembly), assembly.edges).any():
         faults.append("it is not in one piece")
     faults += [
         f"{names[i]} and {names[j]} touch as no exemplar shows"

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray, IntArray, TypeArray
+from stages.shape.geometry.triangles import triangle_areas
 
 ContactKind = Literal["point", "line", "face"]
 
@@ -60,7 +61,7 @@ class PartMesh:
     def centroid(self) -> FloatArray:
         """Area-weighted centroid of the surface, float64 (3,): unmoved by every symmetry of the part."""
         corners = self.vertices[self.faces]
-        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        areas = triangle_areas(corners)
         centroid: FloatArray = (corners.mean(axis=1) * areas[:, None]).sum(axis=0) / areas.sum()
         return centroid
 

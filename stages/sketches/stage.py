@@ -35,8 +35,8 @@ def run_shard(task: Task) -> Outcome:
     summary = {
         "split": task.shard.params["split"],
         "views": [view.name for view in config.views],
-        "backend": config.renderer,
-        "renderer": renderer_version(config.renderer),
+        "renderer": config.renderer,
+        "renderer_version": renderer_version(config.renderer),
     }
     return Outcome(samples, summary)
 
@@ -65,7 +65,7 @@ def drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene) -
 def report(plan: Plan) -> Sequence[str]:
     """What drew the sketches: one line, or several where machines differ."""
     summaries = (plan.summary("sketches", name) for name in plan.shards("sketches"))
-    drawn = Counter(f"{each['backend']}, {each['renderer']}" for each in summaries if each is not None)
+    drawn = Counter(f"{each['renderer']}, {each['renderer_version']}" for each in summaries if each is not None)
     return [f"{count} shards drawn by {what}" for what, count in sorted(drawn.items())]
 
 

@@ -11,9 +11,9 @@ from stages.shape.collection.audit import Audit
 from stages.shape.collection.discovery import languages
 from stages.shape.collection.packaged import PackagedSample
 from stages.shape.collection.pairs import CONTACTS, JOINTS
+from stages.shape.geometry.components import connected_components
 from stages.shape.physics.judge import judge_of, physical_fields
 from stages.shape.physics.settings import PhysicsConfig
-from stages.shape.physics.stability import components
 
 ROUNDED = 2e-6
 """Numbers of a record are rounded to so many."""
@@ -73,7 +73,7 @@ def _pair_faults(sample: PackagedSample) -> Iterator[str]:
         places = pairs[0].astype(np.int64) * parts + pairs[1]
         if (np.diff(places) <= 0).any():
             yield f"{member} is not in order, or has a pair twice"
-    if components(parts, sample.arrays[JOINTS].T).max() + 1 != physics["components"]:
+    if connected_components(parts, sample.arrays[JOINTS].T).max() + 1 != physics["components"]:
         yield "its joints do not make as many components as physics says"
 
 

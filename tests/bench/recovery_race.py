@@ -20,11 +20,12 @@ from torch import Tensor, nn
 
 from stages.programs.program import Program, find_program
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.clouds import chamfer_squared
 from stages.training.recovery.augmentation import quantized_cloud
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.shapes import TRAIN_INTERVAL, VALIDATION_INTERVAL, nearest_valid_values, random_shapes
-from stages.training.recovery.surface import sample_points, shape_points, squared_chamfer_distance
+from stages.training.recovery.surface import sample_points, shape_points
 from stages.training.recovery.training import RecoveryTask, new_network
 from tests.bench.published_dgcnn import PublishedDGCNN
 
@@ -137,7 +138,7 @@ def _judged(program: Program, read: Callable[[FloatArray], Tensor], judged: Clou
     for chosen, each in zip(best.tolist(), values, strict=True):
         found = nearest_valid_values(program, program.schema.from_classes(chosen))
         pair = (shape_points(program.parts(shown), MEASURED) for shown in (found, each))
-        distances.append(squared_chamfer_distance(*(frame_of(points).normalized(points) for points in pair)))
+        distances.append(chamfer_squared(*(frame_of(points).normalized(points) for points in pair)))
     return float(nats), float((best == truth)[visible].float().mean()), float(np.mean(distances))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from stages.programs.curves.mesh import QuadMesh
 from stages.programs.curves.vectors import cross, dots
 from stages.shape.arrays import IntArray
+from stages.shape.geometry.components import connected_components
 
 
 def mesh_defects(mesh: QuadMesh) -> list[str]:
@@ -66,22 +67,18 @@ def _folded(mesh: QuadMesh) -> int:
 
 def _surface_faults(mesh: QuadMesh, faces: IntArray, way: np.ndarray) -> list[str]:
     """Vertices where surfaces only touch, and surfaces inside out; every edge has two faces."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     corner = np.arange(faces.size)
     pairs = np.argsort(way, kind="stable").reshape(-1, 2)
     # Across an edge the start of one side is the end of the other.
     after = corner - corner % 3 + (corner + 1) % 3
     one = np.concatenate([pairs[:, 0], after[pairs[:, 0]]])
     two = np.concatenate([after[pairs[:, 1]], pairs[:, 1]])
-    links = coo_matrix((np.ones(len(one)), (one, two)), shape=(faces.size, faces.size))
-    umbrellas = connected_components(links, directed=False)[0]
+    umbrellas = int(connected_components(faces.size, np.column_stack([one, two])).max(initial=-1)) + 1
     faults = []
     if umbrellas > len(mesh.vertices):
         faults.append(f"surfaces touch in a vertex alone at {umbrellas - len(mesh.vertices)} places")
-    links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0] // 3, pairs[:, 1] // 3)), shape=(len(faces), len(faces)))
-    surfaces, owner = connected_components(links, directed=False)
+    owner = connected_components(len(faces), pairs // 3)
+    surfaces = int(owner.max(initial=-1)) + 1
     a, b, c = (mesh.vertices[faces[:, k]] - mesh.vertices.mean(axis=0) for k in range(3))
     volumes = np.bincount(owner, weights=dots(a, cross(b, c)), minlength=surfaces)
     if (volumes <= 0.0).any():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.components import connected_components
 
 
 def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> np.ndarray:
@@ -45,7 +46,7 @@ def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> 
     size = np.diff(np.r_[first, len(sides)])
     simple = np.column_stack([first[size == 2], first[size == 2] + 1])
     owner = sides[:, 3] // 3
-    region = _numbered(np.concatenate([owner[simple], pairs[0] // 3]), len(faces))
+    region = connected_components(len(faces), np.concatenate([owner[simple], pairs[0] // 3]))
     matched = [simple]
     for begin, count in zip(first[size > 2].tolist(), size[size > 2].tolist(), strict=True):
         there = np.arange(begin, begin + count)
@@ -59,25 +60,12 @@ def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> 
 
 def connected_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> IntArray:
     """For each face corner the vertex that it is, int32 (f, 3), in a mesh where no edge has more than two faces."""
-    return _numbered(joined_corners(vertices, faces, kinds), 3 * len(faces)).reshape(-1, 3)
+    return connected_components(3 * len(faces), joined_corners(vertices, faces, kinds)).reshape(-1, 3)
 
 
 def connected_faces(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> IntArray:
     """The component of each face, int32 (f,), numbered in the order of their first faces."""
-    return _numbered(joined_corners(vertices, faces, kinds) // 3, len(faces))
-
-
-def _numbered(pairs: np.ndarray, count: int) -> IntArray:
-    """Connected components of a graph on `count` nodes, numbered in the order of their first nodes."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    _, component = connected_components(graph, directed=False)
-    _, appearance, inverse = np.unique(component, return_index=True, return_inverse=True)
-    rank = np.empty(len(appearance), dtype=np.int32)
-    rank[np.argsort(appearance)] = np.arange(len(appearance), dtype=np.int32)
-    return rank[inverse.reshape(-1)]
+    return connected_components(len(faces), joined_corners(vertices, faces, kinds) // 3)
 
 
 def _couples(region: IntArray, forward: np.ndarray) -> tuple[list[tuple[int, int]], np.ndarray]:

@@ -11,6 +11,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.polygons import cut, polygon_area
 
 LEAF = 4
 
@@ -272,25 +273,6 @@ def near_pairs(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> np.ndarr
 
 
 @numba.njit(cache=True)
-def _clip(polygon, count, n, offset, out):
-    """The part of a polygon where n . x <= offset (Sutherland and Hodgman); its corner count."""
-    kept = 0
-    for k in range(count):
-        after = (k + 1) % count
-        dk = _dot(n, polygon[k]) - offset
-        dl = _dot(n, polygon[after]) - offset
-        if dk <= 0.0:
-            out[kept] = polygon[k]
-            kept += 1
-        if (dk < 0.0 and dl > 0.0) or (dk > 0.0 and dl < 0.0):
-            t = dk / (dk - dl)
-            for axis in range(3):
-                out[kept, axis] = polygon[k, axis] + t * (polygon[after, axis] - polygon[k, axis])
-            kept += 1
-    return kept
-
-
-@numba.njit(cache=True)
 def contact_patches(ca, cb, pairs, pose, tolerance):
     """Where mesh `b` touches mesh `a`: for each pair of near triangles the share of the first near the second.
 
@@ -327,10 +309,10 @@ def contact_patches(ca, cb, pairs, pose, tolerance):
         for k in range(3):
             one[k] = first[k]
         base = _dot(nb, tri[0])
-        count = _clip(one, 3, nb, base + tolerance, two)
+        count = cut(one, 3, nb, 1.0, base + tolerance, two)
         for axis in range(3):
             nb[axis] = -nb[axis]
-        count = _clip(two, count, nb, -base + tolerance, one)
+        count = cut(two, count, nb, 1.0, -base + tolerance, one)
         for k in range(3):
             if count == 0:
                 break
@@ -345,19 +327,12 @@ def contact_patches(ca, cb, pairs, pose, tolerance):
                 continue
             for axis in range(3):
                 edge[axis] /= length
-            count = _clip(one, count, edge, _dot(edge, tri[k]) + tolerance, two)
+            count = cut(one, count, edge, 1.0, _dot(edge, tri[k]) + tolerance, two)
             one, two = two, one
         if count == 0:
             continue
         if abs(_dot(na, nb)) > 0.99:
-            x, y, z = 0.0, 0.0, 0.0
-            for k in range(1, count - 1):
-                ux, uy, uz = one[k, 0] - one[0, 0], one[k, 1] - one[0, 1], one[k, 2] - one[0, 2]
-                vx, vy, vz = one[k + 1, 0] - one[0, 0], one[k + 1, 1] - one[0, 1], one[k + 1, 2] - one[0, 2]
-                x += uy * vz - uz * vy
-                y += uz * vx - ux * vz
-                z += ux * vy - uy * vx
-            area[index] = (x * x + y * y + z * z) ** 0.5 / 2
+            area[index] = polygon_area(one, count)
         for k in range(count):
             points[total] = one[k]
             total += 1

@@ -10,12 +10,13 @@ from typing import Any, Literal
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.shape.geometry.components import connected_components
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.physics.contacts import ContactPatches, PairContacts
 from stages.shape.physics.settings import PhysicsConfig, Requirements
 from stages.shape.physics.settling import Body, tilt_to_fall
 from stages.shape.physics.solids import MeshSolids, PlacedParts
-from stages.shape.physics.stability import Stability, components, stability, standing_points, tipping_angle
+from stages.shape.physics.stability import Stability, stability, standing_points, tipping_angle
 from stages.shape.physics.structure import ground_share, mirror_score
 from stages.shape.shape import Shape
 
@@ -89,7 +90,7 @@ class Judge:
         connected = self._connected(placed, assembly)
         if _floating(placed, connected, self.config).any():
             return 0.0
-        pieces = components(len(placed), connected)
+        pieces = connected_components(len(placed), connected)
         return min(tilt_to_fall(_body(placed, pieces == piece), placed.diagonal) for piece in range(pieces.max() + 1))
 
     def contacts(self, assembly: Assembly) -> IntArray:
@@ -114,7 +115,7 @@ class Judge:
             margin=found.margin,
             weakest=found.weakest,
             tipping_degrees=tipping_angle(placed, standing),
-            components=int(components(len(placed), connected).max()) + 1,
+            components=int(connected_components(len(placed), connected).max()) + 1,
             floating=int(floating.sum()),
             penetration=float(volumes.sum() / whole) if whole > 0 else 0.0,
             ground=ground_share(placed, standing),
@@ -185,7 +186,7 @@ def _body(placed: PlacedParts, own: BoolArray) -> Body:
 
 def _floating(placed: PlacedParts, connected: np.ndarray, config: PhysicsConfig) -> np.ndarray:
     """Which parts no chain of connected parts leads to the ground, bool (n,)."""
-    pieces = components(len(placed), connected)
+    pieces = connected_components(len(placed), connected)
     low = placed.spans[:, 0, 2] <= config.connected * placed.diagonal
     found: np.ndarray = ~np.isin(pieces, pieces[low])
     return found

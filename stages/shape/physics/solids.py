@@ -10,6 +10,7 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.polygons import convex_hull
+from stages.shape.geometry.triangles import triangle_areas
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.physics.boxes import box_corners, recognise_boxes
 
@@ -41,12 +42,9 @@ class MeshSolids:
         found, centres, axes, halves = recognise_boxes(np.stack([meshes[index].vertices for index in eights]))
         faces = np.stack([meshes[index].faces for index in eights])
         corners = np.stack([meshes[index].vertices for index in eights])[np.arange(len(eights))[:, None, None], faces]
-        areas = np.linalg.norm(
-            np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]), axis=2
-        )
         sides = 8 * (halves * np.roll(halves, 1, axis=1)).sum(axis=1)
         # Twelve triangles with the area of the six sides are the sides: none is missing, none is there twice.
-        found &= np.abs(areas.sum(axis=1) / 2 - sides) <= 1e-4 * sides
+        found &= np.abs(triangle_areas(corners).sum(axis=1) - sides) <= 1e-4 * sides
         for index, row in zip(eights, range(len(eights)), strict=True):
             if found[row]:
                 self.boxes[index] = True
@@ -58,9 +56,8 @@ class MeshSolids:
         corners = mesh.vertices[mesh.faces]
         origin = mesh.vertices.mean(axis=0)
         a, b, c = (corners[:, k] - origin for k in range(3))
-        doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         cones = np.einsum("fc,fc->f", a, np.cross(b, c)) / 6
-        self.areas[index] = doubled.sum() / 2
+        self.areas[index] = triangle_areas(corners).sum()
         if _has_inside(mesh.faces) and cones.sum() > 1e-9 * mesh.diagonal**3:
             self.volumes[index] = cones.sum()
             self.centroids[index] = origin + ((a + b + c) / 4 * cones[:, None]).sum(axis=0) / cones.sum()

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.components import connected_components
 from stages.shape.geometry.polygons import convex_hull, inside_margin
 from stages.shape.physics.contacts import ContactPatches, PairContacts
 from stages.shape.physics.equilibrium import load_limits
@@ -39,18 +40,6 @@ class Stability:
     stable: bool
     margin: float
     weakest: int
-
-
-def components(count: int, pairs: IntArray) -> np.ndarray:
-    """The component of each of `count` parts that `pairs` (m, 2) connect, int (count,), numbered by first part."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    labels = connected_components(graph, directed=False)[1]
-    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
-    found: np.ndarray = np.argsort(np.argsort(first))[inverse]
-    return found
 
 
 def standing_points(placed: PlacedParts, body_of: np.ndarray, tolerance: float) -> ContactPatches:
@@ -98,7 +87,7 @@ def stability(
     """
     count = len(placed)
     tolerance = config.touching * placed.diagonal
-    pieces = components(count, connected)
+    pieces = connected_components(count, connected)
     between, pull = _no_patches(), np.empty(0)
     if config.joints == "dry":
         pieces, between = _dry_joints(placed, touch, connected, deep, tolerance)
@@ -141,7 +130,7 @@ def _dry_joints(
     """The bodies that parts which reach into each other make, and the patches between bodies."""
     shallow = connected[~_among(connected, deep)]
     patches, locked = touch.patches(placed, shallow, tolerance)
-    pieces = components(len(placed), np.concatenate([deep, shallow[locked]]))
+    pieces = connected_components(len(placed), np.concatenate([deep, shallow[locked]]))
     first, second = pieces[patches.first], pieces[patches.second]
     apart = first != second
     return pieces, ContactPatches(
@@ -157,7 +146,7 @@ def _among(pairs: IntArray, some: IntArray) -> np.ndarray:
 def _reach(pieces: np.ndarray, between: ContactPatches, standing: ContactPatches) -> np.ndarray:
     """For each part whether its body rests on the ground, by way of other bodies or not, bool (n,)."""
     links = np.stack([between.first, between.second], axis=1).astype(np.int32)
-    groups = components(int(pieces.max()) + 1, links)
+    groups = connected_components(int(pieces.max()) + 1, links)
     found: np.ndarray = np.isin(groups[pieces], groups[pieces[standing.first]])
     return found
 

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
+from stages.shape.geometry.triangles import unit_normals
 from stages.shape.kit import PartMesh
 from stages.shape.shape import Shape
 
@@ -53,11 +54,7 @@ class MeshSet:
     @cached_property
     def normals(self) -> FloatArray:
         """Unit normal of each face in mesh coordinates, float64 (f, 3); zero for a face without area."""
-        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
-        normals = np.cross(b - a, c - a)
-        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        unit: FloatArray = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
-        return unit
+        return unit_normals(self.vertices[self.faces])
 
     @cached_property
     def corner_normals(self) -> Float32Array:

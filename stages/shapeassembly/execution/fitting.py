@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.clouds import chamfer_l1
 from stages.shapeassembly.execution.differentiable import DifferentiableProgram
 from stages.shapeassembly.execution.interpreter import Execution, execute
 from stages.shapeassembly.execution.parameters import MIN_CUBOID_SIZE, parameter_ranges, parameters, with_parameters
@@ -56,7 +57,7 @@ def fit(
     )
     states = rng.spawn(2)
     before, after = (
-        chamfer_distance(surface_points(execute(each), samples, state), points)
+        chamfer_l1(surface_points(execute(each), samples, state), points)
         for each, state in zip((program, fitted), states, strict=True)
     )
     return FitResult(fitted, before, after)
@@ -143,11 +144,6 @@ def _descended(
 
 def _bound(values: FloatArray | float) -> Tensor:
     return torch.as_tensor(values, dtype=torch.float64)
-
-
-def chamfer_distance(a: FloatArray, b: FloatArray) -> float:
-    """Mean distance of each point of `a`, (n, 3), to the nearest of `b`, (m, 3), plus the same the other way round."""
-    return float(cKDTree(b).query(a)[0].mean() + cKDTree(a).query(b)[0].mean())
 
 
 def surface_points(execution: Execution, count: int, rng: np.random.Generator) -> FloatArray:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.components import connected_components
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly
-from stages.shape.physics.stability import components
 from stages.string_sampling.instantiation.guidance import WITHOUT_GUIDE, Guide
 from stages.string_sampling.instantiation.placements import find_placements
 from stages.string_sampling.instantiation.reach import new_reach
@@ -86,7 +86,7 @@ class Instantiator:
         Where `method.whole` is false the graph tells of some contacts only, and others may be there if the grammar
         admits them. A `guide` says which places are tried first.
         """
-        if not len(labels) or components(len(labels), np.asarray(edges)).any():
+        if not len(labels) or connected_components(len(labels), np.asarray(edges)).any():
             return Instantiation(None, NOT_CONNECTED, 0)
         if method.whole and not self._admitted(labels, edges):
             return Instantiation(None, NOT_ADMITTED, 0)

@@ -9,6 +9,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.shape.geometry.components import connected_components
 from stages.symmetry.matching.cell_lookup import is_among, items_in
 from stages.symmetry.surface.grid import SurfaceGrid
 from stages.symmetry.surface.lattice import cell_index, cell_of
@@ -203,12 +204,7 @@ def _links(kept, regions, regions_back, neighbours, points, starts, motion, orig
 def _dependent(links: np.ndarray, count: int, count_back: int) -> list[tuple[np.ndarray, np.ndarray]]:
     """Connected components of the graph of regions, `count` of the surface and `count_back` of its image; those with
     regions of both."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    total = count + count_back
-    graph = coo_array((np.ones(len(links), dtype=bool), (links[:, 0], count + links[:, 1])), shape=(total, total))
-    number, component = connected_components(graph, directed=False)
-    groups = _members(component, number)
+    component = connected_components(count + count_back, links + np.array([0, count]))
+    groups = _members(component, int(component.max(initial=-1)) + 1)
     split = [(each[each < count], each[each >= count] - count) for each in groups]
     return [(own, other) for own, other in split if len(own) and len(other)]

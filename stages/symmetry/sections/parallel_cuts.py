@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
+from stages.shape.geometry.triangles import unit_normals
 from stages.symmetry.sections.cross_sections import CrossSection, cross_section, shared_share
 from stages.symmetry.surface.boundary_lines import SAME_ANGLE
 from stages.symmetry.surface.corner_frames import creases
@@ -77,8 +78,7 @@ def find_parallel_cuts(corners: FloatArray) -> list[ParallelCuts]:
     which are then equal, whatever stands between them: parts that stand between joints can change places.
     """
     corners = corners[has_area(corners)]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    normals = unit_normals(corners)
     extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
     places, vertices = weld(corners, FINE * extent)
     edges, _, _ = creases(places, normals)

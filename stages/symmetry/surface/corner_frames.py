@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.triangles import unit_normals
 from stages.symmetry.surface.welding import sides_by_edge, weld
 
 CREASE = 0.4
@@ -37,8 +38,7 @@ def corner_frames(corners: FloatArray, tolerance: float) -> CornerFrames:
     Of each corner those frames are taken whose kind is the first in order, all of them where several are equal.
     """
     places, vertices = weld(corners, tolerance)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    normals = unit_normals(corners)
     edges, turns, outwards = creases(places, normals)
     ends = np.concatenate([edges, edges[:, ::-1]])
     turns, outwards = np.concatenate([turns, turns]), np.concatenate([outwards, outwards])

@@ -8,6 +8,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.shape.geometry.triangles import triangle_areas, unit_normals
 from stages.symmetry.surface.boundary_lines import SAME_ANGLE, boundary_lines, sides_that_go_on
 from stages.symmetry.surface.clip import fragments
 from stages.symmetry.surface.lattice import neighbours_of, pack, unpack
@@ -85,8 +86,7 @@ def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
     packed, owner, middles = packed[order], owner[order], middles[order]
     keys, first = np.unique(packed, return_index=True)
     cells = unpack(keys)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    normals = unit_normals(corners)
     starts = np.append(first, len(packed))
     tolerance = SAME_PLACE * size
     planes = _planes(starts, owner, middles, normals, tolerance)
@@ -119,15 +119,14 @@ def estimate_grid_size(corners: FloatArray, radius: float) -> int:
     if not len(corners):
         return 0
     size = radius / CELLS_PER_RADIUS * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-    area = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
-    return len(corners) + round(1.5 * area / 2 / size**2)
+    area = float(triangle_areas(corners).sum())
+    return len(corners) + round(1.5 * area / size**2)
 
 
 def has_area(corners: FloatArray) -> BoolArray:
     """Which of triangles (f, 3, 3) have area, bool (f,)."""
     sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
-    doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    found: BoolArray = doubled > THIN * sides**2
+    found: BoolArray = 2 * triangle_areas(corners) > THIN * sides**2
     return found
 
 

@@ -9,7 +9,9 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.shape.geometry.components import connected_components
 from stages.shape.geometry.pose import invert, transform_points
+from stages.shape.geometry.triangles import triangle_areas
 from stages.symmetry.matching.cell_lookup import is_among
 from stages.symmetry.surface.clip import cut_triangles, fragments
 from stages.symmetry.surface.grid import SurfaceGrid
@@ -38,9 +40,7 @@ class Soup:
     @cached_property
     def areas(self) -> FloatArray:
         """Area of each triangle, float64 (t,)."""
-        ways = self.corners[:, 1:] - self.corners[:, :1]
-        found: FloatArray = np.linalg.norm(np.cross(ways[:, 0], ways[:, 1]), axis=1) / 2
-        return found
+        return triangle_areas(self.corners)
 
     @cached_property
     def area(self) -> float:
@@ -160,8 +160,6 @@ def _middles_in(corners, pose, origin, size, keys, low, high):
 def connected_soups(soup: Soup, origin: FloatArray, size: float) -> list[Soup]:
     """The pieces of a soup that occupy no neighbouring cells of the lattice with a corner at `origin` (3,) and cells of
     `size`, in the order of their first triangles."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
 
     if not len(soup):
@@ -169,8 +167,7 @@ def connected_soups(soup: Soup, origin: FloatArray, size: float) -> list[Soup]:
     where, owner, _ = fragments(soup.corners, origin, size)
     cells, place = np.unique(where, axis=0, return_inverse=True)
     beside = KDTree(cells).query_pairs(1.8, output_type="ndarray")
-    graph = coo_array((np.ones(len(beside), dtype=bool), beside.T), shape=(len(cells), len(cells)))
-    _, component = connected_components(graph, directed=False)
+    component = connected_components(len(cells), beside)
     piece = np.full(len(soup), -1)
     piece[owner] = component[place.reshape(-1)]
     order = list(dict.fromkeys(piece[piece >= 0].tolist()))

@@ -9,6 +9,7 @@ import numpy as np
 from stages.points.area_sampling import sample_surface
 from stages.programs.curves.part import Part, joined
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.triangles import triangle_areas
 
 PLASTIC_NUMBER = 1.32471795724474602596
 """Multiples of its inverse powers fill a square evenly (Roberts 2018)."""
@@ -24,7 +25,7 @@ def even_points(vertices: FloatArray, faces: IntArray, n: int) -> FloatArray:
     """
     corners = vertices[faces]
     first, along, across = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    cumulative = np.cumsum(np.linalg.norm(np.cross(along, across), axis=1))
+    cumulative = np.cumsum(triangle_areas(corners))
     steps = np.arange(n) + 0.5
     hit = np.minimum(np.searchsorted(cumulative, steps / n * cumulative[-1]), len(faces) - 1)
     a, b = (steps / PLASTIC_NUMBER) % 1.0, (steps / PLASTIC_NUMBER**2) % 1.0
@@ -43,13 +44,3 @@ def sample_points(parts: Sequence[Part], n: int, rng: np.random.Generator) -> Fl
     """Draw `n` random points from all parts of a shape together, float64 (n, 3)."""
     mesh = joined(parts).mesh
     return sample_surface(mesh.vertices, mesh.triangles, n, rng)[0]
-
-
-def squared_chamfer_distance(first: FloatArray, second: FloatArray) -> float:
-    """The mean squared distance from each point of a cloud (n, 3) to the nearest of the other (m, 3), both ways, added
-    (geocode §4.2)."""
-    from scipy.spatial import cKDTree
-
-    there, _ = cKDTree(second).query(first)
-    back, _ = cKDTree(first).query(second)
-    return float((there**2).mean() + (back**2).mean())

@@ -19,6 +19,7 @@ from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Task
 from stages.programs.program import Program, find_program
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.clouds import chamfer_squared
 from stages.sketches.settings import SketchesConfig
 from stages.training.loop import resolve_device
 from stages.training.recovery.augmentation import augment_clouds, augment_drawings, quantized_cloud, unpack_drawings
@@ -29,7 +30,7 @@ from stages.training.recovery.model import RecoveryNet
 from stages.training.recovery.outputs import ParameterOutputs
 from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.shapes import TRAIN_INTERVAL, VALIDATION_INTERVAL, nearest_valid_values, random_shapes
-from stages.training.recovery.surface import sample_points, shape_points, squared_chamfer_distance
+from stages.training.recovery.surface import sample_points, shape_points
 
 VALIDATED_SHAPES = 64
 """Validation shapes whose recovery is measured."""
@@ -189,4 +190,4 @@ class RecoveryTask:
         start = estimate_from_probabilities(self.program, probabilities).values(self.program)
         shapes = (nearest_valid_values(self.program, start), self.program.schema.from_text(text))
         clouds = (shape_points(self.program.parts(values), CHAMFER_POINTS) for values in shapes)
-        return squared_chamfer_distance(*(frame_of(cloud).normalized(cloud) for cloud in clouds))
+        return chamfer_squared(*(frame_of(cloud).normalized(cloud) for cloud in clouds))

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stages.shape.arrays import Float32Array, FloatArray, IntArray
+from stages.shape.geometry.triangles import triangle_areas
 from stages.shape.kit import Assembly, Kit
 
 SEEDS = 24
@@ -64,7 +65,7 @@ class PackedShapes:
     """
 
     def __init__(self, kit: Kit, assemblies: Iterable[Assembly], upright: bool) -> None:
-        area = np.array([_surface_area(each.vertices, each.faces) for each in kit.types])
+        area = np.array([triangle_areas(kind.vertices[kind.faces]).sum() for kind in kit.types])
         centroids = np.stack([each.centroid for each in kit.types])
         rotations: dict[bytes, int] = {}
         kept: list[FloatArray] = []
@@ -136,11 +137,6 @@ class PackedShapes:
         common = np.minimum(self._counts[shape], self._counts[others]) @ self._tables.area
         bounds: FloatArray = common / np.maximum(self._tables.areas[shape], self._tables.areas[others])
         return bounds
-
-
-def _surface_area(vertices: FloatArray, faces: np.ndarray) -> float:
-    a, b, c = vertices[faces].transpose(1, 0, 2)
-    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
 def _seeds(areas: FloatArray) -> Indices:

@@ -50,7 +50,7 @@ def test_points_that_cannot_be_seen_are_found() -> None:
     every = sample()
     claimed = {**every.record, "points": {**every.record["points"], "surface": "visible"}}
     points, normals = (every.arrays[f"{name}.npy"].astype(float) for name in ("points", "normals"))
-    hidden = ~seen_from_outside(every.casting, points, normals)
+    hidden = ~seen_from_outside(every.rays, points, normals)
     x, y, z = (points - [100.0, 0.0, 0.0]).T
     in_box = (np.abs([x - 0.3, y, z]) < 0.49).all(axis=0)
     in_drum = (np.hypot(x, z) < 0.49) & (np.abs(y) < 0.49)

@@ -76,7 +76,7 @@ def make(folder: Path, program: str, samples: int, *stages: str) -> tuple[list[R
     """Run `stages` on a sweep, here and now: how each shard ended, all samples, and the report of the first stage."""
     section = {"program": program, "mode": "random", "random": {"samples": samples}, "splits": {"shards": 2}}
     small = {"points": {"uniform": 64}, "package": {"previewed": 2}}
-    small["sketches"] = {"size": 48, "backend": "raster", "views": [{"name": "front"}]}
+    small["sketches"] = {"size": 48, "renderer": "raster", "views": [{"name": "front"}]}
     path = folder / "toy.yaml"
     path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "programs": section, **small}))
     found = find_stages()

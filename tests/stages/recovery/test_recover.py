@@ -23,6 +23,7 @@ from stages.recovery.inputs import InputError, RecoveryInput
 from stages.recovery.reading import read_inputs
 from stages.recovery.recover import recover, recover_input
 from stages.recovery.refinement import refine
+from stages.shape.geometry.clouds import chamfer_squared
 from stages.sketches.settings import SketchesConfig, SketchView
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
 from stages.training.recovery.drawings import draw_fitted
@@ -30,7 +31,7 @@ from stages.training.recovery.estimate import base_estimate
 from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.shapes import TEST_INTERVAL, TRAIN_INTERVAL, VALIDATION_INTERVAL, random_shapes
 from stages.training.recovery.ship import slim_bytes
-from stages.training.recovery.surface import shape_points, squared_chamfer_distance
+from stages.training.recovery.surface import shape_points
 from stages.training.recovery.trained import PRETRAINED_FOLDER, find_models, load_recovery
 from stages.training.recovery.training import new_network, parameter_descriptions
 from tests.stages.training.recovery.toy import PROGRAM, SMALL, config, train
@@ -93,7 +94,7 @@ def test_clouds_of_any_place_size_and_axis_come_back(up: str, asked: bool) -> No
     assert found.placement is not None
     there = shape_points(STOOL.parts(found.values), 2000) @ found.placement[:3, :3].T + found.placement[:3, 3]
     # the cloud is forty times as large as the stool
-    assert squared_chamfer_distance(there, turned) < 0.004 * 40**2
+    assert chamfer_squared(there, turned) < 0.004 * 40**2
     assert np.linalg.det(found.placement[:3, :3]) > 0
     assert any("no trained model" in each for each in found.warnings)
 

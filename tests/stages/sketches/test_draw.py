@@ -101,9 +101,9 @@ def test_impossible_settings_are_refused():
         SketchesConfig.model_validate({"augment": {"dilate": 0.7, "erode": 0.7}})
 
 
-def test_the_backend_that_is_gone_is_refused_with_the_name_of_the_one_that_draws():
-    with pytest.raises(ValueError, match="raycast draws no more: write raster"):
-        SketchesConfig.model_validate({"backend": "raycast"})
+def test_unknown_renderer_is_refused_with_the_names_of_those_that_exist():
+    with pytest.raises(ValueError, match="'raster' or 'egl'"):
+        SketchesConfig.model_validate({"renderer": "raycast"})
 
 
 def test_views_can_be_a_list_as_yaml_has_it():

@@ -80,7 +80,7 @@ STAGES = named_inputs(
 
 def toys(flat: bool = False, **keys: object) -> Config:
     """The config of a small dataset; `keys` are of the section `sketches`."""
-    sketches = SketchesConfig.model_validate({"size": 48, "backend": "raster", **keys})
+    sketches = SketchesConfig.model_validate({"size": 48, "renderer": "raster", **keys})
     sections = {
         **ABSENT_SECTIONS,
         "exemplars": KitsConfig(),
@@ -141,7 +141,7 @@ def test_where_the_backend_of_the_config_cannot_draw_nothing_starts(tmp_path, mo
 def test_the_records_and_the_report_say_what_drew(tmp_path):
     turn(tmp_path)
     records = [json.loads(path.read_bytes()) for path in tmp_path.rglob("sketches/records/*.json")]
-    drawn = {(each["summary"]["backend"], each["summary"]["renderer"]) for each in records}
+    drawn = {(each["summary"]["renderer"], each["summary"]["renderer_version"]) for each in records}
     assert len(records) == 2
     assert drawn == {("raster", RasterRenderer.name)}
     status = list(status_lines(toys(), STAGES, DatasetPaths(tmp_path, "toys"), workers=1))

@@ -27,7 +27,7 @@ from stages.package.croissant import INDEX
 from stages.package.index import index_row, tar_bytes, write_index
 from stages.package.manifest import checksums
 from stages.shape.collection.pairs import CONTACTS, pair_bytes, pairs_of
-from stages.shape.physics.stability import components
+from stages.shape.geometry.components import connected_components
 from stages.verification.shard import shard_samples
 from stages.verification.verify import verify_dataset
 
@@ -456,7 +456,7 @@ def _contacts(it: Forged, change: Callable[[list[list[int]]], list[list[int]]]) 
     record = it.record
     pairs = change(pairs_of(it.members[CONTACTS]).tolist())
     it.members[CONTACTS] = pair_bytes(np.array(pairs, dtype=np.int32).reshape(-1, 2))
-    pieces = components(len(record["parts"]), np.array(pairs).reshape(-1, 2)).max() + 1
+    pieces = connected_components(len(record["parts"]), np.array(pairs).reshape(-1, 2)).max() + 1
     record["counts"]["pieces"] = int(pieces)
     record["counts"]["cycles"] = len(pairs) - len(record["parts"]) + int(pieces)
     record["counts"]["contacts"] = len(pairs)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.triangles import triangle_areas
 from stages.shapeassembly.extraction.boxes import bounding_box
 from stages.shapeassembly.extraction.hierarchy import Box
 
@@ -39,7 +40,7 @@ def _largest_sides(normals: FloatArray, triangles: FloatArray) -> FloatArray:
     """Directions (k, 3) of the hull's largest sides; opposite and coplanar triangles (t, 3, 3) are one side."""
     flipped = np.where(normals[np.arange(len(normals)), np.abs(normals).argmax(axis=1), None] < 0, -normals, normals)
     kinds, kind = np.unique(np.round(flipped, 3) + 0.0, axis=0, return_inverse=True)
-    areas = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+    areas = triangle_areas(triangles)
     total = np.bincount(kind.ravel(), areas, len(kinds))
     first = np.unique(kind.ravel(), return_index=True)[1]
     chosen = np.argsort(-total, kind="stable")[:MAX_HULL_SIDES]

@@ -42,7 +42,7 @@ STOOLS = {
     },
     "abstraction": {"programs": True},
     "points": {"uniform": 128},
-    "sketches": {"size": 64, "backend": "raster", "views": [{"name": "front"}]},
+    "sketches": {"size": 64, "renderer": "raster", "views": [{"name": "front"}]},
     "package": {"previewed": 2},
 }
 KITS = {"exemplars": {"kits": [stated({"name": "fort", "shapes": ["datasets/exemplars/playground/fort.glb"]})]}}

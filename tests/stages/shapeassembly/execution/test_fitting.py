@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from stages.shape.geometry.clouds import chamfer_l1
 from stages.shapeassembly import execute, parse
 from stages.shapeassembly.analysis.structure import signature
-from stages.shapeassembly.execution.fitting import chamfer_distance, fit, fit_cuboids, surface_points
+from stages.shapeassembly.execution.fitting import fit, fit_cuboids, surface_points
 from stages.shapeassembly.execution.parameters import parameter_ranges, parameters, with_parameters
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.validity import execution_boxes
@@ -25,7 +26,7 @@ def test_a_perturbed_chair_is_fitted_back() -> None:
     values = parameters(CHAIR)
     start = with_parameters(CHAIR, np.clip(values + rng.normal(0, 0.05, len(values)) * (high > low), low, high))
     done = fit(start, points, rng, steps=80, samples=800)
-    floor = chamfer_distance(surface_points(execute(CHAIR), 800, rng), points)
+    floor = chamfer_l1(surface_points(execute(CHAIR), 800, rng), points)
     assert done.before > 1.5 * floor
     assert done.after < 1.15 * floor
     assert signature(done.program) == signature(CHAIR)

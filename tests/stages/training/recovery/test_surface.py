@@ -6,8 +6,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stages.shape.geometry.clouds import chamfer_squared
 from stages.training.recovery.clouds import frame_of, subsample
-from stages.training.recovery.surface import even_points, squared_chamfer_distance
+from stages.training.recovery.surface import even_points
 
 SQUARES = np.array([[0, 0, 0], [3, 0, 0], [3, 1, 0], [0, 1, 0]], dtype=np.float64)
 FACES = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
@@ -22,7 +23,7 @@ def brute_chamfer(a: np.ndarray, b: np.ndarray) -> float:
 def test_chamfer_distance_is_that_of_all_pairs(seed: int, n: int, m: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = rng.normal(size=(n, 3)), rng.normal(size=(m, 3))
-    assert np.isclose(squared_chamfer_distance(a, b), brute_chamfer(a, b))
+    assert np.isclose(chamfer_squared(a, b), brute_chamfer(a, b))
 
 
 def test_even_points_lie_on_the_surface_and_as_many_in_each_part_as_its_area_says() -> None:
