@@ -1,5 +1,6 @@
 #!/bin/sh
-# Sets up .venv: system libraries (with apt where it may), Python 3.11, the exact versions of requirements.lock.
+# Sets up .venv: system libraries (with apt where it may), Python 3.11, the exact versions of requirements.lock, and the
+# command shapemill.
 # Run by make from the root of the project; does nothing twice.
 set -eu
 
@@ -64,3 +65,4 @@ if ! .venv/bin/python -c 'import sys, pip; sys.exit(sys.version_info[:2] != (3, 
 fi
 echo "installing the versions of requirements.lock into .venv; the first time this takes some minutes"
 .venv/bin/python -m pip install -qq --disable-pip-version-check -r requirements.lock
+.venv/bin/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation --editable .
