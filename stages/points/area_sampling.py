@@ -62,9 +62,11 @@ def surface_table(meshes: Sequence[tuple[FloatArray, IntArray]]) -> SurfaceTable
     """
     counts = [len(vertices) for vertices, _ in meshes]
     starts = np.cumsum([0, *counts[:-1]])
-    vertices = np.ascontiguousarray(np.concatenate([each for each, _ in meshes]), dtype=np.float64)
-    faces = np.concatenate([each.astype(np.int64) + start for (_, each), start in zip(meshes, starts, strict=True)])
-    first = np.cumsum([0, *(len(each) for _, each in meshes)])
+    vertices = np.ascontiguousarray(np.concatenate([points for points, _ in meshes]), dtype=np.float64)
+    faces = np.concatenate(
+        [corners.astype(np.int64) + start for (_, corners), start in zip(meshes, starts, strict=True)]
+    )
+    first = np.cumsum([0, *(len(corners) for _, corners in meshes)])
     reach = _reach(vertices, faces, first)
     area = np.array([reach[end - 1] if end > begin else 0.0 for begin, end in pairwise(first.tolist())])
     if not (np.isfinite(area) & (area > 0.0)).all():
@@ -103,7 +105,7 @@ def sample_shape(shape: Shape, n: int, rng: np.random.Generator) -> SurfacePoint
 @lru_cache(maxsize=16)
 def mesh_table(meshes: tuple[PartMesh, ...]) -> SurfaceTable:
     """The surface table of a shape's meshes, in their order; made once for each set of meshes."""
-    return surface_table([(each.vertices, each.faces) for each in meshes])
+    return surface_table([(mesh.vertices, mesh.faces) for mesh in meshes])
 
 
 def _points_of_meshes(

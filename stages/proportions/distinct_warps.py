@@ -17,7 +17,7 @@ class DistinctWarps:
     def __init__(self, lattice: Lattice, apart: float) -> None:
         """apart: so far a warp must be from the exemplar and from all others."""
         self._lattice, self._apart = lattice, max(apart, LEAST)
-        self._origin = lattice.signature([np.ones(len(each)) for each in lattice.lengths])
+        self._origin = lattice.signature([np.ones(len(lengths)) for lengths in lattice.lengths])
         self._points = np.empty((64, len(self._origin)))
         self._count = 0
 

@@ -30,7 +30,9 @@ class Proportions:
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
         """The exemplars, hubs among their parts."""
-        found = [(each.name, kit_shape(kit, each.whole)) for kit in self._kits.values() for each in kit.exemplars]
+        found = [
+            (exemplar.name, kit_shape(kit, exemplar.whole)) for kit in self._kits.values() for exemplar in kit.exemplars
+        ]
         return [(f"{name}, {part_count(shape)}", shape) for name, shape in found[:count]]
 
 

@@ -55,9 +55,9 @@ def plan(plan: Plan) -> list[Shard]:
     ]
     inputs = (
         *(f"exemplars/{kit}" for kit in plan.shards("exemplars")),
-        *(f"proportions/{each.name}" for each in lanes),
+        *(f"proportions/{shard.name}" for shard in lanes),
     )
-    params = {"job": "choice", "lanes": [each.name for each in lanes], "asked": asked}
+    params = {"job": "choice", "lanes": [shard.name for shard in lanes], "asked": asked}
     choice = Shard(choice_name(plan.config.name), params, inputs)
     summary = plan.summary("proportions", choice.name)
     if summary is None:
@@ -106,9 +106,9 @@ def run_lane(task: Task) -> Outcome:
     """File of the shard: `.txt`, a text a line of shapes that hold together and are what they must be."""
     config = _asked(task)
     kit = input_kit(task, task.shard.params["kit"])
-    exemplars = [each.whole for each in kit.exemplars]
-    lattices = [lattice_of(kit, each) for each in exemplars]
-    drawn = [DistinctWarps(each, config.min_difference) for each in lattices]
+    exemplars = [exemplar.whole for exemplar in kit.exemplars]
+    lattices = [lattice_of(kit, exemplar) for exemplar in exemplars]
+    drawn = [DistinctWarps(lattice, config.min_difference) for lattice in lattices]
     wanted = -(-OVERSAMPLED * config.samples_per_kit // config.parallel_searches)
     found: list[str] = []
     tries = 0

@@ -21,7 +21,7 @@ class ProportionError(ValueError):
 
 def proportion_text(exemplar: str, warp: Sequence[FloatArray]) -> str:
     """The text of an exemplar's shape with these factors."""
-    factors = {axis: each.tolist() for axis, each in zip(AXES, warp, strict=True)}
+    factors = {axis: values.tolist() for axis, values in zip(AXES, warp, strict=True)}
     return json.dumps({"exemplar": exemplar, **factors}, ensure_ascii=False)
 
 
@@ -41,9 +41,9 @@ def read_proportions(text: str) -> tuple[str, Warp]:
 
 def exemplar_of(kit: Kit, name: str) -> Exemplar:
     """The exemplar of a kit with a name. Raises ProportionError."""
-    for each in kit.exemplars:
-        if each.name == name:
-            return each
+    for exemplar in kit.exemplars:
+        if exemplar.name == name:
+            return exemplar
     raise ProportionError(f"kit {kit.name} has no exemplar {name!r}; it has {', '.join(e.name for e in kit.exemplars)}")
 
 

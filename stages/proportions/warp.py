@@ -60,11 +60,11 @@ class Lattice:
 
     def draw(self, rng: np.random.Generator, spread: float, most: float) -> Warp:
         """Random factors, rounded, at most `most` and at least its inverse."""
-        count = 1 + max((int(each.max()) for each in self.lengths if len(each)), default=-1)
+        count = 1 + max((int(numbers.max()) for numbers in self.lengths if len(numbers)), default=-1)
         sizes = rng.normal(0.0, spread, 3)
         own = rng.normal(0.0, spread * min(1.0, np.sqrt(MANY / max(count, 1))), count)
         found = []
-        large = LARGE * max(float(each[-1] - each[0]) for each in self.knots)
+        large = LARGE * max(float(axis_knots[-1] - axis_knots[0]) for axis_knots in self.knots)
         for knots, lengths, size in zip(self.knots, self.lengths, sizes, strict=True):
             gaps = np.diff(knots)
             follows = (gaps > large) | (len(gaps) > MANY)
@@ -92,8 +92,8 @@ class Lattice:
         """What tells proportions apart, whatever the size: the knots of all axes, float64 (sum of k + 1,), about the
         middle and by the diagonal."""
         images = self.images(warp)
-        diagonal = float(np.linalg.norm([each[-1] - each[0] for each in images]))
-        return np.concatenate([(each - (each[0] + each[-1]) / 2) / max(diagonal, 1e-12) for each in images])
+        diagonal = float(np.linalg.norm([image[-1] - image[0] for image in images]))
+        return np.concatenate([(image - (image[0] + image[-1]) / 2) / max(diagonal, 1e-12) for image in images])
 
 
 def lattice_of(kit: Kit, exemplar: Assembly) -> Lattice:
@@ -105,7 +105,7 @@ def lattice_of(kit: Kit, exemplar: Assembly) -> Lattice:
     for axis in range(3):
         ends = np.sort(boxes[:, :, axis].ravel())
         groups = np.split(ends, 1 + np.flatnonzero(np.diff(ends) > near))
-        places = np.array([each.mean() for each in groups])
+        places = np.array([group.mean() for group in groups])
         numbers = []
         for gap in np.diff(places).tolist():
             same = (place for place, one in enumerate(known) if abs(one - gap) <= max(2 * near, EQUAL * one))

@@ -76,11 +76,11 @@ def _is_docked(kit: Kit, a: int, b: int, pose: FloatArray) -> bool:
     if a > b:
         a, b, pose = b, a, invert(pose)
     length = kit.types[b].diagonal / 2
-    wanted = [pose_vectors(each[None], length) for each in ((pose, invert(pose)) if a == b else (pose,))]
+    wanted = [pose_vectors(seen[None], length) for seen in ((pose, invert(pose)) if a == b else (pose,))]
     for docking in kit.grammar.dockings:
         if (docking.a, docking.b) == (a, b):
             images = pose_vectors(symmetric_images(kit.types[a], kit.types[b], docking.pose), length)
-            gap = min(np.linalg.norm(images - each, axis=1).min() for each in wanted)
+            gap = min(np.linalg.norm(images - vectors, axis=1).min() for vectors in wanted)
             if gap <= (1.0 + BORDERLINE) * (docking.slack or kit.pose_tolerance):
                 return True
     return False
@@ -91,7 +91,9 @@ def _fallen(kit: Kit, assembly: Assembly) -> list[int]:
     axis = {"y": 1, "z": 2}[kit.up]
     fallen = []
     for part, kind in enumerate(assembly.types.tolist()):
-        ups = np.concatenate([each.whole.poses[each.whole.types == kind, axis, :3] for each in kit.exemplars])
+        ups = np.concatenate(
+            [exemplar.whole.poses[exemplar.whole.types == kind, axis, :3] for exemplar in kit.exemplars]
+        )
         images = kit.types[kind].symmetries[:, :3, :3] @ assembly.poses[part, axis, :3]
         if np.linalg.norm(images[:, None] - ups[None], axis=2).min() > MAX_UP_DIFFERENCE:
             fallen.append(part)
@@ -199,8 +201,8 @@ def _penetration_faults(
             i, j = j, i
         seen = kit.grammar.depths.get((int(assembly.types[i]), int(assembly.types[j])), 0.0)
         both = meshes[drawn[i]], meshes[drawn[j]]
-        if any(isinstance(each, StretchedMesh) for each in both):
-            seen += STRETCHED_DEPTH * min(each.diagonal for each in both)
+        if any(isinstance(mesh, StretchedMesh) for mesh in both):
+            seen += STRETCHED_DEPTH * min(mesh.diagonal for mesh in both)
         allowed = seen + slack
         if depth_bound(boxes[i], boxes[j]) <= allowed:
             continue

@@ -87,8 +87,8 @@ class PartType(PartMesh):
 def labels_of(types: Sequence[PartType]) -> tuple[tuple[str, ...], TypeArray]:
     """The labels of some types, each once, in the order in which they come, and the place of each type's among them,
     int16 (types,)."""
-    labels = tuple(dict.fromkeys(each.label for each in types))
-    return labels, np.array([labels.index(each.label) for each in types], dtype=np.int16)
+    labels = tuple(dict.fromkeys(kind.label for kind in types))
+    return labels, np.array([labels.index(kind.label) for kind in types], dtype=np.int16)
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class Assembly:
         for i, j in self.edges.tolist():
             lists[i].append(j)
             lists[j].append(i)
-        return [sorted(each) for each in lists]
+        return [sorted(neighbours) for neighbours in lists]
 
     def select(self, parts: np.ndarray) -> Assembly:
         """The assembly of the given parts alone, int (k,), ascending."""
@@ -186,8 +186,8 @@ class Grammar:
     def depths(self) -> Mapping[tuple[int, int], float]:
         """For pairs of types (a <= b) how deep parts of them reached into each other in the exemplars at most."""
         deepest = dict(self.nested)
-        for each in self.dockings:
-            deepest[each.a, each.b] = max(deepest.get((each.a, each.b), 0.0), each.depth)
+        for docking in self.dockings:
+            deepest[docking.a, docking.b] = max(deepest.get((docking.a, docking.b), 0.0), docking.depth)
         return deepest
 
 

@@ -27,24 +27,24 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
         **({"one_surface": True} if kit.one_surface else {}),
         "types": [
             {
-                "name": each.name,
-                **({"meaning": each.meaning} if each.meaning else {}),
-                "triangles": len(each.faces),
-                "diagonal": round(each.diagonal, 6),
-                "symmetries": len(each.symmetries),
+                "name": kind.name,
+                **({"meaning": kind.meaning} if kind.meaning else {}),
+                "triangles": len(kind.faces),
+                "diagonal": round(kind.diagonal, 6),
+                "symmetries": len(kind.symmetries),
             }
-            for each in kit.types
+            for kind in kit.types
         ],
         "exemplars": [
             {
-                "name": each.name,
+                "name": exemplar.name,
                 "parts": [
                     {"name": name, "type": names[index]}
-                    for name, index in zip(each.part_names, each.assembly.types.tolist(), strict=True)
+                    for name, index in zip(exemplar.part_names, exemplar.assembly.types.tolist(), strict=True)
                 ],
-                "contacts": _contacts(kit, table, each.assembly),
+                "contacts": _contacts(kit, table, exemplar.assembly),
             }
-            for each in kit.exemplars
+            for exemplar in kit.exemplars
         ],
         "strictness": kit.grammar.strictness,
         "hubs": [names[index] for index in kit.grammar.hubs],
@@ -57,15 +57,15 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
         },
         "dockings": [
             {
-                "a": names[each.a],
-                "b": names[each.b],
-                "kind": each.kind,
-                "seen": each.count,
-                "depth": each.depth,
-                **({"slack": each.slack} if each.slack else {}),
-                "pose": each.pose.tolist(),
+                "a": names[docking.a],
+                "b": names[docking.b],
+                "kind": docking.kind,
+                "seen": docking.count,
+                "depth": docking.depth,
+                **({"slack": docking.slack} if docking.slack else {}),
+                "pose": docking.pose.tolist(),
             }
-            for each in kit.grammar.dockings
+            for docking in kit.grammar.dockings
         ],
         "nested": [{"a": names[a], "b": names[b], "depth": depth} for (a, b), depth in kit.grammar.nested.items()],
     }
@@ -82,13 +82,13 @@ def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
     """Write `kit` to two binary streams: the JSON of `describe_kit` to `text`, the tar to `arrays`."""
     text.write(json.dumps(describe_kit(kit), indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n")
     with ShardWriter(arrays) as writer:
-        for index, each in enumerate(kit.types):
+        for index, kind in enumerate(kit.types):
             members = {
-                "vertices.npy": array_bytes(each.vertices),
-                "faces.npy": array_bytes(each.faces),
-                "colors.npy": array_bytes(each.face_colors),
-                "frame.npy": array_bytes(each.frame),
-                "symmetries.npy": array_bytes(each.symmetries),
+                "vertices.npy": array_bytes(kind.vertices),
+                "faces.npy": array_bytes(kind.faces),
+                "colors.npy": array_bytes(kind.face_colors),
+                "frame.npy": array_bytes(kind.frame),
+                "symmetries.npy": array_bytes(kind.symmetries),
             }
             writer.write(f"type-{index:04d}", members)
         for index, exemplar in enumerate(kit.exemplars):
@@ -106,7 +106,7 @@ def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
 def load_kit(text: Path, arrays: Path) -> Kit:
     """The kit that `write_kit` wrote to these two files."""
     described = json.loads(text.read_text())
-    heads = iter([(each["name"], each.get("meaning", "")) for each in described["types"]])
+    heads = iter([(kind["name"], kind.get("meaning", "")) for kind in described["types"]])
     types: list[PartType] = []
     exemplars: list[Exemplar] = []
     for key, members in read_shard(arrays):
@@ -159,7 +159,7 @@ def _exemplar(members: Mapping[str, bytes]) -> Exemplar:
 
 def _grammar(described: Mapping[str, Any], labels: Sequence[str]) -> Grammar:
     """The grammar of a kit with these labels that `describe_kit` described."""
-    index_of = {each["name"]: index for index, each in enumerate(described["types"])}
+    index_of = {kind["name"]: index for index, kind in enumerate(described["types"])}
     neighbourhoods = {
         labels.index(name): {
             tuple(sorted((labels.index(other), count) for other, count in rule["neighbours"].items())): rule["seen"]
@@ -169,20 +169,20 @@ def _grammar(described: Mapping[str, Any], labels: Sequence[str]) -> Grammar:
     }
     dockings = tuple(
         Docking(
-            a=index_of[each["a"]],
-            b=index_of[each["b"]],
-            pose=np.array(each["pose"]),
-            kind=each["kind"],
-            count=each["seen"],
-            depth=each["depth"],
-            slack=each.get("slack", 0.0),
+            a=index_of[docking["a"]],
+            b=index_of[docking["b"]],
+            pose=np.array(docking["pose"]),
+            kind=docking["kind"],
+            count=docking["seen"],
+            depth=docking["depth"],
+            slack=docking.get("slack", 0.0),
         )
-        for each in described["dockings"]
+        for docking in described["dockings"]
     )
     return Grammar(
         neighbourhoods=neighbourhoods,
         dockings=dockings,
-        nested={(index_of[each["a"]], index_of[each["b"]]): each["depth"] for each in described["nested"]},
+        nested={(index_of[pair["a"]], index_of[pair["b"]]): pair["depth"] for pair in described["nested"]},
         strictness=described["strictness"],
         hubs=tuple(index_of[name] for name in described["hubs"]),
     )

@@ -12,7 +12,7 @@ from stages.shape.kit_files import load_kit
 
 def input_kits(task: Task) -> dict[str, Kit]:
     """The kits among the inputs of a shard, by name."""
-    names = [each.partition("/")[2] for each in task.shard.inputs if each.startswith("exemplars/")]
+    names = [name.partition("/")[2] for name in task.shard.inputs if name.startswith("exemplars/")]
     return {name: input_kit(task, name) for name in names}
 
 

@@ -76,7 +76,7 @@ class Shape:
     @property
     def is_stretched(self) -> bool:
         """Whether parts of it are stretched, so that its meshes are not those of its kit."""
-        return any(isinstance(each, StretchedMesh) for each in self.meshes)
+        return any(isinstance(mesh, StretchedMesh) for mesh in self.meshes)
 
     def __len__(self) -> int:
         return len(self.assembly)

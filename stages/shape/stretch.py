@@ -64,8 +64,8 @@ def bake(meshes: Sequence[PartMesh], assembly: Assembly) -> tuple[tuple[PartMesh
     if assembly.stretches is None:
         return tuple(meshes), assembly
     bent = np.abs(assembly.stretches - np.eye(3)).max(axis=(1, 2)) > RIGID_TOLERANCE
-    made = [meshes[each] for each in np.unique(assembly.types[~bent]).tolist()]
-    places = {(each, b""): place for place, each in enumerate(np.unique(assembly.types[~bent]).tolist())}
+    made = [meshes[kind] for kind in np.unique(assembly.types[~bent]).tolist()]
+    places = {(kind, b""): place for place, kind in enumerate(np.unique(assembly.types[~bent]).tolist())}
     types = []
     for part_type, stretch, is_bent in zip(assembly.types.tolist(), assembly.stretches, bent, strict=True):
         key = part_type, stretch.tobytes() if is_bent else b""
@@ -79,9 +79,9 @@ def bake(meshes: Sequence[PartMesh], assembly: Assembly) -> tuple[tuple[PartMesh
 def placements(meshes: Sequence[PartMesh], assembly: Assembly) -> FloatArray:
     """What moves each mesh as its kit has it, float64 (n, 4, 4), as a record has it; the poses themselves where nothing
     was stretched."""
-    if not any(isinstance(each, StretchedMesh) for each in meshes):
+    if not any(isinstance(mesh, StretchedMesh) for mesh in meshes):
         return assembly.poses
-    found = [each.stretch if isinstance(each, StretchedMesh) else np.eye(3) for each in meshes]
+    found = [mesh.stretch if isinstance(mesh, StretchedMesh) else np.eye(3) for mesh in meshes]
     return rounded(replace(assembly, stretches=np.stack(found)[assembly.types]).placements)
 
 

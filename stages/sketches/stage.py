@@ -65,7 +65,9 @@ def drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene) -
 def report(plan: Plan) -> Sequence[str]:
     """What drew the sketches: one line, or several where machines differ."""
     summaries = (plan.summary("sketches", name) for name in plan.shards("sketches"))
-    drawn = Counter(f"{each['renderer']}, {each['renderer_version']}" for each in summaries if each is not None)
+    drawn = Counter(
+        f"{summary['renderer']}, {summary['renderer_version']}" for summary in summaries if summary is not None
+    )
     return [f"{count} shards drawn by {what}" for what, count in sorted(drawn.items())]
 
 

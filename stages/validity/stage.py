@@ -48,7 +48,7 @@ def run_shard(task: Task) -> Outcome:
             "contact_tolerance": _short(touching),
             "joint_tolerance": _short(connected),
         }
-        counts.update(each for each in COUNTED if physics[each])
+        counts.update(name for name in COUNTED if physics[name])
         return {
             CONTACTS: pair_bytes(known),
             JOINTS: pair_bytes(validity.joints),
@@ -56,7 +56,7 @@ def run_shard(task: Task) -> Outcome:
         }
 
     samples = add_members(task, judged)
-    summary = {"split": task.shard.params["split"], **{each: counts[each] for each in COUNTED}}
+    summary = {"split": task.shard.params["split"], **{name: counts[name] for name in COUNTED}}
     return Outcome(samples, {**summary, "samples": samples})
 
 
@@ -68,11 +68,11 @@ def _short(length: float) -> float:
 def report(plan: Plan) -> Sequence[str]:
     """How many samples are rooted and stable."""
     found = [plan.summary("validity", name) for name in plan.shards("validity")]
-    done = [each for each in found if each is not None]
-    judged = sum(each["samples"] for each in done)
+    done = [summary for summary in found if summary is not None]
+    judged = sum(summary["samples"] for summary in done)
     if not judged:
         return []
-    shares = [f"{sum(each[name] for each in done) / judged:.1%} {name}" for name in COUNTED]
+    shares = [f"{sum(summary[name] for summary in done) / judged:.1%} {name}" for name in COUNTED]
     return [f"{judged:,} judged: {', '.join(shares)}"]
 
 

@@ -24,7 +24,7 @@ def producers() -> dict[str, Producer]:
 
 def languages() -> dict[str, Language]:
     """The languages by their names."""
-    return {each.name: each for each in _declared("language", Language).values()}
+    return {language.name: language for language in _declared("language", Language).values()}
 
 
 def members() -> dict[str, Members]:

@@ -42,7 +42,7 @@ class Origin:
 def missing_licenses(origins: Sequence[Origin]) -> list[str]:
     """A sentence for each file whose licence nobody has stated, with the key that does."""
     return [
-        f"licence of {each.file}: not stated; say it with {each.key}: {{license: ..., author: ..., source: ...}}"
-        for each in origins
-        if not each.license
+        f"licence of {origin.file}: not stated; say it with {origin.key}: {{license: ..., author: ..., source: ...}}"
+        for origin in origins
+        if not origin.license
     ]

@@ -46,8 +46,8 @@ def planned_producer(plan: Plan) -> str | None:
 def check_producers(config: Config) -> None:
     """Raises ConfigError for a config that makes no shapes, or makes them in more than one way."""
     ways = producers()
-    used = [each.keys for each in ways.values() if each.asked(config)]
+    used = [producer.keys for producer in ways.values() if producer.asked(config)]
     if len(used) != 1:
         found = f"has {' and '.join(used)}" if used else "has none"
-        known = ", ".join(each.keys for each in ways.values())
+        known = ", ".join(producer.keys for producer in ways.values())
         raise ConfigError(f"{config.path}: a dataset needs one of {known}, and only one; this {found}")

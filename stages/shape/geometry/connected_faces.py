@@ -52,7 +52,7 @@ def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> 
         there = np.arange(begin, begin + count)
         couples, rest = _couples(region[owner[there]], forward[there])
         wedges = _wedges(positions[sides[begin, 1:3]], positions[places[owner[there[rest]]]], forward[there[rest]])
-        matched += [there[np.array([each])] for each in [*couples, *(tuple(rest[[i, j]]) for i, j in wedges)]]
+        matched += [there[np.array([pair])] for pair in [*couples, *(tuple(rest[[i, j]]) for i, j in wedges)]]
     one, other = np.concatenate(matched).T
     pairs += [np.column_stack([sides[one, column], sides[other, column]]) for column in (3, 4)]
     return np.concatenate(pairs)
@@ -72,8 +72,8 @@ def _couples(region: IntArray, forward: np.ndarray) -> tuple[list[tuple[int, int
     """Pairs among the faces around an edge that are alone there in their region and run against each other, and the
     places of the other faces."""
     couples = []
-    for each in np.unique(region):
-        members = np.flatnonzero(region == each)
+    for number in np.unique(region):
+        members = np.flatnonzero(region == number)
         if len(members) == 2 and forward[members[0]] != forward[members[1]]:
             couples.append((int(members[0]), int(members[1])))
     return couples, np.setdiff1d(np.arange(len(region)), np.array(couples, dtype=np.int64))
@@ -101,7 +101,7 @@ def _wedges(ends: FloatArray, triangles: FloatArray, forward: np.ndarray) -> lis
         here, after = free[place], free[(place + 1) % len(free)]
         if forward[here] and not forward[after]:
             pairs.append((here, after))
-            free = [each for each in free if each not in (here, after)]
+            free = [face for face in free if face not in (here, after)]
             place = 0
         else:
             place += 1

@@ -39,7 +39,7 @@ class ContactTest:
     @cached_property
     def diagonals(self) -> FloatArray:
         """Diagonal of each type, float64 (types,)."""
-        return np.array([each.diagonal for each in self.types])
+        return np.array([kind.diagonal for kind in self.types])
 
     def mesh(self, index: int) -> Mesh:
         """The box tree of a type (stages.shape.geometry.mesh_pairs), built at first use."""

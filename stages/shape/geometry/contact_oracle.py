@@ -104,10 +104,10 @@ class ContactOracle:
         )
         if not (values == FORBIDDEN).any():
             quanta = np.empty(12, dtype=np.int64)
-            for each in np.flatnonzero(values == MISSING).tolist():
-                quantize_pose(rotations[each], translations[each], rotation, translation, reach, quantum, quanta)
-                values[each] = self._answer(int(types[each]), b, quanta)
-                self._insert(int(contact_key(types[each], b, quanta)), int(values[each]))
+            for part in np.flatnonzero(values == MISSING).tolist():
+                quantize_pose(rotations[part], translations[part], rotation, translation, reach, quantum, quanta)
+                values[part] = self._answer(int(types[part]), b, quanta)
+                self._insert(int(contact_key(types[part], b, quanta)), int(values[part]))
         found: IntArray = values
         return found
 

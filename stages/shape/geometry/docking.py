@@ -42,7 +42,7 @@ class DockingTable:
         self._fits: dict[tuple[int, int], list[tuple[FloatArray, float, int]]] = {}
         self._fit_poses: dict[tuple[int, int], list[FloatArray]] = {}
         self._poses: dict[tuple[int, int], tuple[FloatArray, FloatArray]] = {}
-        self.reach = 2 * max([tolerance, *(each.slack for each in dockings)])
+        self.reach = 2 * max([tolerance, *(docking.slack for docking in dockings)])
         for index, docking in enumerate(dockings):
             if docking.slack:
                 self._add_fit(index, docking)
@@ -94,7 +94,7 @@ class DockingTable:
         if not forward and not backward:
             return None
         _, index, turned = min(forward + backward)
-        if {each for _, each, _ in forward} == {each for _, each, _ in backward}:
+        if {label for _, label, _ in forward} == {label for _, label, _ in backward}:
             return 2 * index, 2 * index
         return 2 * index + turned, 2 * index + 1 - turned
 

@@ -38,16 +38,16 @@ def admits(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
         return counted in observed
     total, types = _size(counted), {other for other, _ in counted}
     if grammar.strictness == "count_and_set":
-        return any(total == _size(each) and types == {other for other, _ in each} for each in observed)
-    if not types <= {other for each in observed for other, _ in each}:
+        return any(total == _size(multiset) and types == {other for other, _ in multiset} for multiset in observed)
+    if not types <= {other for multiset in observed for other, _ in multiset}:
         return False
     if grammar.strictness in SLOT_LEVELS:
         return True
-    if total not in {_size(each) for each in observed}:
+    if total not in {_size(multiset) for multiset in observed}:
         return False
     if grammar.strictness == "count_and_types":
         return True
-    together = {pair for each in observed for pair in combinations([other for other, _ in each], 2)}
+    together = {pair for multiset in observed for pair in combinations([other for other, _ in multiset], 2)}
     return all(pair in together for pair in combinations(sorted(types), 2))
 
 
@@ -60,22 +60,25 @@ def admits_superset(grammar: Grammar, part_type: int, neighbours: Multiset) -> b
     total = sum(counts.values())
     observed = grammar.neighbourhoods.get(part_type, {})
     if grammar.strictness == "multiset":
-        return any(all(dict(each).get(other, 0) >= count for other, count in counts.items()) for each in observed)
-    if grammar.strictness == "count_and_set":
-        # each observed type stands there at least once, so that many places are left
         return any(
-            counts.keys() <= dict(each).keys() and sum(max(counts.get(other, 0), 1) for other, _ in each) <= _size(each)
-            for each in observed
+            all(dict(multiset).get(other, 0) >= count for other, count in counts.items()) for multiset in observed
         )
-    if not counts.keys() <= {other for each in observed for other, _ in each}:
+    if grammar.strictness == "count_and_set":
+        # each observed type is there at least once, so that many places are left
+        return any(
+            counts.keys() <= dict(multiset).keys()
+            and sum(max(counts.get(other, 0), 1) for other, _ in multiset) <= _size(multiset)
+            for multiset in observed
+        )
+    if not counts.keys() <= {other for multiset in observed for other, _ in multiset}:
         return False
     if grammar.strictness in SLOT_LEVELS:
         return True
-    if not any(total <= _size(each) for each in observed):
+    if not any(total <= _size(multiset) for multiset in observed):
         return False
     if grammar.strictness == "count_and_types":
         return True
-    together = {pair for each in observed for pair in combinations([other for other, _ in each], 2)}
+    together = {pair for multiset in observed for pair in combinations([other for other, _ in multiset], 2)}
     return all(pair in together for pair in combinations(sorted(counts), 2))
 
 

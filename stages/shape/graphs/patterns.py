@@ -66,7 +66,7 @@ def observed_patterns(kit: Kit, dockings: DockingTable, upright: bool) -> list[P
                     break
             else:
                 alike.append(pattern)
-    return sorted((each for alike in found.values() for each in alike), key=lambda each: each.part_type)
+    return sorted((pattern for alike in found.values() for pattern in alike), key=lambda pattern: pattern.part_type)
 
 
 def _same(kit: Kit, first: Pattern, second: Pattern, upright: bool) -> bool:
@@ -97,5 +97,5 @@ def _looks_same(part_type: PartType, rotation: FloatArray, other: FloatArray, li
 
 def unique_pattern_share(patterns: Sequence[Pattern]) -> float:
     """The share of the exemplars' parts whose pattern no other part shows: it foretells how much growth copies."""
-    total = sum(each.seen for each in patterns)
-    return sum(each.seen == 1 for each in patterns) / total
+    total = sum(pattern.seen for pattern in patterns)
+    return sum(pattern.seen == 1 for pattern in patterns) / total

@@ -80,7 +80,7 @@ class _Stance:
         states: list[list[int]] = [[] for _ in range(self.slots)]
         for place in places:
             states[self.slot_of[place]].append(place)
-        return [tuple(each) for each in states]
+        return [tuple(state) for state in states]
 
 
 class SlotGrammar:
@@ -150,7 +150,7 @@ class SlotGrammar:
         stance.states = [{} for _ in range(stance.slots)]
         for places, (seen, _) in stance.seen.items():
             split = stance.split(places)
-            stance.vectors.add(tuple(bool(each) for each in split))
+            stance.vectors.add(tuple(bool(state) for state in split))
             for slot, state in enumerate(split):
                 stance.states[slot][state] = stance.states[slot].get(state, 0.0) + seen
             for i, j in combinations(range(stance.slots), 2):
@@ -235,7 +235,7 @@ class SlotGrammar:
         for part, near in self._free(assembly):
             parts += 1
             good += any(
-                tuple(bool(each) for each in stance.split(places)) in stance.vectors
+                tuple(bool(state) for state in stance.split(places)) in stance.vectors
                 for stance, places in self.around(assembly, part, near)
             )
         return good / max(parts, 1)

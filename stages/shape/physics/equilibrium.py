@@ -70,7 +70,7 @@ def load_limits(
             (~ground, _cone(patches.normals[~ground], friction, azimuth, DIRECTIONS)),
         )
     ]
-    wrenches, bodies = (np.concatenate(each) for each in zip(*parts, strict=True))
+    wrenches, bodies = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     # Equations in weights of each body and forces in weights of the lighter of two, so that solvers see light bodies.
     weights = np.linalg.norm(growing[:, :, :3], axis=2).max(axis=0)
     weights = np.maximum(weights, LIGHTEST * weights.max())
@@ -134,7 +134,7 @@ def _by_highs(
     column = np.broadcast_to((own // 2)[:, None], row.shape)
     values = wrenches.reshape(-1, 6)[own]
     matrix = sparse.csc_matrix((values.ravel(), (row.ravel(), column.ravel())), shape=(rows, columns))
-    factor = sparse.block_diag([each.reshape(-1, 1) for each in growing], format="csc")
+    factor = sparse.block_diag([load.reshape(-1, 1) for load in growing], format="csc")
     system = sparse.hstack([sparse.kron(sparse.eye(loads), matrix, format="csc"), factor], format="csc")
     costs = np.concatenate([np.zeros(loads * columns), -np.ones(loads)])
     bounds = np.column_stack([np.zeros(len(costs)), np.full(len(costs), np.inf)])

@@ -51,7 +51,7 @@ def solve_interior(
     for _ in range(ROUNDS):
         left = system.residuals(now, costs)
         gap = now.gap()
-        if gap < GAP and max(np.abs(each).max() for each in left) < EXACT:
+        if gap < GAP and max(np.abs(residual).max() for residual in left) < EXACT:
             return now.f, now.y[rows]
         if not gap < LOST:
             break

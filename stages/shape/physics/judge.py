@@ -160,7 +160,7 @@ def judge_shape(shape: Shape, config: PhysicsConfig) -> Validity:
 
 def physical_fields(validity: Validity) -> dict[str, Any]:
     """What a sample's record says under `physics`: rounded, so that the noise of last digits changes no bytes."""
-    values = {each.name: getattr(validity, each.name) for each in fields(validity) if each.name != "joints"}
+    values = {field.name: getattr(validity, field.name) for field in fields(validity) if field.name != "joints"}
     return {name: round(value, 6) + 0.0 if isinstance(value, float) else value for name, value in values.items()}
 
 

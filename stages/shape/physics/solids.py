@@ -128,7 +128,7 @@ class PlacedParts:
             corners[part] if boxes[part] else meshes[types[part]].vertices @ rotations[part].T + poses[part, :3, 3]
             for part in range(len(types))
         ]
-        spans = np.array([[each.min(axis=0), each.max(axis=0)] for each in points])
+        spans = np.array([[part.min(axis=0), part.max(axis=0)] for part in points])
         low, high = spans[:, 0].min(axis=0), spans[:, 1].max(axis=0)
         if not np.isfinite(spans).all():
             part = int(np.argmin(np.isfinite(spans).all(axis=(1, 2))))
@@ -147,7 +147,7 @@ class PlacedParts:
             types=types,
             poses=poses,
             spans=spans - drop,
-            points=tuple(each - drop for each in points),
+            points=tuple(part - drop for part in points),
             diagonal=diagonal,
             weights=amounts / amounts.sum(),
             weighed="volume" if closed else "area",

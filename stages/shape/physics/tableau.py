@@ -45,14 +45,14 @@ def grow_loads(edges: FloatArray, load: FloatArray, growing: FloatArray, cap: fl
         return np.full(len(growing), -1.0), np.zeros_like(growing)
     table[basis >= count, -1] = 0.0
     factors, multipliers = np.empty(len(growing)), np.zeros_like(growing)
-    for index, each in enumerate(growing):
+    for index, load_row in enumerate(growing):
         grown, final = table.copy(), basis.copy()
-        grown[:, -2] = grown[:, count : count + rows] @ (each * sign)
+        grown[:, -2] = grown[:, count : count + rows] @ (load_row * sign)
         reached = _grow(grown, final, count, cap)
         own = final < count
         row = np.flatnonzero(final == count + rows)
         factor = float(grown[row[0], -1]) if len(row) else 0.0
-        borne = edges[:, final[own]] @ grown[own, -1] + factor * each
+        borne = edges[:, final[own]] @ grown[own, -1] + factor * load_row
         if reached == NO_END or np.abs(borne - load).max() > 10 * FEASIBLE or grown[own, -1].min(initial=0) < -FEASIBLE:
             raise ArithmeticError("no end to the growth of a load")
         factors[index] = reached

@@ -218,7 +218,7 @@ def _renderer_name() -> str:
     """Renderer and version as OpenGL names them."""
     from OpenGL import GL
 
-    return ", ".join(GL.glGetString(each).decode() for each in (GL.GL_RENDERER, GL.GL_VERSION))
+    return ", ".join(GL.glGetString(name).decode() for name in (GL.GL_RENDERER, GL.GL_VERSION))
 
 
 def _upload(vertices: np.ndarray, faces: IntArray) -> _Mesh:

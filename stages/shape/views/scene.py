@@ -165,7 +165,7 @@ def mesh_scene(vertices: FloatArray, faces: IntArray, face_colors: ByteArray, up
 @lru_cache(maxsize=16)
 def mesh_set(meshes: tuple[PartMesh, ...]) -> MeshSet:
     """The set of these meshes; the same object for the same meshes, so that a renderer keeps what it has uploaded."""
-    return MeshSet.of([(each.vertices, each.faces, each.face_colors) for each in meshes])
+    return MeshSet.of([(mesh.vertices, mesh.faces, mesh.face_colors) for mesh in meshes])
 
 
 def _layers(parts: int, edges: IntArray) -> IntArray:

@@ -56,7 +56,7 @@ def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int 
     width = 2 * margin + max(columns * cell_width + (columns - 1) * gap, _longest(sections, title, fonts, unit))
     widths = [section.span * (cell_width + gap) - gap for section in sections]
     heights = _row_heights(sections, widths, unit)
-    notes = [_note_lines(each, fonts, width - 2 * margin, unit) for each in sections]
+    notes = [_note_lines(section, fonts, width - 2 * margin, unit) for section in sections]
     leading = round(19 * unit)
     heads = [round(66 * unit) + leading * (len(lines) - 1) for lines in notes]
     height = 2 * margin + (round(62 * unit) if title else 0)
@@ -128,8 +128,10 @@ def _scaled(picture: ByteArray, width: int) -> Any:
 def _longest(sections: Sequence[Section], title: str, fonts: Mapping[str, Any], unit: float) -> int:
     """Pixels that titles take, and some of each note beside them."""
     lengths: list[float] = [fonts["title"].getlength(title)]
-    lengths += [fonts["head"].getlength(each.title) for each in sections]
-    lengths += [_after(each, fonts, unit) + NOTE_ROOM * unit for each in sections if each.title and each.note]
+    lengths += [fonts["head"].getlength(section.title) for section in sections]
+    lengths += [
+        _after(section, fonts, unit) + NOTE_ROOM * unit for section in sections if section.title and section.note
+    ]
     return ceil(max(lengths))
 
 
