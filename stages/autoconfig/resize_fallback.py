@@ -14,7 +14,7 @@ from stages.exemplars.build import Observation
 from stages.inspection.config_text import MAX_SAMPLES_REQUESTED
 from stages.proportions.distinct_warps import DistinctWarps
 from stages.proportions.settings import ProportionsConfig
-from stages.proportions.stage import OVERSAMPLED
+from stages.proportions.stage import CANDIDATES_PER_SAMPLE
 from stages.proportions.warp import Lattice, lattice_of, warped
 from stages.proportions.warp_check import warp_fault
 from stages.shape.kit import Kit
@@ -105,11 +105,11 @@ def _different(lattice: Lattice, config: ProportionsConfig, exemplar: int, most:
     """How many different shapes of an exemplar a run finds that wants `most`, if all of them hold together."""
     rng = decision_rng(0, "choices", "different", exemplar)
     drawn = DistinctWarps(lattice, config.min_difference)
-    for _ in range(config.oversample * OVERSAMPLED * most):
+    for _ in range(config.oversample * CANDIDATES_PER_SAMPLE * most):
         warp = lattice.draw(rng, config.log_std, config.max_factor)
         if drawn.is_new(warp):
             drawn.add(warp)
-        if len(drawn) == OVERSAMPLED * most:
+        if len(drawn) == CANDIDATES_PER_SAMPLE * most:
             break
     return len(drawn.farthest_first(most))
 

@@ -74,7 +74,7 @@ class CandidateSetting:
         exemplars; then graphs. For next to nothing no hubs are left out. What looks broken is hardly worth more than
         nothing."""
         finds, kept = self.finds, self.kept
-        if (self.setting.hubs and finds.graphs < MIN_USEFUL_GRAPHS) or finds.familiar < MIN_SEEN_FILLINGS_SHARE:
+        if (self.setting.hubs and finds.graphs < MIN_USEFUL_GRAPHS) or finds.observed_share < MIN_SEEN_FILLINGS_SHARE:
             return (0.0, 0.0)
         if self.lost_support:
             return (0.0, finds.graphs * kept)
@@ -87,7 +87,7 @@ class CandidateSetting:
         return (
             finds.graphs >= SUFFICIENT_GRAPHS
             and finds.histograms >= SUFFICIENT_HISTOGRAMS
-            and finds.familiar >= MIN_SEEN_FILLINGS_SHARE
+            and finds.observed_share >= MIN_SEEN_FILLINGS_SHARE
             and not has_low_diversity(finds)
             and not self.lost_support
         )

@@ -59,7 +59,7 @@ class TrialResult:
     spread: float
     copied: float = 1.0
     telling: float = 0.0
-    familiar: float = 1.0
+    observed_share: float = 1.0
     by_meaning: bool = False
     most_different: tuple[int, ...] = ()
     rejects: Mapping[str, int] = field(default_factory=dict)
@@ -174,7 +174,7 @@ class TrialSearch:
             spread=round(float(np.median(apart)), 4) if len(apart) else 0.0,
             copied=round(float(np.median(whole)), 4),
             telling=round(float(np.mean(whole <= NEAR_COPY_SHARE)), 4),
-            familiar=self._familiar([self.variants[place].assembly for place in taken.tolist()]),
+            observed_share=self._familiar([self.variants[place].assembly for place in taken.tolist()]),
             by_meaning=self.kit.by_meaning,
             most_different=tuple(taken.tolist()),
             rejects=dict(rejects.most_common()),
@@ -183,7 +183,7 @@ class TrialSearch:
     def _familiar(self, assemblies: Sequence[Assembly]) -> float:
         if self._slots is None:
             return 1.0
-        return round(float(np.mean([self._slots.familiar(each) for each in assemblies])), 4)
+        return round(float(np.mean([self._slots.observed_share(each) for each in assemblies])), 4)
 
 
 def type_counts(kit: Kit, shapes: Sequence[np.ndarray]) -> FloatArray:

@@ -11,7 +11,7 @@ from stages.exemplars.build import Observation
 from stages.exemplars.diagnostics import connected_pieces, hub_parts, mirror_twins
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
-from stages.shape.kit_files import describe_kit
+from stages.shape.kit_files import kit_json
 
 MOST_ROWS = 40
 """So many part types are listed for people."""
@@ -30,7 +30,7 @@ def describe_observation(seen: Observation, models: Sequence[Model], config: Kit
     kit = seen.kit
     names = kit.type_names()
     counts = np.bincount(np.concatenate([each.assembly.types for each in kit.exemplars]), minlength=len(names))
-    described = describe_kit(kit)
+    described = kit_json(kit)
     shared = {
         "types": [
             {"name": each.name, "count": int(count), "triangles": len(each.faces), "symmetries": len(each.symmetries)}

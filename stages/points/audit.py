@@ -12,9 +12,9 @@ from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import PackagedSample
 from stages.shape.geometry.triangles import area_vectors, unit_normals
 
-NEAR = 1e-5
+MAX_SURFACE_GAP_SHARE = 1e-5
 """Points are 32-bit numbers: as a share of the shape's size they lie as near to its surface as this."""
-ALONG = 1e-3
+MAX_COSINE_ERROR = 1e-3
 """As much the cosine of a normal and that of its triangle may differ from 1."""
 
 
@@ -29,14 +29,14 @@ def point_faults(sample: PackagedSample) -> Iterator[str]:
     if len(points) != described["farthest"] + described["uniform"]:
         yield "its point arrays have other lengths than its json counts"
         return
-    if np.abs(np.linalg.norm(normals, axis=1) - 1.0).max() > NEAR:
+    if np.abs(np.linalg.norm(normals, axis=1) - 1.0).max() > MAX_SURFACE_GAP_SHARE:
         yield "its normals are not of unit length"
     if instances.min() < 0 or instances.max() >= len(sample.shape):
         yield "its points name parts that are not there"
         return
     if (sample.shape.part_classes[instances] != sample.arrays["labels.npy"]).any():
         yield "its point labels are not the classes of their parts"
-    near = NEAR * max(sample.size, float(np.abs(sample.record["bounds"]).max()))
+    near = MAX_SURFACE_GAP_SHARE * max(sample.size, float(np.abs(sample.record["bounds"]).max()))
     off, turned = _strangers(sample, points, normals, instances, near)
     if off:
         yield f"{off} of its {len(points):,} points are not on the surface of their part"
@@ -58,7 +58,7 @@ def _strangers(
     corners, parts = sample.rays.triangles
     nearest, distances = sample.rays.nearest(points)
     own = parts[nearest] == instances
-    along = np.einsum("ij,ij->i", normals, unit_normals(corners[nearest])) > 1.0 - ALONG
+    along = np.einsum("ij,ij->i", normals, unit_normals(corners[nearest])) > 1.0 - MAX_COSINE_ERROR
     doubtful = np.flatnonzero(~(own & along & (distances <= near)))
     off = turned = 0
     for part in np.unique(instances[doubtful]).tolist():
@@ -67,7 +67,7 @@ def _strangers(
         gaps = _distances(points[mine], triangles)
         touching = gaps <= near
         off += int((~touching.any(axis=1)).sum())
-        fitting = normals[mine] @ unit_normals(triangles).T > 1.0 - ALONG
+        fitting = normals[mine] @ unit_normals(triangles).T > 1.0 - MAX_COSINE_ERROR
         turned += int((touching.any(axis=1) & ~(touching & fitting).any(axis=1)).sum())
     return off, turned
 

@@ -10,7 +10,7 @@ from stages.points.visibility import seen_from_outside
 from stages.shape.geometry.ray_casting import RayCaster
 from stages.shape.shape import Shape
 
-MOST_DRAWS = 1000
+MAX_DRAW_ROUNDS = 1000
 """So many times as many points as asked are drawn at most, until enough of them are seen."""
 
 
@@ -37,13 +37,13 @@ def _drawn(shape: Shape, n: int, casting: RayCaster | None, rng: np.random.Gener
     if casting is None:
         return sample_shape(shape, n, rng)
     kept: SurfacePoints | None = None
-    for _ in range(MOST_DRAWS):
+    for _ in range(MAX_DRAW_ROUNDS):
         drawn = sample_shape(shape, n, rng)
         seen = drawn.take(np.flatnonzero(seen_from_outside(casting, drawn.points, drawn.normals)))
         kept = seen if kept is None else kept.followed_by(seen)
         if len(kept.points) >= n:
             return kept.take(np.arange(n))
-    raise ValueError(f"of {MOST_DRAWS * n:,} points on the surface fewer than {n:,} are seen from outside")
+    raise ValueError(f"of {MAX_DRAW_ROUNDS * n:,} points on the surface fewer than {n:,} are seen from outside")
 
 
 def _spread(pooled: SurfacePoints, n: int, rng: np.random.Generator) -> SurfacePoints:

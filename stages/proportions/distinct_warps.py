@@ -6,7 +6,7 @@ import numpy as np
 
 from stages.proportions.warp import Lattice, Warp
 
-LEAST = 1e-9
+MIN_GAP = 1e-9
 """What differs by less is the same."""
 
 
@@ -16,7 +16,7 @@ class DistinctWarps:
 
     def __init__(self, lattice: Lattice, apart: float) -> None:
         """apart: so far a warp must be from the exemplar and from all others."""
-        self._lattice, self._apart = lattice, max(apart, LEAST)
+        self._lattice, self._apart = lattice, max(apart, MIN_GAP)
         self._origin = lattice.signature([np.ones(len(lengths)) for lengths in lattice.lengths])
         self._points = np.empty((64, len(self._origin)))
         self._count = 0

@@ -37,7 +37,7 @@ from stages.variations.fallback import resolved_fallback
 from stages.variations.settings import VariationsConfig
 
 BYTES_A_SAMPLE = 8_000
-OVERSAMPLED = 2
+CANDIDATES_PER_SAMPLE = 2
 """So many times the shapes wanted are found, for the choice."""
 
 
@@ -109,7 +109,7 @@ def run_lane(task: Task) -> Outcome:
     exemplars = [exemplar.whole for exemplar in kit.exemplars]
     lattices = [lattice_of(kit, exemplar) for exemplar in exemplars]
     drawn = [DistinctWarps(lattice, config.min_difference) for lattice in lattices]
-    wanted = -(-OVERSAMPLED * config.samples_per_kit // config.parallel_searches)
+    wanted = -(-CANDIDATES_PER_SAMPLE * config.samples_per_kit // config.parallel_searches)
     found: list[str] = []
     tries = 0
     while len(found) < wanted and tries < config.oversample * wanted:

@@ -18,17 +18,17 @@ from stages.shape.geometry.pose import transform_points
 from stages.shape.kit import Assembly, Kit, PartMesh
 from stages.shape.shape import Shape, kit_shape
 
-NEAR = 2e-3
+MERGED_ENDS_SHARE = 2e-3
 """Ends of parts that are nearer to each other than this share of the longest side are one."""
-EQUAL = 0.02
+EQUAL_LENGTH_TOLERANCE = 0.02
 """Lengths that differ by less, as a share, are equal."""
-LARGE = 0.15
+MIN_SCALED_LENGTH_SHARE = 0.15
 """A length of more than this share of the longest side follows the size of the whole along its axis; what is thinner
 has a thickness of its own."""
-MANY = 12
+MAX_FREE_INTERVALS = 12
 """With more intervals along an axis than this all of them follow the size of the whole; and with more lengths than this
 each has the less of its own."""
-DECIMALS = 3
+FACTOR_DECIMALS = 3
 
 Warp = tuple[FloatArray, FloatArray, FloatArray]
 """For each axis the factors of its intervals, float64 (k,)."""
@@ -62,14 +62,14 @@ class Lattice:
         """Random factors, rounded, at most `most` and at least its inverse."""
         count = 1 + max((int(numbers.max()) for numbers in self.lengths if len(numbers)), default=-1)
         sizes = rng.normal(0.0, spread, 3)
-        own = rng.normal(0.0, spread * min(1.0, np.sqrt(MANY / max(count, 1))), count)
+        own = rng.normal(0.0, spread * min(1.0, np.sqrt(MAX_FREE_INTERVALS / max(count, 1))), count)
         found = []
-        large = LARGE * max(float(axis_knots[-1] - axis_knots[0]) for axis_knots in self.knots)
+        large = MIN_SCALED_LENGTH_SHARE * max(float(axis_knots[-1] - axis_knots[0]) for axis_knots in self.knots)
         for knots, lengths, size in zip(self.knots, self.lengths, sizes, strict=True):
             gaps = np.diff(knots)
-            follows = (gaps > large) | (len(gaps) > MANY)
+            follows = (gaps > large) | (len(gaps) > MAX_FREE_INTERVALS)
             factors = np.exp(own[lengths] + np.where(follows, size, 0.0))
-            found.append(np.round(np.clip(factors, 1 / most, most), DECIMALS))
+            found.append(np.round(np.clip(factors, 1 / most, most), FACTOR_DECIMALS))
         x, y, z = found
         return x, y, z
 
@@ -99,7 +99,7 @@ class Lattice:
 def lattice_of(kit: Kit, exemplar: Assembly) -> Lattice:
     """The intervals of an exemplar of a kit, hubs among its parts."""
     boxes = world_boxes(kit.types, exemplar.types, exemplar.poses)
-    near = max(kit.contact_tolerance, NEAR * float(np.ptp(boxes, axis=(0, 1)).max()))
+    near = max(kit.contact_tolerance, MERGED_ENDS_SHARE * float(np.ptp(boxes, axis=(0, 1)).max()))
     known: list[float] = []
     knots, lengths = [], []
     for axis in range(3):
@@ -108,7 +108,11 @@ def lattice_of(kit: Kit, exemplar: Assembly) -> Lattice:
         places = np.array([group.mean() for group in groups])
         numbers = []
         for gap in np.diff(places).tolist():
-            same = (place for place, one in enumerate(known) if abs(one - gap) <= max(2 * near, EQUAL * one))
+            same = (
+                place
+                for place, one in enumerate(known)
+                if abs(one - gap) <= max(2 * near, EQUAL_LENGTH_TOLERANCE * one)
+            )
             place = next(same, len(known))
             known += [gap] if place == len(known) else []
             numbers.append(place)

@@ -27,7 +27,7 @@ from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import Shape, kit_shape, mesh_name
 from stages.shape.stretch import STRETCHED_DEPTH, StretchedMesh, split
 
-BORDERLINE = 0.03
+BORDERLINE_SHARE = 0.03
 """A distance that differs from the contact tolerance by less than this share of it is no evidence either way: poses
 in a GLB are 32-bit numbers."""
 
@@ -81,7 +81,7 @@ def _is_docked(kit: Kit, a: int, b: int, pose: FloatArray) -> bool:
         if (docking.a, docking.b) == (a, b):
             images = pose_vectors(symmetric_images(kit.types[a], kit.types[b], docking.pose), length)
             gap = min(np.linalg.norm(images - vectors, axis=1).min() for vectors in wanted)
-            if gap <= (1.0 + BORDERLINE) * (docking.slack or kit.pose_tolerance):
+            if gap <= (1.0 + BORDERLINE_SHARE) * (docking.slack or kit.pose_tolerance):
                 return True
     return False
 
@@ -160,7 +160,7 @@ def _contacts(
             found.add((i, j))
             continue
         distance = fcl.distance(bodies[i], bodies[j], fcl.DistanceRequest(), fcl.DistanceResult())
-        if abs(distance - tolerance) <= BORDERLINE * tolerance:
+        if abs(distance - tolerance) <= BORDERLINE_SHARE * tolerance:
             doubtful.add((i, j))
         elif distance < tolerance:
             found.add((i, j))

@@ -14,7 +14,7 @@ from stages.shape.geometry.docking import DockingTable
 from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType, labels_of
 
 
-def describe_kit(kit: Kit) -> dict[str, Any]:
+def kit_json(kit: Kit) -> dict[str, Any]:
     """The kit as JSON that a person can read: types, exemplars, neighbourhoods by label, dockings by type name."""
     names, labels = kit.type_names(), kit.labels
     table = DockingTable.of(kit)
@@ -79,8 +79,8 @@ def _contacts(kit: Kit, table: DockingTable, assembly: Assembly) -> list[list[in
 
 
 def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
-    """Write `kit` to two binary streams: the JSON of `describe_kit` to `text`, the tar to `arrays`."""
-    text.write(json.dumps(describe_kit(kit), indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n")
+    """Write `kit` to two binary streams: the JSON of `kit_json` to `text`, the tar to `arrays`."""
+    text.write(json.dumps(kit_json(kit), indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n")
     with ShardWriter(arrays) as writer:
         for index, kind in enumerate(kit.types):
             members = {
@@ -158,7 +158,7 @@ def _exemplar(members: Mapping[str, bytes]) -> Exemplar:
 
 
 def _grammar(described: Mapping[str, Any], labels: Sequence[str]) -> Grammar:
-    """The grammar of a kit with these labels that `describe_kit` described."""
+    """The grammar of a kit with these labels that `kit_json` described."""
     index_of = {kind["name"]: index for index, kind in enumerate(described["types"])}
     neighbourhoods = {
         labels.index(name): {

@@ -15,17 +15,17 @@ from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import PackagedSample
 from stages.sketches.cameras import projected
 
-INK = (2e-4, 0.9)
+INK_SHARE_RANGE = (2e-4, 0.9)
 """How much of a drawing is ink, at least and at most, as a share of a black picture."""
-RIGID = 1e-9
+MAX_ROTATION_ERROR = 1e-9
 """How far the rotation of a camera may be from one."""
-SEEN_FINE = 112
+RAYS_ACROSS = 112
 """The shape is looked at with so many rays across the picture."""
-FINEST = 0.25
+FINE_RAY_SPACING_PIXELS = 0.25
 """Where no ray has hit near some ink, it is looked at with rays so far apart; pixels."""
-DRAWN = 0.75
+MIN_OUTLINE_DRAWN = 0.75
 """At least so much of the outline has ink."""
-ASTRAY = 0.02
+MAX_INK_ASTRAY = 0.02
 """At most so much of the ink lies off the shape."""
 
 
@@ -46,7 +46,11 @@ def _drawing_faults(
 
     pose = np.array(camera["world_to_camera"])
     turn = pose[:3, :3]
-    if np.abs(turn @ turn.T - np.eye(3)).max() > RIGID or np.linalg.det(turn) < 0 or pose[3].tolist() != [0, 0, 0, 1]:
+    if (
+        np.abs(turn @ turn.T - np.eye(3)).max() > MAX_ROTATION_ERROR
+        or np.linalg.det(turn) < 0
+        or pose[3].tolist() != [0, 0, 0, 1]
+    ):
         yield "has a camera whose world_to_camera is no rigid motion"
     if (camera["intrinsics"][0][0] < 0) != camera["flipped"]:
         yield "has a camera whose intrinsics and flipped do not say the same"
@@ -59,7 +63,7 @@ def _drawing_faults(
         yield f"has pixels {drawing.dtype} {drawing.shape}, not those that its record says"
         return
     share = 1.0 - float(drawing.mean()) / 255.0
-    if not INK[0] <= share <= INK[1]:
+    if not INK_SHARE_RANGE[0] <= share <= INK_SHARE_RANGE[1]:
         yield f"is blank or full: {share:.2%} of it is ink"
         return
     seen = projected(camera, corners)
@@ -76,9 +80,9 @@ def _drawing_faults(
 
 def _outline_faults(inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], sample: PackagedSample) -> Iterator[str]:
     drawn, astray = outline_shares(inked, camera, sample)
-    if drawn < DRAWN:
+    if drawn < MIN_OUTLINE_DRAWN:
         yield f"draws {drawn:.0%} of the outline that its camera sees"
-    if astray > ASTRAY:
+    if astray > MAX_INK_ASTRAY:
         yield f"has {astray:.0%} of its ink where its camera does not see the shape"
 
 
@@ -89,7 +93,7 @@ def outline_shares(
     shares. inked: bool (h, w), where there is ink."""
     from scipy.ndimage import binary_erosion, distance_transform_edt
 
-    step = max(1, -(-max(inked.shape) // SEEN_FINE))
+    step = max(1, -(-max(inked.shape) // RAYS_ACROSS))
     rows, columns = (np.arange(step // 2, length, step) for length in inked.shape)
     origins, directions = _rays(camera, columns + 0.5, rows + 0.5)
     hit = sample.rays.hit(origins.reshape(-1, 3), directions.reshape(-1, 3)).reshape(len(rows), len(columns))
@@ -108,7 +112,7 @@ def outline_shares(
 def _is_seen_near(place: npt.NDArray[np.int64], near: float, camera: Mapping[str, Any], sample: PackagedSample) -> bool:
     """Whether the shape is seen `near` the pixel in row and column `place`, (2,), with rays that no thin part slips
     through."""
-    offsets = np.arange(-near, near + FINEST, FINEST)
+    offsets = np.arange(-near, near + FINE_RAY_SPACING_PIXELS, FINE_RAY_SPACING_PIXELS)
     origins, directions = _rays(camera, place[1] + 0.5 + offsets, place[0] + 0.5 + offsets)
     return bool(sample.rays.hit(origins.reshape(-1, 3), directions.reshape(-1, 3)).any())
 

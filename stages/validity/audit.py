@@ -15,9 +15,9 @@ from stages.shape.geometry.components import connected_components
 from stages.shape.physics.judge import judge_of, physical_fields
 from stages.shape.physics.settings import PhysicsConfig
 
-ROUNDED = 2e-6
+FIELD_ROUNDING = 2e-6
 """Numbers of a record are rounded to so many."""
-SLACK = 1e-3
+RELATIVE_TOLERANCE = 1e-3
 """As a share of the number, so near a number is that is computed from rounded poses."""
 
 
@@ -28,7 +28,7 @@ def contradictions(sample: PackagedSample) -> Iterator[str]:
     push = _config(sample).push
     if physics["rooted"] != (physics["floating"] == 0):
         yield f"its json says rooted: {physics['rooted']} and counts {physics['floating']} floating parts"
-    if physics["stable"] != (physics["margin"] >= push - ROUNDED):
+    if physics["stable"] != (physics["margin"] >= push - FIELD_ROUNDING):
         yield f"its json says stable: {physics['stable']}, with a margin of {physics['margin']} for a push of {push}"
     if not (0 <= physics["floating"] <= parts and 1 <= physics["components"] <= parts):
         yield "its json counts more pieces or floating parts than it has parts"
@@ -36,7 +36,7 @@ def contradictions(sample: PackagedSample) -> Iterator[str]:
         yield "its json names a weakest part that is not there"
 
 
-def judged_anew(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
+def recomputed_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
     """A sentence for each field that statics finds otherwise, and for contacts that are none."""
     shape, recorded = sample.shape, sample.record["physics"]
     judge = judge_of(shape.meshes, shape.up, _config(sample))
@@ -46,7 +46,7 @@ def judged_anew(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
     found = physical_fields(validity)
     for name, value in found.items():
         if isinstance(value, float):
-            wrong = abs(value - recorded[name]) > max(ROUNDED, SLACK * abs(value))
+            wrong = abs(value - recorded[name]) > max(FIELD_ROUNDING, RELATIVE_TOLERANCE * abs(value))
         else:
             wrong = value != recorded[name]
         if wrong:
@@ -81,4 +81,4 @@ def _config(sample: PackagedSample) -> PhysicsConfig:
     return PhysicsConfig.model_validate(sample.sections["validity"])
 
 
-AUDIT = Audit(faults=contradictions, recheck=judged_anew)
+AUDIT = Audit(faults=contradictions, recheck=recomputed_faults)

@@ -17,7 +17,7 @@ from stages.shape.physics.judge import judge_of, physical_fields
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample
 
-COUNTED = ("rooted", "stable")
+COUNTED_FIELDS = ("rooted", "stable")
 BYTES_A_SAMPLE = 4096
 
 
@@ -48,7 +48,7 @@ def run_shard(task: Task) -> Outcome:
             "contact_tolerance": _short(touching),
             "joint_tolerance": _short(connected),
         }
-        counts.update(name for name in COUNTED if physics[name])
+        counts.update(name for name in COUNTED_FIELDS if physics[name])
         return {
             CONTACTS: pair_bytes(known),
             JOINTS: pair_bytes(validity.joints),
@@ -56,7 +56,7 @@ def run_shard(task: Task) -> Outcome:
         }
 
     samples = add_members(task, judged)
-    summary = {"split": task.shard.params["split"], **{name: counts[name] for name in COUNTED}}
+    summary = {"split": task.shard.params["split"], **{name: counts[name] for name in COUNTED_FIELDS}}
     return Outcome(samples, {**summary, "samples": samples})
 
 
@@ -72,7 +72,7 @@ def report(plan: Plan) -> Sequence[str]:
     judged = sum(summary["samples"] for summary in done)
     if not judged:
         return []
-    shares = [f"{sum(summary[name] for summary in done) / judged:.1%} {name}" for name in COUNTED]
+    shares = [f"{sum(summary[name] for summary in done) / judged:.1%} {name}" for name in COUNTED_FIELDS]
     return [f"{judged:,} judged: {', '.join(shares)}"]
 
 

@@ -13,7 +13,7 @@ def _nothing(_: PackagedSample) -> Iterator[str]:
     return iter(())
 
 
-def _nothing_anew(_: PackagedSample, __: DatasetPaths) -> Iterator[str]:
+def _no_recheck(_: PackagedSample, __: DatasetPaths) -> Iterator[str]:
     return iter(())
 
 
@@ -28,4 +28,4 @@ class Audit:
     """
 
     faults: Callable[[PackagedSample], Iterator[str]] = _nothing
-    recheck: Callable[[PackagedSample, DatasetPaths], Iterator[str]] = _nothing_anew
+    recheck: Callable[[PackagedSample, DatasetPaths], Iterator[str]] = _no_recheck

@@ -14,22 +14,22 @@ from stages.shape.collection.language import Language
 from stages.shape.collection.members import Members
 from stages.shape.collection.producer import Producer
 
-Declared = TypeVar("Declared")
+Discovered = TypeVar("Discovered")
 
 
 def producers() -> dict[str, Producer]:
     """The producers by the stage that each is."""
-    return _declared("producer", Producer)
+    return _discovered("producer", Producer)
 
 
 def languages() -> dict[str, Language]:
     """The languages by their names."""
-    return {language.name: language for language in _declared("language", Language).values()}
+    return {language.name: language for language in _discovered("language", Language).values()}
 
 
 def members() -> dict[str, Members]:
     """What is added to every sample, by the stage that adds it."""
-    return _declared("members", Members)
+    return _discovered("members", Members)
 
 
 def member_modules() -> tuple[str, ...]:
@@ -39,7 +39,7 @@ def member_modules() -> tuple[str, ...]:
 
 def audits() -> dict[str, Audit]:
     """How finished samples are looked at, by the folder that does."""
-    return _declared("audit", Audit)
+    return _discovered("audit", Audit)
 
 
 def language_of(producer: str) -> Language:
@@ -51,9 +51,9 @@ def language_of(producer: str) -> Language:
 
 
 @cache
-def _declared(what: str, kind: type[Declared]) -> dict[str, Declared]:
+def _discovered(what: str, kind: type[Discovered]) -> dict[str, Discovered]:
     """The `WHAT` of each `stages/<folder>/<what>.py`, by folder. Raises TypeError for a file without it."""
-    found: dict[str, Declared] = {}
+    found: dict[str, Discovered] = {}
     for folder in folders_with(stages.__name__, f"{what}.py"):
         declared = getattr(importlib.import_module(f"{stages.__name__}.{folder}.{what}"), what.upper(), None)
         if not isinstance(declared, kind):

@@ -18,7 +18,7 @@ from stages.shape.kit import ContactKind, Kit
 from stages.variations.kernels.structs import FORBIDDEN, LABELS, MISSING, NONE, ContactTable, Workspace
 from stages.variations.kernels.tables import QUANTUM
 
-BORDERLINE = 1.06
+BORDERLINE_TOLERANCES = 1.06
 """Two parts closer than this many contact tolerances, yet not in contact, are too close to be called apart."""
 
 
@@ -143,7 +143,7 @@ class ContactOracle:
             # What touches does so in some kind, and which one is dear to tell.
             if self._every_kind or self.contact.kind(a, b, pose) in self.kit.contact_kinds:
                 return FORBIDDEN
-        elif self.contact.touches(a, b, pose, BORDERLINE * self.contact.tolerance):
+        elif self.contact.touches(a, b, pose, BORDERLINE_TOLERANCES * self.contact.tolerance):
             return FORBIDDEN
         return FORBIDDEN if self._nested(a, b, pose, not touching) else NONE
 

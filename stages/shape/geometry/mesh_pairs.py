@@ -13,7 +13,7 @@ import numpy as np
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.polygons import cut, polygon_area
 
-LEAF = 4
+MAX_LEAF_TRIANGLES = 4
 
 Tree = tuple[FloatArray, FloatArray, np.ndarray]
 
@@ -52,7 +52,7 @@ def _split(low, high):
             boxes[node, k], boxes[node, 3 + k] = (bottom + top) / 2, (top - bottom) / 2
             if most - least > longest:
                 longest, axis = most - least, k
-        if end - begin <= LEAF:
+        if end - begin <= MAX_LEAF_TRIANGLES:
             links[node] = -begin - 1, end - begin
             continue
         own = order[begin:end].copy()

@@ -11,7 +11,7 @@ from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, transform_points
 from stages.shape.kit import PartMesh
 
-SPACING = 0.04
+PROBE_SPACING_SHARE = 0.04
 """Distance of the probes on a part's surface, as a share of its diagonal."""
 RAYS = np.array(
     [
@@ -25,8 +25,8 @@ RAYS = np.array(
     ]
 )
 """Directions in which a probe looks for surfaces, askew to what people model along."""
-MAJORITY = len(RAYS) // 2 + 1
-ROUNDING = 1e-9
+MAJORITY_RAYS = len(RAYS) // 2 + 1
+BOX_ROUNDING_SHARE = 1e-9
 """Points so near to a box, as a share of its size, are looked at once more."""
 
 
@@ -81,10 +81,10 @@ class PenetrationTest:
             return np.zeros(0, dtype=bool)
         scene = self._scene(index)
         # Four of seven are a majority: only points on which the first four disagree need the others.
-        odd = self._odd(scene, points, RAYS[:MAJORITY])
-        doubtful = (odd > 0) & (odd < MAJORITY)
-        odd[doubtful] += self._odd(scene, points[doubtful], RAYS[MAJORITY:])
-        found: np.ndarray = odd >= MAJORITY
+        odd = self._odd(scene, points, RAYS[:MAJORITY_RAYS])
+        doubtful = (odd > 0) & (odd < MAJORITY_RAYS)
+        odd[doubtful] += self._odd(scene, points[doubtful], RAYS[MAJORITY_RAYS:])
+        found: np.ndarray = odd >= MAJORITY_RAYS
         return found
 
     def _odd(self, scene: Any, points: np.ndarray, directions: FloatArray) -> np.ndarray:
@@ -122,7 +122,7 @@ class PenetrationTest:
             part = self.types[index]
             corners = part.vertices[part.faces]
             longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-            steps = np.clip(np.ceil(longest / (SPACING * part.diagonal)), 1, 12).astype(int)
+            steps = np.clip(np.ceil(longest / (PROBE_SPACING_SHARE * part.diagonal)), 1, 12).astype(int)
             points = [part.vertices]
             for count in np.unique(steps):
                 weights = [(i, j, count - i - j) for i in range(count + 1) for j in range(count + 1 - i)]
@@ -137,7 +137,7 @@ def _inside_box(columns: FloatArray, pose: FloatArray, box: FloatArray) -> Float
 
     An axis at a time: a large part has hundreds of thousands, of which few are near.
     """
-    slack = ROUNDING * float(np.abs(box).max())
+    slack = BOX_ROUNDING_SHARE * float(np.abs(box).max())
     for axis, (low, high) in enumerate(box.T):
         places = pose[axis, :3] @ columns + pose[axis, 3]
         columns = columns[:, (places > low - slack) & (places < high + slack)]

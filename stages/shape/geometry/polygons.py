@@ -7,7 +7,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-THIN = 1e-7
+THIN_CORNER_SHARE = 1e-7
 
 
 @numba.njit(cache=True)
@@ -56,7 +56,7 @@ def _chain(flat, order):
         hull[count] = index
         count += 1
     way = flat[hull[count - 1]] - flat[hull[0]]
-    thin = THIN * (way[0] * way[0] + way[1] * way[1]) ** 0.5
+    thin = THIN_CORNER_SHARE * (way[0] * way[0] + way[1] * way[1]) ** 0.5
     kept = 1
     for k in range(1, count - 1):
         a, b, c = flat[hull[kept - 1]], flat[hull[k]], flat[hull[k + 1]]

@@ -29,25 +29,25 @@ from stages.shape.kit import Assembly, Kit, Strictness
 
 MIN_SLOT_OVERLAP = 0.3
 """Share of the smaller box from which on two places are one slot."""
-IMAGES = 8192
+MAX_SYMMETRIC_IMAGES = 8192
 """Where the symmetric images of what was seen of a way to stand have more members than this, symmetry is left out of
 account: round parts have hundreds, all alike."""
 MAX_PATTERNS = 256
 """Most patterns of a way to stand that are offered to growth."""
-DRAWS = 2048
+RANDOM_DRAWS = 2048
 """Random neighbourhoods that are drawn where there are too many to list."""
-STEPS = 4096
+MAX_LISTING_STEPS = 4096
 """Most steps of one listing of neighbourhoods."""
 MAX_SLOTS = 32
 """Parts with more slots than this, which are hubs, have no neighbourhoods offered but those that were observed."""
-UNSEEN = 0.5
+UNSEEN_WEIGHT = 0.5
 """Weight of a neighbourhood that no part shows, beside one that is shown once."""
 
 State = tuple[int, ...]
 
 
 @dataclass
-class _Stance:
+class _Orientation:
     """One way of standing of a part type: the places around it, and what was seen of them.
 
     up: float64 (3,), what is up in part coordinates; turns: float64 (k, 3, 3), symmetries that keep it; types int64
@@ -93,15 +93,15 @@ class SlotGrammar:
         self.upright = upright
         self._axis = {"y": 1, "z": 2}[kit.up]
         self._limit = 2.0 * kit.pose_tolerance
-        self._stances: dict[int, list[_Stance]] = {}
+        self._orientations: dict[int, list[_Orientation]] = {}
         for pattern in observed_patterns(kit, dockings, upright):
-            self._stance(pattern).patterns.append(pattern)
-        for stances in self._stances.values():
+            self._orientation(pattern).patterns.append(pattern)
+        for stances in self._orientations.values():
             for stance in stances:
                 self._observe(stance)
 
-    def _stance(self, pattern: Pattern) -> _Stance:
-        known = self._stances.setdefault(pattern.part_type, [])
+    def _orientation(self, pattern: Pattern) -> _Orientation:
+        known = self._orientations.setdefault(pattern.part_type, [])
         turns = self.kit.types[pattern.part_type].symmetries[:, :3, :3]
         for stance in known:
             if not self.upright or np.linalg.norm(turns @ pattern.up - stance.up, axis=1).min() < MAX_UP_DIFFERENCE:
@@ -109,21 +109,21 @@ class SlotGrammar:
         kept = turns
         if self.upright:
             kept = turns[np.linalg.norm(turns @ pattern.up - pattern.up, axis=1) < MAX_UP_DIFFERENCE]
-        known.append(_Stance(pattern.part_type, pattern.up, kept))
+        known.append(_Orientation(pattern.part_type, pattern.up, kept))
         return known[-1]
 
-    def _turns_to(self, stance: _Stance, up: FloatArray) -> FloatArray:
+    def _turns_to(self, stance: _Orientation, up: FloatArray) -> FloatArray:
         """The symmetries (k, 3, 3) that bring a part's way up to that of the stance; all where nothing is upright."""
         turns: FloatArray = self.kit.types[stance.part_type].symmetries[:, :3, :3]
         if self.upright:
             turns = turns[np.linalg.norm(turns @ up - stance.up, axis=1) < MAX_UP_DIFFERENCE]
         return turns
 
-    def _observe(self, stance: _Stance) -> None:
+    def _observe(self, stance: _Orientation) -> None:
         """Read the places, slots and states of a stance off its patterns."""
         members = sum(1 + len(pattern.types) for pattern in stance.patterns)
         widest = max(len(pattern.types) for pattern in stance.patterns)
-        if len(stance.turns) * max(members, widest**2) > IMAGES:
+        if len(stance.turns) * max(members, widest**2) > MAX_SYMMETRIC_IMAGES:
             stance.turns, stance.closed = stance.turns[:1], False
         for pattern in stance.patterns:
             first = self._turns_to(stance, pattern.up)[0]
@@ -159,7 +159,7 @@ class SlotGrammar:
         stance.states = [dict(sorted(states.items())) for states in stance.states]
         stance.odds = [np.array(list(states.values())) for states in stance.states]
 
-    def _place(self, stance: _Stance, kind: int, pose: FloatArray, add: bool = False) -> int:
+    def _place(self, stance: _Orientation, kind: int, pose: FloatArray, add: bool = False) -> int:
         """The number of a place, new if it may be added, else -1."""
         part_type, at = self.kit.types[kind], pose[:3, 3]
         low, high = (np.floor((at + gap) / (4 * self._limit)).astype(int) for gap in (-self._limit, self._limit))
@@ -178,7 +178,7 @@ class SlotGrammar:
         stance.cells.setdefault((kind, *own), []).append(len(stance.types) - 1)
         return len(stance.types) - 1
 
-    def _slots(self, stance: _Stance) -> tuple[np.ndarray, int]:
+    def _slots(self, stance: _Orientation) -> tuple[np.ndarray, int]:
         """The slot of each place, int64 (p,), and how many there are: overlapping places are one."""
         count = len(stance.types)
         boxes = np.empty((count, 2, 3))
@@ -197,12 +197,12 @@ class SlotGrammar:
         _, slot_of = np.unique(owner, return_inverse=True)
         return slot_of.astype(np.int64), int(slot_of.max()) + 1 if count else 0
 
-    def around(self, assembly: Assembly, part: int, neighbours: list[int]) -> Iterator[tuple[_Stance, State]]:
+    def around(self, assembly: Assembly, part: int, neighbours: list[int]) -> Iterator[tuple[_Orientation, State]]:
         """How a part of an assembly may be seen to stand, with the places around it that are taken; nothing where one
         was never seen. Once, where all symmetric images of what was seen are known; else by each symmetry."""
         up, inverse = assembly.poses[part][self._axis, :3], invert(assembly.poses[part])
         relative = [(int(assembly.types[other]), inverse @ assembly.poses[other]) for other in neighbours]
-        for stance in self._stances.get(int(assembly.types[part]), []):
+        for stance in self._orientations.get(int(assembly.types[part]), []):
             for turn in self._turns_to(stance, up)[: 1 if stance.closed else None]:
                 places = [self._place(stance, kind, _turned(turn, pose)) for kind, pose in relative]
                 if min(places, default=0) >= 0:
@@ -228,7 +228,7 @@ class SlotGrammar:
             if not is_hub[part]:
                 yield part, [other for other in near if not is_hub[other]]
 
-    def familiar(self, assembly: Assembly) -> float:
+    def observed_share(self, assembly: Assembly) -> float:
         """The share of parts of which it was seen just so which slots are filled and which are empty: it tells whether
         a level is too loose for a kit."""
         good = parts = 0
@@ -244,7 +244,7 @@ class SlotGrammar:
         """Neighbourhoods that the grammar admits, as patterns, ordered by type: all that were observed, and others, at
         most PATTERNS a way of standing, modulo symmetry."""
         found: list[Pattern] = []
-        for part_type, stances in sorted(self._stances.items()):
+        for part_type, stances in sorted(self._orientations.items()):
             for stance in stances:
                 chosen: dict[State, tuple[float, int]] = {}
                 for places, (seen, owner) in stance.seen.items():
@@ -255,14 +255,14 @@ class SlotGrammar:
                 for places in self._others(stance):
                     if len(chosen) >= MAX_PATTERNS:
                         break
-                    chosen.setdefault(_canonical(stance, places), (UNSEEN, owner))
+                    chosen.setdefault(_canonical(stance, places), (UNSEEN_WEIGHT, owner))
                 for places, (weight, owner) in chosen.items():
                     poses = np.array([stance.poses[place] for place in places]).reshape(-1, 4, 4)
                     types = np.array([stance.types[place] for place in places], dtype=np.int64)
                     found.append(Pattern(part_type, types, poses, stance.up, weight, owner))
         return found
 
-    def _others(self, stance: _Stance) -> Iterator[State]:
+    def _others(self, stance: _Orientation) -> Iterator[State]:
         """Neighbourhoods that the grammar admits: all in order where they are few, else drawn at random."""
         if not 0 < stance.slots <= MAX_SLOTS:
             return
@@ -271,12 +271,12 @@ class SlotGrammar:
             yield from listed
             return
         rng = np.random.Generator(np.random.PCG64([stance.part_type, stance.slots]))
-        for _ in range(DRAWS):
+        for _ in range(RANDOM_DRAWS):
             drawn = self._draw(stance, rng)
             if drawn is not None:
                 yield drawn
 
-    def _list(self, stance: _Stance) -> Iterator[State]:
+    def _list(self, stance: _Orientation) -> Iterator[State]:
         split: list[State] = [()] * stance.slots
         steps = 0
 
@@ -287,7 +287,7 @@ class SlotGrammar:
                 return
             for state in stance.states[slot]:
                 steps += 1
-                if steps > STEPS:
+                if steps > MAX_LISTING_STEPS:
                     return
                 split[slot] = state
                 if self._fits(stance, split, slot, range(slot)):
@@ -295,7 +295,7 @@ class SlotGrammar:
 
         yield from fill(0)
 
-    def _draw(self, stance: _Stance, rng: np.random.Generator) -> State | None:
+    def _draw(self, stance: _Orientation, rng: np.random.Generator) -> State | None:
         """One neighbourhood, slot after slot, states by how often they were seen; None at a dead end."""
         split: list[State] = [()] * stance.slots
         done: list[int] = []
@@ -315,7 +315,7 @@ class SlotGrammar:
             done.append(slot)
         return tuple(sorted(place for state in split for place in state))
 
-    def _fits(self, stance: _Stance, split: list[State], slot: int, others: Iterable[int]) -> bool:
+    def _fits(self, stance: _Orientation, split: list[State], slot: int, others: Iterable[int]) -> bool:
         """Whether the level admits the state of a slot beside those of some others."""
         if self.level == "slots":
             return True
@@ -329,7 +329,7 @@ class SlotGrammar:
         return all(((i, slot, split[i], own) if i < slot else (slot, i, own, split[i])) in stance.pairs for i in others)
 
 
-def _canonical(stance: _Stance, places: State) -> State:
+def _canonical(stance: _Orientation, places: State) -> State:
     """The first of the symmetric images of some places."""
     if not places:
         return places

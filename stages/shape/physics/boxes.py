@@ -13,11 +13,11 @@ from stages.shape.geometry.polygons import cut, polygon_area
 
 SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 EDGES = np.array([[a, b] for a in range(8) for b in range(a + 1, 8) if np.abs(SIGNS[a] - SIGNS[b]).sum() == 2])
-SQUARE = 1e-5
+RIGHT_ANGLE_TOLERANCE = 1e-5
 """Corners of a box are as near as this, as a share of its diagonal, to where the corners of a true box would be."""
-FAVOUR = 1e-3
+EDGE_AXIS_MARGIN = 1e-3
 """Boxes a little askew touch with their faces all the same: edges must part them by this share of their size more."""
-SHRUNK = 1e-9
+SHRINK_SHARE = 1e-9
 """One of two boxes is smaller by this share of the other's size where they are cut with each other, so that no face
 of one lies in a face of the other."""
 
@@ -41,18 +41,18 @@ def recognise_boxes(corners: FloatArray) -> tuple[BoolArray, FloatArray, FloatAr
     lengths = np.linalg.norm(ways, axis=2)
     sizes = np.maximum(lengths.max(axis=1), np.finfo(float).tiny)
     axes, halves = np.empty((count, 3, 3)), np.empty((count, 3))
-    allowed = lengths > SQUARE * sizes[:, None]
+    allowed = lengths > RIGHT_ANGLE_TOLERANCE * sizes[:, None]
     for axis in range(3):
         chosen = np.argmin(np.where(allowed, lengths, np.inf), axis=1)
         length = np.maximum(lengths[every, chosen], np.finfo(float).tiny)
         axes[:, axis] = ways[every, chosen] / length[:, None]
         halves[:, axis] = length / 2
         along = np.abs(np.einsum("nkc,nc->nk", ways, axes[:, axis]))
-        allowed &= along <= SQUARE * sizes[:, None]
+        allowed &= along <= RIGHT_ANGLE_TOLERANCE * sizes[:, None]
     local = np.einsum("nkc,nac->nka", corners - centres[:, None], axes)
     signs = local > 0
     codes = np.sort((signs * [4, 2, 1]).sum(axis=2), axis=1)
-    near = np.abs(np.abs(local) - halves[:, None]).max(axis=(1, 2)) <= SQUARE * sizes
+    near = np.abs(np.abs(local) - halves[:, None]).max(axis=(1, 2)) <= RIGHT_ANGLE_TOLERANCE * sizes
     return near & (codes == np.arange(8)).all(axis=1), centres, axes, halves
 
 
@@ -212,7 +212,7 @@ def overlap_volumes(centres, axes, halves, pairs):
         gap, _ = _separation(centres[a], axes[a], halves[a], centres[b], axes[b], halves[b], 1e-9, normal)
         if gap >= 0:
             continue
-        small = halves[b] - SHRUNK * (halves[a].max() + halves[b].max())
+        small = halves[b] - SHRINK_SHARE * (halves[a].max() + halves[b].max())
         total = 0.0
         for side in range(12):
             first = side < 6
@@ -250,7 +250,9 @@ def box_contacts(centres, axes, halves, pairs, tolerance):
     total = 0
     for index in range(len(pairs)):
         a, b = pairs[index]
-        gap, which = _separation(centres[a], axes[a], halves[a], centres[b], axes[b], halves[b], FAVOUR, normal)
+        gap, which = _separation(
+            centres[a], axes[a], halves[a], centres[b], axes[b], halves[b], EDGE_AXIS_MARGIN, normal
+        )
         if gap > tolerance:
             continue
         count = 0

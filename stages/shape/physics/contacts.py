@@ -14,9 +14,9 @@ from stages.shape.geometry.pose import relative_poses
 from stages.shape.kit import PartMesh
 from stages.shape.physics.solids import MeshSolids, PlacedParts
 
-STEP = 1e-6
+POSE_STEP_SHARE = 1e-6
 """Poses are asked about on a grid of this share of the smaller part's diagonal, so that answers can be kept."""
-KEPT = 100_000
+MAX_CACHED_ANSWERS = 100_000
 
 
 @dataclass(frozen=True)
@@ -116,13 +116,13 @@ class PairContacts:
         """Meshes, the pose of part j in coordinates of part i on a grid, and what to remember it by."""
         a, b = int(placed.types[i]), int(placed.types[j])
         pose = relative_poses(placed.poses, np.array([[i, j]]))[0]
-        step = STEP * min(self.meshes[a].diagonal, self.meshes[b].diagonal)
+        step = POSE_STEP_SHARE * min(self.meshes[a].diagonal, self.meshes[b].diagonal)
         pose[:3, 3] = np.round(pose[:3, 3] / step) * step + 0.0
-        pose[:3, :3] = np.round(pose[:3, :3] / STEP) * STEP + 0.0
+        pose[:3, :3] = np.round(pose[:3, :3] / POSE_STEP_SHARE) * POSE_STEP_SHARE + 0.0
         return a, b, pose, pose.tobytes()
 
     def _remember(self, question: tuple[Any, ...], answer: Any) -> Any:
-        if len(self._answers) >= KEPT:
+        if len(self._answers) >= MAX_CACHED_ANSWERS:
             self._answers.clear()
         self._answers[question] = answer
         return answer

@@ -17,19 +17,19 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.contacts import ContactPatches
 
-DIRECTIONS = 8
+JOINT_DIRECTIONS = 8
 """Sides of the friction pyramid of a joint."""
 GROUND_DIRECTIONS = 24
 """Sides of the friction pyramid on the ground, where slopes tell nothing of the way in which things slide."""
-SMALL = 4_000
+MAX_HIGHS_COLUMNS = 4_000
 """Programmes of together so many columns are given to HiGHS."""
-PATIENCE = 20_000
+MAX_HIGHS_ITERATIONS = 20_000
 """Iterations after which HiGHS gives up."""
-LIGHTEST = 1e-8
+MIN_WEIGHT_SHARE = 1e-8
 """Bodies lighter than this share of the heaviest count as that heavy where equations are scaled."""
-STEADY = 100.0
+STEADY_LOAD_WEIGHT = 100.0
 """Worth of the steady load beside that of a growing one."""
-BORNE = 1e-5
+BORNE_TOLERANCE = 1e-5
 """A load is borne if this share of it is not left over."""
 
 
@@ -67,13 +67,13 @@ def load_limits(
         _wrenches(patches.first[own], patches.second[own], patches.points[own], centres, forces)
         for own, forces in (
             (ground, _cone(patches.normals[ground], friction, azimuth, GROUND_DIRECTIONS)),
-            (~ground, _cone(patches.normals[~ground], friction, azimuth, DIRECTIONS)),
+            (~ground, _cone(patches.normals[~ground], friction, azimuth, JOINT_DIRECTIONS)),
         )
     ]
     wrenches, bodies = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     # Equations in weights of each body and forces in weights of the lighter of two, so that solvers see light bodies.
     weights = np.linalg.norm(growing[:, :, :3], axis=2).max(axis=0)
-    weights = np.maximum(weights, LIGHTEST * weights.max())
+    weights = np.maximum(weights, MIN_WEIGHT_SHARE * weights.max())
     wrenches = (
         wrenches
         / weights[bodies][:, :, None]
@@ -91,7 +91,7 @@ def _solved(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing:
         found = _by_tableau(wrenches, bodies, load, growing, cap)
         if found is not None:
             return found
-    if len(wrenches) * len(growing) <= SMALL:
+    if len(wrenches) * len(growing) <= MAX_HIGHS_COLUMNS:
         found = _by_highs(wrenches, bodies, load, growing, cap)
         if found is not None:
             return found
@@ -145,7 +145,7 @@ def _by_highs(
         b_eq=np.tile(load.ravel(), loads),
         bounds=bounds,
         method="highs",
-        options={"maxiter": PATIENCE},
+        options={"maxiter": MAX_HIGHS_ITERATIONS},
     )
     if solved.status == 2:  # no equilibrium at factor 0, which is the same for all
         return LoadLimits(np.full(loads, -1.0), np.zeros_like(growing))
@@ -164,11 +164,11 @@ def _by_interior_point(
     loads = np.stack([-load.ravel(), growing.ravel()])
     try:
         found, dual = solve_interior(
-            wrenches, bodies, len(load), loads, np.array([1.0, cap]), np.array([-STEADY, -1.0])
+            wrenches, bodies, len(load), loads, np.array([1.0, cap]), np.array([-STEADY_LOAD_WEIGHT, -1.0])
         )
     except (ArithmeticError, np.linalg.LinAlgError):
         return None
-    borne = found[0] >= 1 - BORNE
+    borne = found[0] >= 1 - BORNE_TOLERANCE
     return LoadLimits(np.array([found[1] if borne else -1.0]), -dual.reshape(growing.shape))
 
 

@@ -15,18 +15,18 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-ROUNDS = 100
-EXACT = 1e-5
+MAX_ITERATIONS = 100
+MAX_RESIDUAL = 1e-5
 """Largest residual of any equation at the end; forces and loads are to be of the order of 1."""
-GAP = 1e-4
+MAX_COST_GAP = 1e-4
 """Largest gap of the costs at the end."""
-LOST = 1e12
+DIVERGED_GAP = 1e12
 """A gap from which there is no way back."""
-STEP = 0.995
+STEP_TO_BOUND = 0.995
 """Share of the way to the nearest bound that a step goes."""
-FIRM = 1e-11
+DIAGONAL_SHIFT = 1e-11
 """Added to the diagonal, as a share of its mean: bodies that touch at a point can turn about it."""
-REFINED = 100
+MAX_GRADIENT_STEPS = 100
 """Conjugate gradients for a solution of the normal equations, at most."""
 
 
@@ -48,22 +48,22 @@ def solve_interior(
     dense[rows] = loads.T
     system = _System(wrenches, np.where(bodies >= 0, order[bodies], -1), count, width, dense)
     now = _Point.first(len(wrenches), bounds, 6 * count)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ITERATIONS):
         left = system.residuals(now, costs)
         gap = now.gap()
-        if gap < GAP and max(np.abs(residual).max() for residual in left) < EXACT:
+        if gap < MAX_COST_GAP and max(np.abs(residual).max() for residual in left) < MAX_RESIDUAL:
             return now.f, now.y[rows]
-        if not gap < LOST:
+        if not gap < DIVERGED_GAP:
             break
         system.factor(now)
         straight = system.move(now, left, 0.0, None)
         one, two = now.reach(straight)
         after = now.after(straight, min(one, 1.0), min(two, 1.0)).gap()
         # No nearer to the bounds than the answer needs: there the normal equations lose their digits.
-        aim = max((after / gap) ** 3 * gap, GAP / 10) / (len(now.x) + 2 * len(now.f))
+        aim = max((after / gap) ** 3 * gap, MAX_COST_GAP / 10) / (len(now.x) + 2 * len(now.f))
         bent = system.move(now, left, aim, straight)
         one, two = now.reach(bent)
-        now = now.after(bent, min(STEP * one, 1.0), min(STEP * two, 1.0))
+        now = now.after(bent, min(STEP_TO_BOUND * one, 1.0), min(STEP_TO_BOUND * two, 1.0))
     raise ArithmeticError(f"the programme of equilibrium did not converge: the gap is {gap:.1e}")
 
 
@@ -125,7 +125,7 @@ class _System:
 
         self._weight_x, self._weight_f = now.x / now.z, 1 / (now.zf / now.f + now.zs / now.s)
         band = _normal(self._wrenches, self._place, self._weight_x, self._count, self._width)
-        band[0] += FIRM * band[0].mean()
+        band[0] += DIAGONAL_SHIFT * band[0].mean()
         self._band = cholesky_banded(band, lower=True, check_finite=False), True
         self._spread = cho_solve_banded(self._band, self._dense, check_finite=False)
         self._small = np.diag(1 / self._weight_f) + self._dense.T @ self._spread
@@ -166,8 +166,8 @@ class _System:
         point the factors, made firm, answer so much too stiffly that correcting again and again would not arrive."""
         answer, left = np.zeros_like(right), right
         along, before = np.zeros_like(right), 1.0
-        for _ in range(REFINED):
-            if np.abs(left).max() <= EXACT * 1e-4:
+        for _ in range(MAX_GRADIENT_STEPS):
+            if np.abs(left).max() <= MAX_RESIDUAL * 1e-4:
                 break
             near = self._nearly(left)
             worth = float(left @ near)

@@ -20,7 +20,7 @@ from stages.shape.physics.stability import Stability, stability, standing_points
 from stages.shape.physics.structure import ground_share, mirror_score
 from stages.shape.shape import Shape
 
-ROUNDING = 1e-4
+TIPPING_TOLERANCE_DEGREES = 1e-4
 """Degrees by which a shape that just stands may seem to be beyond tipping."""
 
 
@@ -70,7 +70,7 @@ class Judge:
         anything is asked about its parts. Raises ValueError as `validity` does."""
         placed = self._placed(assembly)
         standing = self._standing(placed) if requirements.stable else None
-        if standing is not None and tipping_angle(placed, standing) < -ROUNDING:
+        if standing is not None and tipping_angle(placed, standing) < -TIPPING_TOLERANCE_DEGREES:
             return "not stable"
         connected = self._connected(placed, assembly)
         if requirements.rooted and _floating(placed, connected, self.config).any():

@@ -8,13 +8,13 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.polygons import convex_hull, cut
 
-OPPOSED = 0.98
+MIN_OPPOSED_COSINE = 0.98
 """Faces press on each other if their normals are opposed within about 11 degrees (cosine)."""
-COLUMNS = 24
+LINES_PER_SIDE = 24
 """Lines along each axis, on either side of a square, on which the overlap of two meshes is measured."""
 
 
-OFF = np.array([0.0073, 0.0131, 0.0039])
+LINE_OFFSETS = np.array([0.0073, 0.0131, 0.0039])
 
 
 @numba.njit(cache=True)
@@ -70,7 +70,7 @@ def facing_polygons(ca, cb, pairs, pose, tolerance, oriented):
         if _unit_normal(first, na) <= 0 or _unit_normal(tri, nb) <= 0:
             continue
         facing = na[0] * nb[0] + na[1] * nb[1] + na[2] * nb[2]
-        if facing > -OPPOSED and (oriented or facing < OPPOSED):
+        if facing > -MIN_OPPOSED_COSINE and (oriented or facing < MIN_OPPOSED_COSINE):
             continue
         one[:3] = first
         count = 3
@@ -177,7 +177,7 @@ def flat_hulls(points: FloatArray, normals: FloatArray, tolerance: float) -> tup
     while len(left):
         normal = normals[left[0]]
         height = (points[left] - points[left[0]]) @ normal
-        alike = (normals[left] @ normal > OPPOSED) & (np.abs(height) <= 2 * tolerance)
+        alike = (normals[left] @ normal > MIN_OPPOSED_COSINE) & (np.abs(height) <= 2 * tolerance)
         chosen = points[left[alike]]
         corners = chosen[hull_corners(chosen, normal)]
         kept_points.append(corners)
@@ -239,18 +239,18 @@ def overlap(ca, cb, pose, low, high):
             for i in range(3):
                 moved[f, k, i] = r[i, 0] * cb[f, k, 0] + r[i, 1] * cb[f, k, 1] + r[i, 2] * cb[f, k, 2] + t[i]
     # A little off the middle, along each axis by another share, so that no line meets the edges of a symmetric part.
-    step = (high - low) / (COLUMNS + 0.02)
-    start = low + OFF * step
-    one, two = np.empty((COLUMNS, COLUMNS, 64)), np.empty((COLUMNS, COLUMNS, 64))
-    count_one = np.zeros((COLUMNS, COLUMNS), dtype=np.int64)
-    count_two = np.zeros((COLUMNS, COLUMNS), dtype=np.int64)
+    step = (high - low) / (LINES_PER_SIDE + 0.02)
+    start = low + LINE_OFFSETS * step
+    one, two = np.empty((LINES_PER_SIDE, LINES_PER_SIDE, 64)), np.empty((LINES_PER_SIDE, LINES_PER_SIDE, 64))
+    count_one = np.zeros((LINES_PER_SIDE, LINES_PER_SIDE), dtype=np.int64)
+    count_two = np.zeros((LINES_PER_SIDE, LINES_PER_SIDE), dtype=np.int64)
     volume, depth = 0.0, np.inf
     for axis in range(3):
-        _crossings(ca, axis, start, step, COLUMNS, one, count_one)
-        _crossings(moved, axis, start, step, COLUMNS, two, count_two)
+        _crossings(ca, axis, start, step, LINES_PER_SIDE, one, count_one)
+        _crossings(moved, axis, start, step, LINES_PER_SIDE, two, count_two)
         longest, sum_of = 0.0, 0.0
-        for i in range(COLUMNS):
-            for j in range(COLUMNS):
+        for i in range(LINES_PER_SIDE):
+            for j in range(LINES_PER_SIDE):
                 p, q = count_one[i, j], count_two[i, j]
                 if p < 2 or q < 2 or p % 2 == 1 or q % 2 == 1:
                     continue

@@ -17,12 +17,12 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.polygons import convex_hull, inside_margin
 
-FALL = 0.025
+FALL_SHARE = 0.025
 """Change of the height of the centre of mass, as a share of it, by which a component has fallen: that of the programs'
 authors, whose figures are published; their text says 0.1."""
-SAME = 1e-4
+SAME_PLACE_SHARE = 1e-4
 """Points this near, as a share of the diagonal of the shape, lie on the ground together."""
-MOST_RESTS = 40
+MAX_RESTS = 40
 """A body that has been on so many faces without falling rolls."""
 
 
@@ -65,7 +65,7 @@ class Body:
 def come_to_rest(body: Body, diagonal: float) -> Body:
     """The body as it lies when it has been let go: tipped over points and edges, its centre sinking, until the
     vertical through the centre meets the face below it."""
-    near = SAME * diagonal
+    near = SAME_PLACE_SHARE * diagonal
     body = body.lowered()
     for _ in range(len(body.points)):
         support = body.support(near)
@@ -80,13 +80,13 @@ def tilt_to_fall(body: Body, diagonal: float) -> float:
     """The least tilt, in degrees, by which pushes make the body come to rest with its centre FALL higher or lower than
     it was let go; 0 where it falls by itself, infinite where it never does: a ball, a cube."""
     start = body.lowered().height
-    near = SAME * diagonal
+    near = SAME_PLACE_SHARE * diagonal
     ahead: list[tuple[float, int, Body]] = [(0.0, 0, come_to_rest(body, diagonal))]
     rests: list[Body] = []
     tried = 0
-    while ahead and len(rests) < MOST_RESTS:
+    while ahead and len(rests) < MAX_RESTS:
         tilt, _, rest = heappop(ahead)
-        if abs(rest.height - start) > FALL * start:
+        if abs(rest.height - start) > FALL_SHARE * start:
             return tilt
         if any(np.abs(rest.points[:, 2] - other.points[:, 2]).max() <= 10 * near for other in rests):
             continue

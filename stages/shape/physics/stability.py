@@ -22,10 +22,10 @@ from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.physics.solids import PlacedParts
 from stages.shape.physics.tableau import TIE_TOLERANCE
 
-ARM = 0.25
+TWIST_ARM_SHARE = 0.25
 """Lever arm of the twists, as a share of the diagonal: a twist of factor 1 is the part's weight at this arm."""
-PUSHES = 8
-CAP = 1.0
+PUSH_DIRECTIONS = 8
+MAX_PUSH = 1.0
 """Greatest push that is tried, in weights."""
 
 
@@ -109,14 +109,14 @@ def stability(
     gravity = np.zeros((len(weights), 6))
     gravity[:, 2] = -weights
     loads = _pushes(weights, azimuth, bool(pull.any()))
-    limits = load_limits(scaled, centres / size, gravity, loads, config.friction, pull, azimuth, CAP)
+    limits = load_limits(scaled, centres / size, gravity, loads, config.friction, pull, azimuth, MAX_PUSH)
     stands = bool((limits.factors >= 0).all())
     if not stands:
         empty = np.zeros_like(gravity)
         limits = load_limits(scaled, centres / size, empty, gravity[None], config.friction, pull, azimuth, 2.0)
     worst = int(np.flatnonzero(limits.factors <= limits.factors.min() + TIE_TOLERANCE)[0])
     margin = float(limits.factors[worst]) if stands else -1.0
-    gives = not stands or margin < CAP * (1 - 1e-9)
+    gives = not stands or margin < MAX_PUSH * (1 - 1e-9)
     return Stability(
         stable=stands and margin >= config.push * (1 - 1e-6),
         margin=margin,
@@ -178,12 +178,12 @@ def _pushes(weights: FloatArray, azimuth: float, glued: bool) -> FloatArray:
     """The loads that a stable shape bears a little of, float64 (loads, n, 6), lengths in diagonals: each part pushed by
     its weight in eight level directions and twisted by it both ways about the vertical. Where joints bear pull only so
     far also up and down: without glue that is less or more gravity, which changes nothing."""
-    angles = azimuth + 2 * np.pi * np.arange(PUSHES) / PUSHES
-    level = np.stack([np.cos(angles), np.sin(angles), np.zeros(PUSHES)], axis=1)
+    angles = azimuth + 2 * np.pi * np.arange(PUSH_DIRECTIONS) / PUSH_DIRECTIONS
+    level = np.stack([np.cos(angles), np.sin(angles), np.zeros(PUSH_DIRECTIONS)], axis=1)
     upright = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
     pushed = np.concatenate([level, upright]) if glued else level
     unit = np.zeros((len(pushed) + 2, 6))
-    unit[:-2, :3], unit[-2:, 3:] = pushed, ARM * upright
+    unit[:-2, :3], unit[-2:, 3:] = pushed, TWIST_ARM_SHARE * upright
     return unit[:, None] * weights[:, None]
 
 

@@ -9,7 +9,7 @@ from stages.shape.geometry.polygons import convex_hull
 from stages.shape.physics.contacts import ContactPatches
 from stages.shape.physics.solids import PlacedParts
 
-ALIKE = 0.02
+MIRROR_TOLERANCE_SHARE = 0.02
 """Parts are mirror images where centroids and extents differ by at most this share of the shape's diagonal."""
 
 
@@ -41,10 +41,10 @@ def mirror_score(placed: PlacedParts) -> float:
     spreads = _spreads(placed)
     outmost = int(np.argmax(placed.weights * (places[:, :2] ** 2).sum(axis=1)))
     ways = places[outmost, :2] - places[:, :2]
-    alike = np.abs(places[:, 2] - places[outmost, 2]) <= ALIKE * placed.diagonal
+    alike = np.abs(places[:, 2] - places[outmost, 2]) <= MIRROR_TOLERANCE_SHARE * placed.diagonal
     ways = ways[alike & (np.linalg.norm(ways, axis=1) > 1e-9 * placed.diagonal)]
     own = places[outmost, :2]
-    if np.linalg.norm(own) <= ALIKE * placed.diagonal:
+    if np.linalg.norm(own) <= MIRROR_TOLERANCE_SHARE * placed.diagonal:
         own = _long_axis(placed)
     normals = np.concatenate([ways, [[-own[1], own[0]]], [own]])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -75,5 +75,5 @@ def _matched(placed: PlacedParts, places: FloatArray, spreads: FloatArray, norma
     mirror[:2, :2] -= 2 * np.outer(normal, normal)
     there = np.concatenate([places, spreads.reshape(-1, 9)], axis=1)
     mirrored = np.concatenate([places @ mirror, (mirror @ spreads @ mirror).reshape(-1, 9)], axis=1)
-    distances, _ = cKDTree(there).query(mirrored, distance_upper_bound=ALIKE * placed.diagonal)
+    distances, _ = cKDTree(there).query(mirrored, distance_upper_bound=MIRROR_TOLERANCE_SHARE * placed.diagonal)
     return float(placed.weights[np.isfinite(distances)].sum())

@@ -8,15 +8,15 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-FEASIBLE = 1e-7
+FEASIBILITY_TOLERANCE = 1e-7
 """What may be left over of an equation that holds."""
 TIE_TOLERANCE = 1e-6
 """Of loads that grow equally far the first tells what gives way."""
-ZERO = 1e-9
+ZERO_RATE = 1e-9
 """Smaller rates are rounding: none is divided by."""
-GREEDY = 100
+GREEDY_PIVOTS = 100
 """Pivots by the greatest gain; then by the first, which never goes in circles (Bland's rule)."""
-PATIENCE = 2_000
+MAX_PIVOTS = 2_000
 NO_END = -2.0
 
 
@@ -41,7 +41,7 @@ def grow_loads(edges: FloatArray, load: FloatArray, growing: FloatArray, cap: fl
     left = _empty_slacks(table, basis, count)
     if left == NO_END:
         raise ArithmeticError("no end to the search for an equilibrium")
-    if left > FEASIBLE:
+    if left > FEASIBILITY_TOLERANCE:
         return np.full(len(growing), -1.0), np.zeros_like(growing)
     table[basis >= count, -1] = 0.0
     factors, multipliers = np.empty(len(growing)), np.zeros_like(growing)
@@ -53,7 +53,11 @@ def grow_loads(edges: FloatArray, load: FloatArray, growing: FloatArray, cap: fl
         row = np.flatnonzero(final == count + rows)
         factor = float(grown[row[0], -1]) if len(row) else 0.0
         borne = edges[:, final[own]] @ grown[own, -1] + factor * load_row
-        if reached == NO_END or np.abs(borne - load).max() > 10 * FEASIBLE or grown[own, -1].min(initial=0) < -FEASIBLE:
+        if (
+            reached == NO_END
+            or np.abs(borne - load).max() > 10 * FEASIBILITY_TOLERANCE
+            or grown[own, -1].min(initial=0) < -FEASIBILITY_TOLERANCE
+        ):
             raise ArithmeticError("no end to the growth of a load")
         factors[index] = reached
         if reached < cap:
@@ -70,14 +74,14 @@ def _least(edges: FloatArray, load: FloatArray, growing: FloatArray, factor: flo
     from scipy.optimize import nnls
 
     inner = np.vstack([edges.T, growing, -load])
-    bounds = np.concatenate([np.zeros(edges.shape[1]), [1.0, -factor - FEASIBLE]])
+    bounds = np.concatenate([np.zeros(edges.shape[1]), [1.0, -factor - FEASIBILITY_TOLERANCE]])
     try:
         forces, _ = nnls(np.vstack([inner.T, bounds]), np.concatenate([np.zeros(len(load)), [1.0]]))
     except RuntimeError:
         return found
     gap = 1.0 - bounds @ forces
     least: FloatArray = inner.T @ forces / gap if gap > 0 else found
-    return least if (inner @ least >= bounds - 10 * FEASIBLE).all() else found
+    return least if (inner @ least >= bounds - 10 * FEASIBILITY_TOLERANCE).all() else found
 
 
 @numba.njit(cache=True)
@@ -98,9 +102,9 @@ def _leaving(table, basis, count, column, fixed):
     for row in range(len(table)):
         rate = table[row, column]
         slack = fixed and count <= basis[row] < count + len(table)
-        if rate > ZERO or (slack and rate < -ZERO):
+        if rate > ZERO_RATE or (slack and rate < -ZERO_RATE):
             ratio = 0.0 if slack else max(table[row, -1], 0.0) / rate
-            if ratio < least - ZERO or (ratio <= least + ZERO and basis[row] < basis[found]):
+            if ratio < least - ZERO_RATE or (ratio <= least + ZERO_RATE and basis[row] < basis[found]):
                 found, least = row, min(ratio, least)
     return found
 
@@ -108,7 +112,7 @@ def _leaving(table, basis, count, column, fixed):
 @numba.njit(cache=True)
 def _entering(rates, greedy):
     """The column of the greatest rate, or of the first above rounding, -1 for none."""
-    found, most = -1, ZERO
+    found, most = -1, ZERO_RATE
     for column in range(len(rates)):
         if rates[column] > most:
             found, most = column, rates[column]
@@ -120,14 +124,14 @@ def _entering(rates, greedy):
 @numba.njit(cache=True)
 def _empty_slacks(table, basis, count):
     """Pivots until the slacks are as little as they can be; what is left of them."""
-    for step in range(PATIENCE):
+    for step in range(MAX_PIVOTS):
         rates = np.zeros(count)
         left = 0.0
         for row in range(len(table)):
             if basis[row] >= count:
                 left += table[row, -1]
                 rates += table[row, :count]
-        column = _entering(rates, step < GREEDY)
+        column = _entering(rates, step < GREEDY_PIVOTS)
         if column < 0 or left <= 0.0:
             return left
         row = _leaving(table, basis, count, column, False)
@@ -145,10 +149,10 @@ def _grow(table, basis, count, cap):
     if row < 0:
         return cap
     _pivot(table, basis, row, factor)
-    for step in range(PATIENCE):
+    for step in range(MAX_PIVOTS):
         if table[row, -1] >= cap:
             return cap
-        column = _entering(-table[row, :count], step < GREEDY)
+        column = _entering(-table[row, :count], step < GREEDY_PIVOTS)
         if column < 0:
             return max(table[row, -1], 0.0)
         leaving = _leaving(table, basis, count, column, True)

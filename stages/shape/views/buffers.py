@@ -16,7 +16,7 @@ from stages.shape.views.scene import Scene
 RendererName = Literal["raster", "egl"]
 """`raster`: our own, whole numbers in compiled code; `egl`: OpenGL on EGL, rasterised by Mesa's llvmpipe."""
 
-RENDERS_A_CONTEXT = 20_000
+MAX_RENDERS_PER_CONTEXT = 20_000
 """A context is given back and made anew after so many renders: drivers have been seen to go blank or to grow."""
 
 
@@ -96,7 +96,7 @@ _RENDERS: dict[RendererName, int] = {}
 
 def _draw(scene: Scene, view: View, width: int, height: int, backend: RendererName) -> IntArray:
     """Draw with this process's one renderer of the kind `backend`; a lost context is made anew once."""
-    if _RENDERS.get(backend, 0) >= RENDERS_A_CONTEXT:
+    if _RENDERS.get(backend, 0) >= MAX_RENDERS_PER_CONTEXT:
         _RENDERERS.pop(backend).close()
         _RENDERS[backend] = 0
     try:

@@ -13,7 +13,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-CLOSEST = 1.05
+MIN_DISTANCE_RADII = 1.05
 """Nearest allowed eye, in radii of the bounding sphere: the whole shape stays in front of the eye."""
 
 
@@ -60,8 +60,10 @@ class Camera:
         """
         if len(points) == 0:
             raise ValueError("a camera needs at least one point to look at")
-        if self.distance is not None and self.distance < CLOSEST:
-            raise ValueError(f"camera distance {self.distance} is inside the shape; at least {CLOSEST} radii")
+        if self.distance is not None and self.distance < MIN_DISTANCE_RADII:
+            raise ValueError(
+                f"camera distance {self.distance} is inside the shape; at least {MIN_DISTANCE_RADII} radii"
+            )
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
         turned = (points - middle) @ eye_rotation(self.azimuth, self.elevation, up).T
         radius = float(np.linalg.norm(turned, axis=1).max()) or 1.0

@@ -8,7 +8,7 @@ from stages.shape.arrays import ByteArray
 from stages.shape.shape import Shape
 from stages.shape.views.palette import label_colors
 
-ALIKE = 12
+MAX_COLOR_RANGE = 12
 """Levels by which colours of one blob differ at most."""
 
 
@@ -18,7 +18,7 @@ def part_paint(shape: Shape) -> ByteArray | None:
     if len(shape.labels) < 2:
         return None
     colors = np.concatenate([mesh.face_colors for mesh in shape.meshes])
-    if np.ptp(colors, axis=0).max() > ALIKE:
+    if np.ptp(colors, axis=0).max() > MAX_COLOR_RANGE:
         return None
     painted: ByteArray = label_colors(len(shape.labels))[shape.part_labels]
     return painted

@@ -17,7 +17,7 @@ from stages.shape.views.scene import mesh_scene
 
 RENDERERS: tuple[RendererName, ...] = get_args(RendererName)
 
-SECONDS = 120.0
+CHECK_SECONDS = 120.0
 
 
 def check_renderer(backend: RendererName, asked: str) -> None:
@@ -57,9 +57,9 @@ def check_in_subprocess(backend: RendererName) -> str | None:
     root = Path(__file__).resolve().parents[3]
     command = [sys.executable, "-m", "stages.shape.views.renderer_check", backend]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, cwd=root, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=CHECK_SECONDS, cwd=root, check=False)
     except subprocess.TimeoutExpired:
-        return f"no picture within {SECONDS:.0f} seconds"
+        return f"no picture within {CHECK_SECONDS:.0f} seconds"
     if done.returncode == 0:
         return None
     lines = (done.stdout + done.stderr).strip().splitlines()

@@ -15,8 +15,8 @@ from stages.shape.views.portrait import PAPER
 
 TITLE_INK = (32, 30, 34)
 CAPTION_INK = (122, 116, 112)
-RULE = (226, 221, 213)
-NOTE_ROOM = 180
+RULE_COLOR = (226, 221, 213)
+MIN_NOTE_WIDTH = 180
 """Pixels beside a title, of a cell of 320, that a note has at least."""
 
 
@@ -70,7 +70,9 @@ def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int 
         y += round(62 * unit)
     for section, across, section_heights, lines, head in zip(sections, widths, heights, notes, heads, strict=True):
         if section.title:
-            pen.line([(margin, y + round(8 * unit)), (width - margin, y + round(8 * unit))], RULE, max(1, round(unit)))
+            pen.line(
+                [(margin, y + round(8 * unit)), (width - margin, y + round(8 * unit))], RULE_COLOR, max(1, round(unit))
+            )
             pen.text((margin, y + round(24 * unit)), section.title, TITLE_INK, fonts["head"])
             after = margin + _after(section, fonts, unit)
             for number, line in enumerate(lines):
@@ -130,7 +132,7 @@ def _longest(sections: Sequence[Section], title: str, fonts: Mapping[str, Any], 
     lengths: list[float] = [fonts["title"].getlength(title)]
     lengths += [fonts["head"].getlength(section.title) for section in sections]
     lengths += [
-        _after(section, fonts, unit) + NOTE_ROOM * unit for section in sections if section.title and section.note
+        _after(section, fonts, unit) + MIN_NOTE_WIDTH * unit for section in sections if section.title and section.note
     ]
     return ceil(max(lengths))
 

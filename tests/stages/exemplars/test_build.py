@@ -269,7 +269,7 @@ def test_a_model_a_million_units_away_has_the_same_contacts(tmp_path: Path) -> N
 
 
 def test_building_twice_gives_the_same_kit() -> None:
-    from stages.shape.kit_files import describe_kit
+    from stages.shape.kit_files import kit_json
 
     models = [ring(), model({"a": (CUBE, (0, 0, 0)), "b": (SLAB, (1, 0, 0))}, "two")]
-    assert describe_kit(block_kit(*models)) == describe_kit(block_kit(*models))
+    assert kit_json(block_kit(*models)) == kit_json(block_kit(*models))

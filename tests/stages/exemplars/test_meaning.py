@@ -17,7 +17,7 @@ from stages.package.record import describe_sample
 from stages.shape.assembly_faults import geometry_faults
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.kit import Assembly, Kit
-from stages.shape.kit_files import describe_kit
+from stages.shape.kit_files import kit_json
 from stages.shape.sample import Sample
 from stages.shape.shape import kit_shape
 from tests.toy_kits.chains_and_rings import models_of, pose
@@ -56,7 +56,7 @@ def test_a_kit_by_congruence_or_labels_says_nothing_of_meanings() -> None:
         kit = table_kit(table(THIN, SQUARE), table(THIN, SHORT), types=types)
         assert kit.labels == kit.type_names()
         assert kit.label_of.tolist() == list(range(len(kit.types)))
-        described = describe_kit(kit)
+        described = kit_json(kit)
         assert all("meaning" not in each for each in described["types"])
         assert all(each["seen"] and "slack" not in each for each in described["dockings"])
 

@@ -20,7 +20,7 @@ from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
 from stages.exemplars.stage import STAGE
-from stages.shape.kit_files import describe_kit, load_kit
+from stages.shape.kit_files import kit_json, load_kit
 from stages.variations.settings import VariationsConfig
 from tests.stages.exemplars.model_files import box, write_obj
 from tests.stated import stated
@@ -79,7 +79,7 @@ def test_the_files_hold_the_kit_of_its_shapes(made: tuple[Path, Config]) -> None
     root = folder / "out" / ".work" / "toy" / "exemplars"
     settings = config.section(ExemplarsConfig).kits[0]
     kit, _ = build_kit(settings, [read_model(shape.path) for shape in settings.shapes])
-    assert describe_kit(load_kit(root / "row.json", root / "row.tar")) == describe_kit(kit)
+    assert kit_json(load_kit(root / "row.json", root / "row.tar")) == kit_json(kit)
     assert kit.grammar.neighbourhoods == {0: {((0, 1),): 4, ((0, 2),): 4}}
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.exemplars.settings import ContactConfig
 from stages.shape.kit import Kit
-from stages.shape.kit_files import describe_kit, load_kit, write_kit
+from stages.shape.kit_files import kit_json, load_kit, write_kit
 from stages.shape.shape import kit_shape
 from tests.stages.exemplars.blocks import CUBE, SLAB, block_kit, model, ring
 from tests.stages.shape.geometry.bodies import box
@@ -85,7 +85,7 @@ def test_a_kit_that_was_read_is_written_in_the_same_bytes(tmp_path: Path) -> Non
 
 def test_people_read_names_and_no_indices() -> None:
     described = json.loads(written(make_kit())[0])
-    assert described == describe_kit(make_kit())
+    assert described == kit_json(make_kit())
     assert [each["name"] for each in described["types"]] == ["cube_0", "slab"]
     assert [each["symmetries"] for each in described["types"]] == [24, 8]
     assert described["neighbourhoods"]["slab"] == [{"neighbours": {"cube_0": 2}, "seen": 1}]

@@ -96,7 +96,7 @@ def test_levels_grow_and_growth_keeps_to_each(folder: Path) -> None:
     grammars = [SlotGrammar(observed, DockingTable.of(observed), True, level) for level in SLOT_LEVELS]
     for grammar in grammars:
         assert all(grammar.misfits(each.assembly) == [] for each in observed.exemplars)
-        assert grammar.familiar(observed.exemplars[0].assembly) == 1.0
+        assert grammar.observed_share(observed.exemplars[0].assembly) == 1.0
     for place, level in enumerate(SLOT_LEVELS):
         kit = replace(observed, grammar=replace(observed.grammar, strictness=level))
         line = Search(ContactOracle(kit), SearchConfig(method="growth"))
