@@ -108,7 +108,7 @@ def unrejected(
     kept: list[AssemblyProgram] = []
     most = 50 * (1 + count // AT_ONCE)
     for _ in range(most):
-        found = model.decode(model.points(AT_ONCE, rng, temperature), reject=False)
+        found = model.decode(model.sample_points(AT_ONCE, rng, temperature), reject=False)
         kept += [each for each in found if each is not None]
         if len(kept) >= count:
             return kept[:count]
@@ -122,7 +122,7 @@ def smoothness(
     the diagonal of the bounding box, edit distance of programs; and the percent of points that gave no shape, and are
     passed over. The first two are empty where no two points in a row gave one, the second of cuboids without
     programs."""
-    ends = model.points(2 * sequences, rng).reshape(sequences, 2, model.latent)
+    ends = model.sample_points(2 * sequences, rng).reshape(sequences, 2, model.latent)
     shares = np.linspace(0, 1, steps, dtype=np.float32)[:, None]
     geometry, structure, none = [], [], 0
     for first, last in ends:

@@ -80,7 +80,7 @@ def reconstruction(model: TrainedStringVae, strings: Sequence[str]) -> Reconstru
     """
     decoded = model.decode(model.encode(strings), None)
     right, total, same, graphs, valid = 0, 0, 0, 0, 0
-    for one, other in zip(map(model.written_for, strings), decoded, strict=True):
+    for one, other in zip(map(model.target_of, strings), decoded, strict=True):
         first, second = _codes(model, one), _codes(model, other)
         right += sum(a == b for a, b in zip(first, second, strict=False))
         total += max(len(first), len(second))
@@ -103,7 +103,7 @@ def sampling(
     """`searches` searches of one of WAYS among training strings, whose shape graphs are `known`."""
     found = sample(model, way, strings, searches, rng)
     graphs = [_graph(model, each.string) for each in found if each.string is not None]
-    asked = sum(each.asked for each in found)
+    asked = sum(each.decoded for each in found)
     distinct = set(graphs)
     return Sampling(
         searches=searches,

@@ -62,7 +62,7 @@ def repair_strings(
             break
         begun = [PartialString(drafts[each].kept, set(drafts[each].banned)) for each in wrong]
         points = np.stack([found[each].point for each in wrong])
-        for number, string in zip(wrong, model.decode(points, None, begun=begun), strict=True):
+        for number, string in zip(wrong, model.decode(points, None, partial=begun), strict=True):
             strings[number] = string
     return strings
 

@@ -1,4 +1,4 @@
-"""Which samples stand together in a batch, where they are of different lengths."""
+"""Batches of samples of similar length."""
 
 from __future__ import annotations
 
@@ -8,20 +8,35 @@ import numpy as np
 import numpy.typing as npt
 
 BATCHES_PER_BUCKET = 16
-"""Samples of like length stand together in a batch, chosen from so many batches at once."""
+"""Samples are sorted by length within a bucket of this many batches."""
 
 Indices = npt.NDArray[np.int64]
 
 
 def bucket_batches(lengths: Indices, size: int, rng: np.random.Generator | None) -> Iterator[Indices]:
-    """The samples of each batch of at most `size`, int64 (n,), by their lengths int64 (samples,): all once, in random
-    order, those of like length together; with no `rng`, in their order."""
+    """Yield the samples of each batch, int64 (n,) with n at most `size`; every sample occurs once.
+
+    lengths: int64 (samples,).
+    rng: draws the order, and samples of similar length share a batch; without it samples keep their own order.
+    """
     order = np.arange(len(lengths)) if rng is None else rng.permutation(len(lengths))
-    chosen: list[Indices] = []
+    batches: list[Indices] = []
     for start in range(0, len(order), size * BATCHES_PER_BUCKET):
-        pool = order[start : start + size * BATCHES_PER_BUCKET]
+        bucket = order[start : start + size * BATCHES_PER_BUCKET]
         if rng is not None:
-            pool = pool[np.argsort(lengths[pool], kind="stable")]
-        chosen += [pool[begin : begin + size] for begin in range(0, len(pool), size)]
-    for number in range(len(chosen)) if rng is None else rng.permutation(len(chosen)):
-        yield chosen[int(number)]
+            bucket = bucket[np.argsort(lengths[bucket], kind="stable")]
+        batches += [bucket[begin : begin + size] for begin in range(0, len(bucket), size)]
+    for number in range(len(batches)) if rng is None else rng.permutation(len(batches)):
+        yield batches[int(number)]
+
+
+def padded_rows(first: Indices, samples: Indices) -> tuple[npt.NDArray[np.bool_], Indices]:
+    """Locate the rows of some samples, padded to the longest: which places are filled, bool (n, longest), and their
+    rows, int64 (n, longest), 0 at padding.
+
+    first: where the rows of each sample begin, int64 (samples + 1,).
+    """
+    lengths = np.diff(first)[samples]
+    place = np.arange(lengths.max())
+    filled = place < lengths[:, None]
+    return filled, np.where(filled, first[samples][:, None] + place, 0)

@@ -1,8 +1,9 @@
-"""Where a model's latent space holds what it has learnt: the Gaussian that new points are drawn from."""
+"""Latent spaces: a Gaussian fitted to the aggregate posterior, from which new points are drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,45 +11,62 @@ import torch
 from torch import Generator, Tensor, nn
 
 LatentPoints = npt.NDArray[np.float32]
-"""Points of the latent space, float32 (n, latent)."""
+"""Points of a latent space, float32 (n, latent)."""
 
 
 class LatentGaussian(nn.Module):
-    """A module with a latent space, of which `centre` (latent,) and `spread` (latent, latent) say where samples stand:
-    centre + spread @ noise; the prior as long as nothing has been learnt."""
+    """A module with a latent space and a Gaussian in it: `center + covariance_root @ noise`, at first the prior.
+
+    center: float32 (latent,).
+    covariance_root: float32 (latent, latent).
+    """
+
+    center: Tensor
+    covariance_root: Tensor
 
     def __init__(self, latent: int) -> None:
         super().__init__()
-        self.centre: Tensor
-        self.spread: Tensor
-        self.register_buffer("centre", torch.zeros(latent))
-        self.register_buffer("spread", torch.eye(latent))
+        self.register_buffer("center", torch.zeros(latent))
+        self.register_buffer("covariance_root", torch.eye(latent))
+
+    def encode(self, batch: Any) -> tuple[Tensor, Tensor]:
+        """Encode a batch: mean and logarithm of the variance, float (n, latent) each."""
+        raise NotImplementedError
 
     def set_gaussian(self, means: LatentPoints, variances: LatentPoints) -> None:
-        """Say where samples stand, which are encoded as these means and variances, float32 (n, latent) each: as the
-        Gaussian with the mean and the covariance of all of them together."""
+        """Set the Gaussian to mean and covariance of the aggregate posterior of samples.
+
+        means, variances: of the posterior of each sample, float32 (n, latent). Values that are not finite change
+        nothing: the training loop reports the divergence.
+        """
         if not (np.isfinite(means).all() and np.isfinite(variances).all()):
-            return  # the training has run away, which whoever trains tells
+            return
         covariance = np.cov(means.T.astype(np.float64), bias=True).reshape(2 * [means.shape[1]])
         values, axes = np.linalg.eigh(covariance + np.diag(variances.mean(axis=0, dtype=np.float64)))
-        self.centre.copy_(torch.from_numpy(means.mean(axis=0, dtype=np.float64)))
-        self.spread.copy_(torch.from_numpy(axes * np.sqrt(np.maximum(values, 0.0))))
+        self.center.copy_(torch.from_numpy(means.mean(axis=0, dtype=np.float64)))
+        self.covariance_root.copy_(torch.from_numpy(axes * np.sqrt(np.maximum(values, 0.0))))
 
     def fit_posterior(self, encoded: Iterable[tuple[Tensor, Tensor]]) -> None:
-        """`stand_at` of all batches of samples: means and logarithms of the variances, float (n, latent) each."""
-        codes = [torch.stack([mean, spread.exp()]).detach().float().cpu().numpy() for mean, spread in encoded]
+        """Fit the Gaussian to encoded batches, as `encode` returns them."""
+        codes = [
+            torch.stack([mean, log_variance.exp()]).detach().float().cpu().numpy() for mean, log_variance in encoded
+        ]
         self.set_gaussian(*np.concatenate(codes, axis=1))
 
-    def points(self, count: int, rng: np.random.Generator, temperature: float) -> LatentPoints:
-        """Random points, float32 (count, latent), of that Gaussian, which the prior is not quite: from the prior come
-        crude shapes. temperature: how far from its centre they spread."""
-        noise = temperature * rng.standard_normal((count, len(self.centre)))
-        found: LatentPoints = (self.centre.cpu().numpy() + noise @ self.spread.cpu().numpy().T).astype(np.float32)
-        return found
+    def sample_points(self, count: int, rng: np.random.Generator, temperature: float) -> LatentPoints:
+        """Draw points of the Gaussian, float32 (count, latent).
+
+        The aggregate posterior differs from the prior, whose points decode to crude shapes. temperature: factor of the
+        standard deviation.
+        """
+        noise = temperature * rng.standard_normal((count, len(self.center)))
+        points: LatentPoints = (self.center.cpu().numpy() + noise @ self.covariance_root.cpu().numpy().T).astype(
+            np.float32
+        )
+        return points
 
 
 def reparameterize(mean: Tensor, log_variance: Tensor, noise: Generator) -> tuple[Tensor, Tensor]:
-    """A point of each sample's Gaussian, float (n, latent), and the divergence of these from the prior, in nats, mean
-    over the samples."""
+    """Draw a point of each posterior, float (n, latent); and their mean divergence from the prior, in nats."""
     points = mean + torch.exp(0.5 * log_variance) * torch.randn(mean.shape, generator=noise, device=mean.device)
     return points, 0.5 * (mean**2 + log_variance.exp() - 1.0 - log_variance).sum() / len(mean)

@@ -1,4 +1,4 @@
-"""The training loop: so many steps of Adam."""
+"""The training loop: steps of Adam with a linearly falling learning rate."""
 
 from __future__ import annotations
 
@@ -13,69 +13,74 @@ import torch
 from torch import Tensor
 
 from stages.training.checkpoint import tensors_below
-from stages.training.model_config import ModelConfig
 from stages.training.training_task import TrainingTask
 
 FINAL_RATE_SHARE = 0.05
-"""Share of the learning rate that is left at the last step."""
 MAX_GRADIENT_NORM = 1.0
-"""Longer gradients are shortened to this norm: recurrent nets have rare ones that undo hours."""
+"""Longer gradients are clipped to this norm: recurrent nets have rare ones that undo hours."""
 
-_BFLOAT16 = frozenset({"amx_bf16", "avx512_bf16", "bf16"})
+_BFLOAT16_FLAGS = frozenset({"amx_bf16", "avx512_bf16", "bf16"})
 _MOMENTS = ("exp_avg", "exp_avg_sq")
 
 
 def set_deterministic(threads: int) -> None:
-    """Let torch sum in one order, with so many threads: equal seeds give equal weights. To be called before anything
-    runs on a GPU, whose matrix products read the environment when they are first used."""
+    """Make torch sum in one order, with a number of threads, so that equal seeds give equal weights.
+
+    Call it before anything runs on a GPU: matrix products read the environment on first use.
+    """
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
     torch.set_num_threads(threads)
     torch.use_deterministic_algorithms(True)
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]  # it only costs time
 
 
-def resolve_device(asked: str) -> torch.device:
-    """The device that a config asks for."""
-    return torch.device("cuda" if asked == "cuda" or (asked == "auto" and torch.cuda.is_available()) else "cpu")
+def resolve_device(setting: str) -> torch.device:
+    """Return the device of a config's `device`."""
+    return torch.device("cuda" if setting == "cuda" or (setting == "auto" and torch.cuda.is_available()) else "cpu")
 
 
-def resolve_precision(asked: str, device: torch.device) -> str:
-    """The numbers that a config asks for on a device: `auto` is bfloat16 where it is reckoned with as it stands, and
-    not by way of float32, which takes several times as long."""
-    if asked != "auto":
-        return asked
+def resolve_precision(setting: str, device: torch.device) -> str:
+    """Return the precision of a config's `precision` on a device.
+
+    `auto` is bfloat16 where the hardware supports it; emulation by float32 takes several times as long.
+    """
+    if setting != "auto":
+        return setting
     if device.type == "cuda":
         return "bfloat16" if torch.cuda.is_bf16_supported(including_emulation=False) else "float32"
-    return "bfloat16" if _BFLOAT16 & _processor_flags() else "float32"
+    return "bfloat16" if _BFLOAT16_FLAGS & _processor_flags() else "float32"
 
 
 @cache
 def _processor_flags() -> frozenset[str]:
-    """What the processor says that it can do, as Linux names it."""
+    """Read the features of the processor, as Linux names them."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
         return frozenset()
-    told = (line.partition(":")[2] for line in lines if line.startswith(("flags", "Features")))
-    return frozenset(next(told, "").split())
+    flags = (line.partition(":")[2] for line in lines if line.startswith(("flags", "Features")))
+    return frozenset(next(flags, "").split())
 
 
 @dataclass
 class TrainState:
-    """A learner on its way: with its optimiser, after so many steps."""
+    """A task with its optimiser and the number of steps taken."""
 
-    learner: TrainingTask
+    task: TrainingTask
     optimizer: torch.optim.Adam
     step: int = 0
 
     @classmethod
-    def of(cls, learner: TrainingTask, entry: ModelConfig) -> TrainState:
-        return cls(learner, torch.optim.Adam(learner.module.parameters(), lr=entry.learning_rate))
+    def of(cls, task: TrainingTask) -> TrainState:
+        """Start training a task."""
+        return cls(task, torch.optim.Adam(task.module.parameters(), lr=task.config.learning_rate))
 
     def tensors(self) -> dict[str, Tensor]:
-        """Weights as `weights.<name>` and the optimiser's moments as `exp_avg.<name>` and `exp_avg_sq.<name>`; what no
-        sample has used yet has none."""
-        module = self.learner.module
+        """Return weights as `weights.<name>`, moments of the optimiser as `exp_avg.<name>` and `exp_avg_sq.<name>`.
+
+        A parameter that no sample has used yet has no moments.
+        """
+        module = self.task.module
         tensors = {f"weights.{name}": tensor for name, tensor in module.state_dict().items()}
         for name, parameter in module.named_parameters():
             for moment in _MOMENTS if parameter in self.optimizer.state else ():
@@ -83,8 +88,8 @@ class TrainState:
         return tensors
 
     def restore(self, tensors: dict[str, Tensor], step: int) -> None:
-        """Go on from `tensors()` as they were after `step` steps."""
-        module = self.learner.module
+        """Resume from `tensors()` as they were after `step` steps."""
+        module = self.task.module
         module.load_state_dict(tensors_below(tensors, "weights"))
         moments = {moment: tensors_below(tensors, moment) for moment in _MOMENTS}
         state = {
@@ -96,36 +101,33 @@ class TrainState:
         self.step = step
 
 
-def train(
-    trainee: TrainState, entry: ModelConfig, rng: np.random.Generator, progress: Callable[[int, int], None]
-) -> dict[str, float]:
-    """One round: `entry.steps` steps. Answers the mean of each figure of the learner."""
-    learner, optimizer = trainee.learner, trainee.optimizer
-    device = next(learner.module.parameters()).device
+def train(state: TrainState, rng: np.random.Generator, progress: Callable[[int, int], None]) -> dict[str, float]:
+    """Train one round, `config.steps` steps. Returns the mean of each figure of the task."""
+    task, optimizer, config = state.task, state.optimizer, state.task.config
+    device = task.device
     seed = int(rng.integers(2**63))
     noise = torch.Generator(device).manual_seed(seed)
-    torch.manual_seed(seed)  # of what modules draw by themselves: dropout
-    stream = learner.batches(rng)
+    torch.manual_seed(seed)  # modules draw dropout from the global generator
+    half = resolve_precision(config.precision, device) == "bfloat16"
+    batches = task.batches(rng)
     sums: dict[str, Tensor] = {}
-    learner.module.train()
-    for done in range(entry.steps):
+    task.module.train()
+    for done in range(config.steps):
         for group in optimizer.param_groups:
-            group["lr"] = entry.learning_rate * _rate(trainee.step, entry.steps * entry.max_rounds)
-        with torch.autocast(
-            device.type, torch.bfloat16, enabled=resolve_precision(entry.precision, device) == "bfloat16"
-        ):
-            losses = learner.losses(next(stream), trainee.step, noise)
+            group["lr"] = config.learning_rate * _rate(state.step, config.steps * config.max_rounds)
+        with torch.autocast(device.type, torch.bfloat16, enabled=half):
+            losses = task.losses(next(batches), state.step, noise)
         optimizer.zero_grad()
         losses["loss"].backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(learner.module.parameters(), MAX_GRADIENT_NORM)
+        torch.nn.utils.clip_grad_norm_(task.module.parameters(), MAX_GRADIENT_NORM)
         optimizer.step()
-        trainee.step += 1
+        state.step += 1
         for name, value in losses.items():
             sums[name] = sums.get(name, torch.zeros((), device=device)) + value.detach()
-        progress(done + 1, entry.steps)
-    return {name: float(total) / entry.steps for name, total in sums.items()}
+        progress(done + 1, config.steps)
+    return {name: float(total) / config.steps for name, total in sums.items()}
 
 
 def _rate(step: int, steps: int) -> float:
-    """The share of the learning rate at a step: it falls in a straight line."""
+    """Return the share of the learning rate at a step; it falls linearly."""
     return 1.0 - (1.0 - FINAL_RATE_SHARE) * step / steps

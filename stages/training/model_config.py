@@ -1,4 +1,4 @@
-"""What the config says of every model, whatever its kind: its name, its data, and how long and on what it trains."""
+"""The config of a model, whatever its kind: its name, its samples, and how it trains."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ Subject = Literal["kit", "program"]
 """What a model learns from: the samples of a kit, or a program."""
 
 LearningSource = Literal["strings", "shapes", "programs"]
-"""What models of a kit learn from: the strings that stage `strings` has written, the shapes themselves, or, where the
-kit is a category of ShapeAssembly programs, their texts."""
+"""What a model of a kit learns from: the strings of stage `strings`, the shapes themselves, or the texts of
+ShapeAssembly programs, where the kit is a category of programs."""
 
 
 class ModelConfig(StrictModel):
@@ -27,31 +27,30 @@ class ModelConfig(StrictModel):
     name: str = Field(
         pattern=r"^[a-z][a-z0-9]*(_[a-z0-9]+)*$",
         max_length=32,
-        description="what the model is called; its weights stand in `OUT/<dataset>-models/<name>-<subject>-<seed>`, "
-        "the subject being a kit or a program; lower-case letters, digits and single underscores",
+        description="name of the model; its folder is `OUT/<dataset>-models/<name>-<subject>-<seed>`, where the "
+        "subject is a kit or a program; lower-case letters, digits and single underscores",
     )
-    seeds: int = Field(1, ge=1, le=100, description="how often it is trained, from other weights; unit: models")
-    learning_rate: float = Field(1e-3, gt=0, le=1, description="of Adam at the start; it falls to a twentieth")
-    batch_size: int = Field(64, ge=1, le=65_536, description="samples that a step of the optimiser sees; unit: samples")
+    seeds: int = Field(1, ge=1, le=100, description="trainings from different initial weights; unit: models")
+    learning_rate: float = Field(1e-3, gt=0, le=1, description="initial rate of Adam; it falls linearly to a twentieth")
+    batch_size: int = Field(64, ge=1, le=65_536, description="samples of an optimiser step; unit: samples")
     steps: int = Field(
-        250, ge=1, le=1_000_000, description="steps of a round, a minute or two of work; unit: optimiser steps"
+        250, ge=1, le=1_000_000, description="optimiser steps of a round, one or two minutes of work; unit: steps"
     )
-    max_rounds: int = Field(12, ge=1, le=10_000, description="rounds at most; unit: rounds")
+    max_rounds: int = Field(12, ge=1, le=10_000, description="maximum number of rounds; unit: rounds")
     patience: int = Field(
-        4, ge=1, le=10_000, description="so many rounds in a row that are no better than the best end it; unit: rounds"
+        4, ge=1, le=10_000, description="training ends after this many rounds without improvement; unit: rounds"
     )
     threads: int = Field(
         1,
         ge=1,
         le=256,
-        description="threads of a training, and workers that are put aside for it; another number sums in another "
-        "order: other weights; unit: threads",
+        description="threads of a training, which reserves as many workers; another number sums in another order and "
+        "gives other weights; unit: threads",
     )
-    device: Literal["auto", "cpu", "cuda"] = Field("auto", description="where it trains; `auto`: a GPU if there is one")
+    device: Literal["auto", "cpu", "cuda"] = Field("auto", description="training device; `auto`: a GPU if available")
     precision: Literal["auto", "float32", "bfloat16"] = Field(
         "auto",
-        description="numbers of the forward pass; `auto`: bfloat16 where the processor or the GPU reckons with it, "
-        "else float32, which is faster there",
+        description="precision of the forward pass; `auto`: bfloat16 where processor or GPU support it, else float32",
     )
 
 
@@ -64,10 +63,9 @@ class KitModelConfig(ModelConfig):
     subject: ClassVar[Subject] = "kit"
     learns_from: ClassVar[LearningSource] = "strings"
 
-    kits: tuple[str, ...] = Field((), description="the kits that it is trained on, each by itself; all if empty")
+    kits: tuple[str, ...] = Field((), description="kits to train on, one model a kit; empty: all")
 
     @property
     def prepared(self) -> dict[str, str]:
-        """What `prepare` is asked for, beside the samples of a kit: entries that ask for the same share what it
-        makes."""
+        """What `prepare` needs besides the samples; models with equal values share the prepared samples."""
         return {}

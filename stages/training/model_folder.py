@@ -1,4 +1,4 @@
-"""A finished training: the best weights, the curves, and the card that stands beside them."""
+"""A finished training: the best weights, the curves, and the model card."""
 
 from __future__ import annotations
 
@@ -12,36 +12,36 @@ from pipeline.stage import Outcome, Task
 from stages.training.rounds import subject_fields
 
 MODEL_FILES = {"weights.safetensors", "curves.csv", "curves.png", "README.md"}
-"""What a model's folder holds."""
+"""Files of a model's folder."""
 
 Row = Mapping[str, Any]
 
 
 def publish_model(task: Task) -> Outcome:
-    """Files of the shard: those of FILES, each behind the shard's name and a dot."""
+    """Write the files of MODEL_FILES, each as `<shard>.<file>`."""
     from stages.training.checkpoint import checkpoint_bytes, load_checkpoint, tensors_below
 
     params = task.shard.params
-    rows = [json.loads(task.input("training", f"{each}.json").read_bytes()) for each in params["rounds"]]
+    rows = [json.loads(task.input("training", f"{shard}.json").read_bytes()) for shard in params["rounds"]]
     best = task.input("training", f"{params['rounds'][params['best']]}.safetensors")
     tensors, header = load_checkpoint(best, {"kind": params["kind"], **subject_fields(params)})
     weights = tensors_below(tensors, "weights")
     header |= {key: params[key] for key in ("name", "dataset", "license")}
     figures = {"rounds": len(rows), "best": rows[params["best"]]}
-    written = {
+    files = {
         "weights.safetensors": checkpoint_bytes(weights, header),
         "curves.csv": curves_csv(rows).encode(),
         "curves.png": curves_png(rows, params["best"]),
-        "README.md": model_card(header, figures, sum(each.numel() for each in weights.values())).encode(),
+        "README.md": model_card(header, figures, sum(tensor.numel() for tensor in weights.values())).encode(),
     }
-    for file, content in written.items():
+    for file, content in files.items():
         with task.output(f"{task.shard.name}.{file}") as stream:
             stream.write(content)
     return Outcome(samples=0, summary=figures)
 
 
 def curves_csv(rows: Sequence[Row]) -> str:
-    """The figures of each round, one line a round."""
+    """Return the figures of each round, one line a round."""
     text = io.StringIO()
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     writer.writeheader()
@@ -50,7 +50,7 @@ def curves_csv(rows: Sequence[Row]) -> str:
 
 
 def curves_png(rows: Sequence[Row], best: int) -> bytes:
-    """A picture of every figure over the steps, in train and val; the best round is marked."""
+    """Plot every figure of train and val over the steps, and mark the best round."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -73,7 +73,7 @@ def curves_png(rows: Sequence[Row], best: int) -> bytes:
 
 
 def model_card(header: Mapping[str, Any], figures: Mapping[str, Any], parameters: int) -> str:
-    """What a user must know of the weights, as Markdown."""
+    """Return the model card, as Markdown."""
     best = figures["best"]
     rows = [f"| {name} | {value:.4g} |" for name, value in best.items() if isinstance(value, float)]
     settings = [f"| `{key}` | `{json.dumps(value)}` |" for key, value in header["settings"].items()]
@@ -94,8 +94,8 @@ def model_card(header: Mapping[str, Any], figures: Mapping[str, Any], parameters
         f"parameters, the best of {figures['rounds']} rounds, after {best['step']:,} steps on {header['device']} in "
         f"{header['precision']}.",
         "",
-        "`weights.safetensors` says in its header all that is needed to read it again: kind, settings, vocabulary, and "
-        "the sha256 of the samples and of the code that made it. `curves.csv` and `curves.png` show the training.",
+        "The header of `weights.safetensors` holds all that is needed to read it: kind, settings, vocabulary, and the "
+        "sha256 of samples and code. `curves.csv` and `curves.png` show the training.",
         "",
         "## Data",
         "",

@@ -25,21 +25,24 @@ AnyModelConfig = Annotated[
     | PartGraphVaeConfig,
     Field(discriminator="kind"),
 ]
-"""An entry of any kind, which its key `kind` tells."""
+"""A model of any kind; the key `kind` selects the class."""
 
 
 class TrainingConfig(StrictModel):
-    """Which models are trained. None belongs to the dataset: `make train` trains them."""
+    """The models that `make train` trains. They are no part of the dataset."""
 
     max_length: int = Field(
-        256, ge=2, le=100_000, description="longer strings are left out of the training of models; unit: tokens"
+        256,
+        ge=2,
+        le=100_000,
+        description="longer strings and programs are not trained on; unit: tokens, words or lines",
     )
-    models: tuple[AnyModelConfig, ...] = Field((), description="the models; each is trained by itself")
+    models: tuple[AnyModelConfig, ...] = Field((), description="the models; each is trained independently")
 
     @model_validator(mode="after")
     def _names_differ(self) -> TrainingConfig:
-        names = [each.name for each in self.models]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise ValueError(f"models of one name: {', '.join(twice)}")
+        names = [model.name for model in self.models]
+        duplicates = sorted({name for name in names if names.count(name) > 1})
+        if duplicates:
+            raise ValueError(f"models of one name: {', '.join(duplicates)}")
         return self

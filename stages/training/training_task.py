@@ -1,51 +1,102 @@
-"""What a kind of model is to its training: parameters, batches, losses, and a look at what it has not learnt from."""
+"""What trains a model of any kind: its samples, batches, losses and validation."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
+import torch
 from torch import Generator, Tensor, nn
 
 from pipeline.paths import file_digest
 from pipeline.stage import Task
+from stages.training.latent import LatentGaussian
+
+Module = TypeVar("Module", bound=nn.Module)
 
 
-class TrainingTask(Protocol):
-    """A model and the samples it learns from. A kind's `training.py` makes one: `learner(task, entry) -> Learner`."""
+@dataclass(frozen=True)
+class TrainingTask(ABC):
+    """A model with the samples that it learns from.
+
+    module: the parameters, on their device.
+    header: what weights must state to be read again, as JSON: vocabulary, sizes, sha256 of the samples.
+    config: the model's entry in `training.models`.
+    train, val: the samples of both splits.
+    """
+
+    module: Any
+    header: Mapping[str, Any]
+    config: Any
+    train: Any
+    val: Any
 
     @property
-    def module(self) -> nn.Module:
-        """The parameters, on their device."""
+    def device(self) -> torch.device:
+        """The device of the parameters."""
+        device: torch.device = next(self.module.parameters()).device
+        return device
 
-    @property
-    def header(self) -> Mapping[str, Any]:
-        """What weights must say of themselves to be read again, as JSON: vocabulary, sizes, sha256 of the samples."""
+    def epoch(self, samples: Any, rng: np.random.Generator | None) -> Iterator[Any]:
+        """Yield all samples once, in batches: in random order, or in their own order without `rng`.
+
+        A task without epochs overrides `batches` and `validate`.
+        """
+        raise NotImplementedError
+
+    @abstractmethod
+    def losses(self, batch: Any, step: int, noise: Generator) -> dict[str, Tensor]:
+        """Compute the figures of a batch, scalars; training minimises `loss`."""
+
+    def validation_losses(self, batch: Any, noise: Generator) -> Mapping[str, Tensor]:
+        """Compute the figures of a validation batch, by a measure that does not change from step to step."""
+        return self.losses(batch, 0, noise)
 
     def batches(self, rng: np.random.Generator) -> Iterator[Any]:
-        """Batches without end, on the device."""
-
-    def losses(self, batch: Any, step: int, noise: Generator) -> dict[str, Tensor]:
-        """Figures of a batch, scalars; `loss` is what is minimised."""
+        """Yield random batches of train without end, on the device."""
+        while True:
+            yield from self._on_device(self.epoch(self.train, rng))
 
     def validate(self, noise: Generator) -> dict[str, float]:
-        """Figures on the validation split; `loss` says which weights are best, and is the same measure at each step."""
+        """Compute the mean figures of val; `loss` decides which weights are best.
+
+        A latent Gaussian is first fitted to the encoded samples of train.
+        """
+        if isinstance(self.module, LatentGaussian):
+            self.module.fit_posterior(
+                self.module.encode(batch) for batch in self._on_device(self.epoch(self.train, None))
+            )
+        sums: dict[str, float] = {}
+        for batch in self._on_device(self.epoch(self.val, None)):
+            for name, value in self.validation_losses(batch, noise).items():
+                sums[name] = sums.get(name, 0.0) + float(value) * _batch_samples(batch) / len(self.val)
+        return sums
+
+    def _on_device(self, batches: Iterator[Any]) -> Iterator[Any]:
+        device = self.device
+        for batch in batches:
+            yield [level.to(device) for level in batch] if isinstance(batch, list) else batch.to(device)
+
+
+def _batch_samples(batch: Any) -> int:
+    """Return the number of samples of a batch; a batch of trees is a list of levels, the roots first."""
+    return len(batch[0]) if isinstance(batch, list) else len(batch)
+
+
+def seeded(seed: int, build: Callable[[], Module]) -> Module:
+    """Build a module whose random weights depend on the seed alone."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        return build()
 
 
 def sample_digests(task: Task, suffix: str) -> dict[str, str]:
-    """The sha256 of the prepared samples that a model learns from and of those that judge it, for its header.
+    """Return the sha256 of the prepared samples of train and val, for the header.
 
-    suffix: how their files end.
+    suffix: the end of their file names.
     """
     data = task.shard.params["data"]
     return {split: file_digest(task.input("training", f"{data}.{split}.{suffix}")) for split in ("train", "val")}
-
-
-def weighted_means(found: Iterable[tuple[Mapping[str, Tensor], int]], count: int) -> dict[str, float]:
-    """The means over `count` samples of figures that come as those of batches of so many samples each."""
-    sums: dict[str, float] = {}
-    for figures, samples in found:
-        for name, value in figures.items():
-            sums[name] = sums.get(name, 0.0) + float(value) * samples / count
-    return sums

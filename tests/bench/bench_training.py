@@ -61,7 +61,7 @@ def bench() -> Iterator[Measure]:
     }
     for name, settings in arms.items():
         arm = StringVaeConfig.model_validate({"name": "bench", **settings})
-        learner = StringVaeTask(new_model(arm, vocabulary, most, 0), {}, arm, vocabulary, True, strings, strings)
+        learner = StringVaeTask(new_model(arm, vocabulary, most, 0), {}, arm, strings, strings, vocabulary, True)
         ours = rate(our_steps(learner), 4.0, 2)
         yield Measure(f"string VAE learns, {name}", "strings", ours, "as in MOSES", peer, note)
     yield _programs_measure()
@@ -118,7 +118,7 @@ def _steps(learner: Any, seen: Callable[[Any], int]) -> Any:
 
     def step() -> int:
         batch = next(stream)
-        with torch.autocast("cpu", torch.bfloat16, enabled=learner.entry.precision == "bfloat16"):
+        with torch.autocast("cpu", torch.bfloat16, enabled=learner.config.precision == "bfloat16"):
             loss = learner.losses(batch, next(steps), noise)["loss"]
         _descend(learner.module, optimizer, loss)
         return seen(batch)

@@ -1,1 +1,1 @@
-"""A recurrent network that writes the cuboids of a shape one after another, as 3D-PRNN does (Zou and others 2017)."""
+"""A recurrent network of cuboids, a baseline (3D-PRNN)."""

@@ -1,4 +1,4 @@
-"""A GRU that says of each cuboid of which kind it is, and of each of its axes a mixture of Gaussians (3D-PRNN)."""
+"""A GRU that predicts each cuboid's kind, and a mixture of Gaussians for each of its axes (3D-PRNN)."""
 
 from __future__ import annotations
 
@@ -12,42 +12,49 @@ from stages.training.cuboid_rnn.batches import FLAG_COUNT, INPUT_WIDTH, KIND_COU
 from stages.training.cuboid_rnn.settings import CuboidRnnConfig
 
 MIN_DEVIATION = 0.01
-"""Least standard deviation of a Gaussian: numbers that recur would make it endlessly narrow."""
+"""Minimum standard deviation of a Gaussian: recurring numbers would make it collapse."""
 
 
 class CuboidRnn(nn.Module):
-    """Steps of cuboids, one behind the other."""
+    """A sequence model over the steps of cuboids."""
 
-    def __init__(self, entry: CuboidRnnConfig) -> None:
+    def __init__(self, config: CuboidRnnConfig) -> None:
         super().__init__()
-        self.mixtures = entry.mixtures
-        self.reader = nn.GRU(INPUT_WIDTH, entry.hidden, batch_first=True)
-        self.kinds = nn.Linear(entry.hidden, KIND_COUNT)
-        self.said = nn.Sequential(
-            nn.Linear(entry.hidden + FLAG_COUNT, entry.hidden),
+        self.mixtures = config.mixtures
+        self.reader = nn.GRU(INPUT_WIDTH, config.hidden, batch_first=True)
+        self.kinds = nn.Linear(config.hidden, KIND_COUNT)
+        self.gaussians = nn.Sequential(
+            nn.Linear(config.hidden + FLAG_COUNT, config.hidden),
             nn.LeakyReLU(0.2),
-            nn.Linear(entry.hidden, entry.mixtures * (1 + 2 * NUMBERS_PER_STEP)),
+            nn.Linear(config.hidden, config.mixtures * (1 + 2 * NUMBERS_PER_STEP)),
         )
 
-    def read(self, shown: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
-        """The states behind what is `shown`, float (n, steps, SHOWN), in which each step is written: float (n, steps,
-        hidden), and the last of them, (1, n, hidden)."""
-        states, last = self.reader(shown, state)
+    def read(self, inputs: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """Return the state after each input, float (n, steps, hidden), and the last one, float (1, n, hidden).
+
+        inputs: float (n, steps, INPUT_WIDTH).
+        """
+        states, last = self.reader(inputs, state)
         return states, last
 
     def numbers(self, states: Tensor, flags: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """The logits of the Gaussians (n, steps, mixtures), their means and deviations (n, steps, mixtures, NUMBERS),
-        of cuboids with these flags, float (n, steps, FLAGS)."""
-        found = self.said(torch.cat([states, flags], dim=-1)).float()
-        weights, rest = found.split([self.mixtures, 2 * NUMBERS_PER_STEP * self.mixtures], dim=-1)
+        """Return the logits of the mixture (n, steps, mixtures), means and deviations (n, steps, mixtures, 3).
+
+        flags: float (n, steps, FLAG_COUNT).
+        """
+        outputs = self.gaussians(torch.cat([states, flags], dim=-1)).float()
+        weights, rest = outputs.split([self.mixtures, 2 * NUMBERS_PER_STEP * self.mixtures], dim=-1)
         means, deviations = rest.view(*rest.shape[:2], self.mixtures, 2 * NUMBERS_PER_STEP).chunk(2, dim=-1)
         return weights, means, softplus(deviations) + MIN_DEVIATION
 
 
-def log_density(weights: Tensor, means: Tensor, deviations: Tensor, numbers: Tensor, turned: Tensor) -> Tensor:
-    """Logarithm of the density of numbers (n, steps, NUMBERS), float (n, steps); the turn counts where a cuboid is
-    `turned`, float (n, steps)."""
-    away = (numbers[:, :, None] - means) / deviations
-    each = -0.5 * away**2 - torch.log(deviations) - 0.5 * math.log(2 * math.pi)
-    joint = each[..., 0] + each[..., 1] + turned[..., None] * each[..., 2]
+def log_density(weights: Tensor, means: Tensor, deviations: Tensor, numbers: Tensor, rotated: Tensor) -> Tensor:
+    """Return the log-density of numbers, float (n, steps).
+
+    numbers: float (n, steps, NUMBERS_PER_STEP).
+    rotated: float (n, steps), 1 where the rotation counts.
+    """
+    scaled = (numbers[:, :, None] - means) / deviations
+    single = -0.5 * scaled**2 - torch.log(deviations) - 0.5 * math.log(2 * math.pi)
+    joint = single[..., 0] + single[..., 1] + rotated[..., None] * single[..., 2]
     return torch.logsumexp(torch.log_softmax(weights, dim=-1) + joint, dim=-1)

@@ -1,1 +1,1 @@
-"""A model that reads from a string where each part stands (strings §6)."""
+"""A model that predicts from a string how each part is placed relative to its parent (strings §6)."""

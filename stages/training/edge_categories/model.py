@@ -1,4 +1,4 @@
-"""Models of edge categories: an LSTM that judges each token by itself, and a walker from part to part (strings §6)."""
+"""Models of edge categories: an LSTM with independent tokens, and an autoregressive decoder (strings §6)."""
 
 from __future__ import annotations
 
@@ -12,44 +12,46 @@ from stages.training.transformer import TransformerBlock
 
 
 class EdgeCategoriesModel(nn.Module):
-    """What all models of edge categories do."""
+    """A model of edge categories."""
 
     def forward(self, batch: CategoryBatch) -> Tensor:
-        """Logits of each token, float (n, longest, categories). Of the categories of a batch only those of the tokens
-        before may be looked at."""
+        """Return the logits of each token, float (n, longest, categories).
+
+        Of the batch's categories, a token may depend on those of earlier tokens only.
+        """
         raise NotImplementedError
 
 
 class StringReader(nn.Module):
-    """An LSTM that reads a string both ways: where a part stands is also told by what comes, the branches that hang on
-    it and the numbers that close cycles."""
+    """A bidirectional LSTM: the placement of a part also depends on later branches and cycle numbers."""
 
-    def __init__(self, entry: EdgeCategoriesConfig, codes: int) -> None:
+    def __init__(self, config: EdgeCategoriesConfig, codes: int) -> None:
         super().__init__()
-        self.embedding = nn.Embedding(codes, entry.embedding)
-        sizes = [entry.embedding, *(entry.hidden for _ in range(entry.layers - 1))]
-        self.forwards = nn.ModuleList(nn.LSTM(size, entry.hidden // 2, batch_first=True) for size in sizes)
-        self.backwards = nn.ModuleList(nn.LSTM(size, entry.hidden // 2, batch_first=True) for size in sizes)
+        self.embedding = nn.Embedding(codes, config.embedding)
+        sizes = [config.embedding, *(config.hidden for _ in range(config.layers - 1))]
+        self.forwards = nn.ModuleList(nn.LSTM(size, config.hidden // 2, batch_first=True) for size in sizes)
+        self.backwards = nn.ModuleList(nn.LSTM(size, config.hidden // 2, batch_first=True) for size in sizes)
 
     def forward(self, batch: CategoryBatch) -> Tensor:
-        """What is known of each token, float (n, longest, hidden)."""
-        known: Tensor = self.embedding(batch.codes)
-        # Each string is turned around by itself: what is behind its end comes behind its beginning, and says nothing.
-        token = torch.arange(known.shape[1], device=known.device)
-        lengths = batch.lengths.to(known.device)[:, None]
-        turned = torch.where(token < lengths, lengths - 1 - token, token)
+        """Return the features of each token, float (n, longest, hidden)."""
+        features: Tensor = self.embedding(batch.codes)
+        # Each string is reversed on its own, so that padding stays behind it.
+        token = torch.arange(features.shape[1], device=features.device)
+        lengths = batch.lengths.to(features.device)[:, None]
+        reverse = torch.where(token < lengths, lengths - 1 - token, token)
         for forwards, backwards in zip(self.forwards, self.backwards, strict=True):
-            known = torch.cat([forwards(known)[0], _at(backwards(_at(known, turned))[0], turned)], dim=-1)
-        return known
+            backward = _at(backwards(_at(features, reverse))[0], reverse)
+            features = torch.cat([forwards(features)[0], backward], dim=-1)
+        return features
 
 
 class IndependentEdgeDecoder(EdgeCategoriesModel):
-    """A reader and a dense layer: each token is judged by itself, as published."""
+    """A reader and a dense layer: tokens are classified independently, as published."""
 
-    def __init__(self, entry: EdgeCategoriesConfig, codes: int, categories: int) -> None:
+    def __init__(self, config: EdgeCategoriesConfig, codes: int, categories: int) -> None:
         super().__init__()
-        self.reader = StringReader(entry, codes)
-        self.logits = nn.Linear(entry.hidden, categories)
+        self.reader = StringReader(config, codes)
+        self.logits = nn.Linear(config.hidden, categories)
 
     def forward(self, batch: CategoryBatch) -> Tensor:
         logits: Tensor = self.logits(self.reader(batch))
@@ -57,95 +59,100 @@ class IndependentEdgeDecoder(EdgeCategoriesModel):
 
 
 class AutoregressiveEdgeDecoder(EdgeCategoriesModel):
-    """A reader, and a transformer that walks the string with the parts that stand already before its eyes.
+    """A reader, and a transformer that places parts one after another.
 
-    A string does not tell left from right, nor how a flag is turned, so what is right depends on what was chosen
-    before. At each token the walker sees what the reader knows of it and of both ends of its edge, the frame that it
-    starts from, where the other end stands if it stands already, and the choice before and where that has led; and by
-    attention what it saw at all tokens before. Frames follow from the categories: how turns add up need not be learnt.
+    A string does not tell left from right, so the right category depends on earlier choices. The inputs of a token are
+    the reader's features of the token and of both ends of its edge, the frame of the parent, the frame of the other end
+    if it is placed already, and the category and frame of the token before. Attention adds the inputs of all earlier
+    tokens. Frames are computed from the categories, so the composition of rotations need not be learnt.
 
-    poses: float (categories, 4, 4), of the child's frame in its parent's, in the length of a part.
+    poses: float (categories, 4, 4), as in `CategoryTables`.
     """
 
-    def __init__(self, entry: EdgeCategoriesConfig, codes: int, poses: Tensor) -> None:
+    def __init__(self, config: EdgeCategoriesConfig, codes: int, poses: Tensor) -> None:
         super().__init__()
-        self.reader = StringReader(entry, codes)
+        self.reader = StringReader(config, codes)
         self.poses: Tensor
         self.register_buffer("poses", poses, persistent=False)
-        self.choice = nn.Embedding(len(poses), entry.hidden)
-        self.ends = nn.Linear(3 * entry.hidden, entry.hidden)
-        self.places = nn.Sequential(nn.Linear(3 * 12, entry.hidden), nn.GELU(), nn.Linear(entry.hidden, entry.hidden))
-        self.blocks = nn.ModuleList(TransformerBlock(entry.hidden) for _ in range(entry.layers))
-        self.norm = nn.LayerNorm(entry.hidden)
-        self.logits = nn.Linear(entry.hidden, len(poses))
+        self.choice = nn.Embedding(len(poses), config.hidden)
+        self.ends = nn.Linear(3 * config.hidden, config.hidden)
+        self.places = nn.Sequential(
+            nn.Linear(3 * 12, config.hidden), nn.GELU(), nn.Linear(config.hidden, config.hidden)
+        )
+        self.blocks = nn.ModuleList(TransformerBlock(config.hidden) for _ in range(config.layers))
+        self.norm = nn.LayerNorm(config.hidden)
+        self.logits = nn.Linear(config.hidden, len(poses))
 
     def forward(self, batch: CategoryBatch) -> Tensor:
         tokens = torch.arange(batch.codes.shape[1], device=batch.codes.device)
-        seen = self.seen(batch, self.reader(batch), self.frames(batch), tokens)
+        states = self.inputs(batch, self.reader(batch), self.frames(batch), tokens)
         for block in self.blocks:
-            seen, _, _ = block(seen, None)
-        logits: Tensor = self.logits(self.norm(seen))
+            states, _, _ = block(states, None)
+        logits: Tensor = self.logits(self.norm(states))
         return logits
 
     @torch.no_grad()
     def frames(self, batch: CategoryBatch) -> Tensor:
-        """Where each token leads, float (n, longest, 4, 4): to the frame of its part, or to the one that the part at
-        the other end of a cycle must have."""
+        """Return the frame of each token, float (n, longest, 4, 4).
+
+        It is the frame of the token's part, or the one that the part at the other end of a cycle must have.
+        """
         frames = self.poses[batch.categories]
         for token in range(1, frames.shape[1]):
             frames[:, token] = self.step(frames, batch.here[:, token], frames[:, token])
         return frames
 
     def step(self, frames: Tensor, here: Tensor, pose: Tensor) -> Tensor:
-        """The frames float (n, 4, 4) that poses float (n, 4, 4) lead to from the tokens `here`, int64 (n,)."""
-        led: Tensor = _at(frames, here.clamp(min=0)[:, None])[:, 0] @ pose
-        return led
+        """Return the frames, float (n, 4, 4), of poses float (n, 4, 4) relative to tokens `here`, int64 (n,)."""
+        composed: Tensor = _at(frames, here.clamp(min=0)[:, None])[:, 0] @ pose
+        return composed
 
-    def seen(self, batch: CategoryBatch, known: Tensor, frames: Tensor, tokens: Tensor) -> Tensor:
-        """What the walker looks at before some tokens int64 (t,), float (n, t, width).
+    def inputs(self, batch: CategoryBatch, features: Tensor, frames: Tensor, tokens: Tensor) -> Tensor:
+        """Return the inputs of some tokens, float (n, t, width).
 
-        known: float (n, longest, width), what the reader knows; frames: float (n, longest, 4, 4), those of the tokens
-        before.
+        features: float (n, longest, width), of the reader.
+        frames: float (n, longest, 4, 4), correct for the tokens before.
+        tokens: int64 (t,).
         """
-        here, there = (torch.where(each < 0, tokens, each) for each in (batch.here[:, tokens], batch.there[:, tokens]))
-        before = (tokens - 1).clamp(min=0).expand(len(known), -1)
+        here, there = (torch.where(end < 0, tokens, end) for end in (batch.here[:, tokens], batch.there[:, tokens]))
+        before = (tokens - 1).clamp(min=0).expand(len(features), -1)
         is_first = (tokens == 0)[:, None, None]
-        ends = torch.cat([known[:, tokens], _at(known, here), _at(known, there)], dim=-1)
+        ends = torch.cat([features[:, tokens], _at(features, here), _at(features, there)], dim=-1)
         start = _at(frames, torch.minimum(here, before))
         other = _inverse(start) @ _at(frames, torch.minimum(there, before))
         other = other.masked_fill((there >= tokens)[..., None, None], 0.0)
         last = _at(frames, before).masked_fill(is_first, 0.0)
-        places = torch.cat([each[..., :3, :].flatten(-2) for each in (start, other, last)], dim=-1)
+        places = torch.cat([frame[..., :3, :].flatten(-2) for frame in (start, other, last)], dim=-1)
         choice = batch.categories.gather(1, before).masked_fill(tokens == 0, DUMMY_CATEGORY)
-        seen: Tensor = self.ends(ends) + self.places(places) + self.choice(choice)
-        return seen
+        inputs: Tensor = self.ends(ends) + self.places(places) + self.choice(choice)
+        return inputs
 
 
-def make_model(entry: EdgeCategoriesConfig, tables: CategoryTables, cycles: int) -> EdgeCategoriesModel:
-    """A model of the categories of a kit, with cycle numbers below `cycles`."""
+def make_model(config: EdgeCategoriesConfig, tables: CategoryTables, cycles: int) -> EdgeCategoriesModel:
+    """Build a model of a kit's categories, with `cycles` distinct cycle numbers."""
     codes = len(tables.masks) + 2 + cycles
-    if entry.decoder == "lstm":
-        return IndependentEdgeDecoder(entry, codes, len(tables.poses))
-    return AutoregressiveEdgeDecoder(entry, codes, torch.from_numpy(tables.poses))
+    if config.decoder == "lstm":
+        return IndependentEdgeDecoder(config, codes, len(tables.poses))
+    return AutoregressiveEdgeDecoder(config, codes, torch.from_numpy(tables.poses))
 
 
 def masked(logits: Tensor, allowed: Tensor) -> Tensor:
-    """Logits where only what is allowed has a probability; where nothing is, they stay as they are."""
+    """Mask logits to the allowed categories; rows that allow none stay unchanged."""
     return logits.masked_fill(~allowed & allowed.any(dim=-1, keepdim=True), -torch.inf)
 
 
 def _at(values: Tensor, tokens: Tensor) -> Tensor:
-    """Rows of float (n, longest, ...) at tokens int64 (n, longest)."""
+    """Return the rows of float (n, longest, ...) at tokens int64 (n, longest)."""
     flat = values.flatten(2)
-    found: Tensor = flat.gather(1, tokens[..., None].expand(-1, -1, flat.shape[-1]))
-    return found.view(*tokens.shape, *values.shape[2:])
+    rows: Tensor = flat.gather(1, tokens[..., None].expand(-1, -1, flat.shape[-1]))
+    return rows.view(*tokens.shape, *values.shape[2:])
 
 
 def _inverse(frames: Tensor) -> Tensor:
-    """Inverse of rigid transforms (..., 4, 4)."""
-    turn = frames[..., :3, :3].transpose(-1, -2)
+    """Return the inverse of rigid transforms (..., 4, 4)."""
+    rotation = frames[..., :3, :3].transpose(-1, -2)
     inverse = torch.zeros_like(frames)
-    inverse[..., :3, :3] = turn
-    inverse[..., :3, 3:] = -turn @ frames[..., :3, 3:]
+    inverse[..., :3, :3] = rotation
+    inverse[..., :3, 3:] = -rotation @ frames[..., :3, 3:]
     inverse[..., 3, 3] = 1.0
     return inverse

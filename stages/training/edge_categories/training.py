@@ -1,105 +1,93 @@
-"""Training a model of edge categories: the loss and what is looked at (strings §6)."""
+"""Train a model of edge categories: loss and accuracy (strings §6)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import torch
 from torch import Generator, Tensor
 from torch.nn.functional import cross_entropy
 
-from pipeline.stage import Outcome, Task
+from pipeline.stage import Task
+from stages.training.corpus import read_description
 from stages.training.edge_categories.batches import CategoryBatch, CategoryTables, LabelledStrings, batches
-from stages.training.edge_categories.corpus import prepare_corpus, read_corpus
+from stages.training.edge_categories.corpus import prepare, read_corpus
 from stages.training.edge_categories.model import EdgeCategoriesModel, make_model, masked
 from stages.training.edge_categories.settings import EdgeCategoriesConfig
+from stages.training.kind import Kind
 from stages.training.loop import resolve_device
-from stages.training.training_task import sample_digests
-
-
-def prepare(task: Task) -> Outcome:
-    """The strings of a kit's shapes with their categories."""
-    return prepare_corpus(task)
-
-
-def entry(settings: Mapping[str, Any]) -> EdgeCategoriesConfig:
-    """The entry whose JSON is `settings`."""
-    return EdgeCategoriesConfig.model_validate(settings)
-
-
-def learner(task: Task, entry: EdgeCategoriesConfig, seed: int) -> EdgeCategoriesTask:
-    """A model with fresh weights beside the strings of its kit."""
-    described, tables, strings = read_corpus(task, task.shard.params["data"])
-    header = {**described, "data": sample_digests(task, "rows")}
-    module = new_model(entry, tables, described["cycles"], seed).to(resolve_device(entry.device))
-    return EdgeCategoriesTask(module, header, entry, tables, strings["train"], strings["val"])
-
-
-def new_model(entry: EdgeCategoriesConfig, tables: CategoryTables, cycles: int, seed: int) -> EdgeCategoriesModel:
-    """A model with random weights, by its seed alone."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
-        return make_model(entry, tables, cycles)
+from stages.training.training_task import TrainingTask, sample_digests, seeded
 
 
 @dataclass(frozen=True)
-class EdgeCategoriesTask:
-    """The `Learner` of a model of edge categories."""
+class EdgeCategoriesTask(TrainingTask):
+    """Training of a model of edge categories."""
 
-    module: EdgeCategoriesModel
-    header: Mapping[str, Any]
-    entry: EdgeCategoriesConfig
     tables: CategoryTables
-    train: LabelledStrings
-    val: LabelledStrings
 
-    def batches(self, rng: np.random.Generator) -> Iterator[CategoryBatch]:
-        """Random batches of train, one pass after another."""
-        device = next(self.module.parameters()).device
-        while True:
-            for batch in batches(self.train, self.entry.batch_size, self.tables.masks, rng):
-                yield batch.to(device)
+    def epoch(self, samples: LabelledStrings, rng: np.random.Generator | None) -> Iterator[CategoryBatch]:
+        return batches(samples, self.config.batch_size, self.tables.masks, rng)
 
     def losses(self, batch: CategoryBatch, step: int, noise: Generator) -> dict[str, Tensor]:
-        """Nats of a token, and the share of the tokens of edges that are right."""
-        right, nats = self._judge(batch)
+        """Compute the nats of a token, and the accuracy at tokens with more than one allowed category."""
+        right, nats = self._classify(batch)
         return {"loss": nats.mean(), "accuracy": right[is_open(batch)].float().mean()}
 
     def validate(self, noise: Generator) -> dict[str, float]:
-        """On val, shares of what is right, where a walker sees the right ones before each. `accuracy`: of the tokens
-        that may have more than one category; `tokens`: of all, as published; `strings`: of strings with none wrong."""
-        device = next(self.module.parameters()).device
-        sums = dict.fromkeys(("nats", "right", "open", "sure", "tokens", "strings"), 0.0)
-        for batch in (each.to(device) for each in batches(self.val, self.entry.batch_size, self.tables.masks, None)):
-            right, nats = self._judge(batch)
-            there, undecided = batch.there_is, is_open(batch)
-            found = {
-                "nats": nats.sum(), "right": right[there].sum(), "tokens": there.sum(),
-                "sure": right[undecided].sum(), "open": undecided.sum(), "strings": (right | ~there).all(dim=1).sum(),
-            }  # fmt: skip
-            for name, value in found.items():
+        """Compute accuracies on val; an autoregressive decoder sees the right categories before each token.
+
+        `accuracy`: of tokens with more than one allowed category.
+        `tokens`: of all tokens, as published.
+        `strings`: share of strings without an error.
+        """
+        sums = dict.fromkeys(("nats", "right", "open", "open_right", "tokens", "strings"), 0.0)
+        for batch in self._on_device(self.epoch(self.val, None)):
+            right, nats = self._classify(batch)
+            is_token, undecided = batch.is_token, is_open(batch)
+            counts = {
+                "nats": nats.sum(),
+                "right": right[is_token].sum(),
+                "tokens": is_token.sum(),
+                "open_right": right[undecided].sum(),
+                "open": undecided.sum(),
+                "strings": (right | ~is_token).all(dim=1).sum(),
+            }
+            for name, value in counts.items():
                 sums[name] += float(value)
         return {
             "loss": sums["nats"] / sums["tokens"],
-            "accuracy": sums["sure"] / max(sums["open"], 1.0),
+            "accuracy": sums["open_right"] / max(sums["open"], 1.0),
             "tokens": sums["right"] / sums["tokens"],
             "strings": sums["strings"] / len(self.val),
         }
 
-    def _judge(self, batch: CategoryBatch) -> tuple[Tensor, Tensor]:
-        """Whether the likeliest category of each token is right, bool (n, longest), and the nats of those that are
-        there, float (tokens,)."""
+    def _classify(self, batch: CategoryBatch) -> tuple[Tensor, Tensor]:
+        """Return whether each token's likeliest category is right, bool (n, longest), and nats, float (tokens,)."""
         logits = self.module(batch).float()
-        if self.entry.mask:
+        if self.config.mask:
             logits = masked(logits, batch.allowed)
-        there = batch.there_is
-        nats = cross_entropy(logits[there], batch.categories[there], reduction="none")
+        nats = cross_entropy(logits[batch.is_token], batch.categories[batch.is_token], reduction="none")
         return logits.argmax(dim=-1) == batch.categories, nats
 
 
+def new_task(task: Task, config: EdgeCategoriesConfig, seed: int) -> EdgeCategoriesTask:
+    """Build a task with fresh weights."""
+    description = read_description(task)
+    tables, strings = read_corpus(task)
+    header = {**description, "data": sample_digests(task, "rows")}
+    module = new_model(config, tables, description["cycles"], seed).to(resolve_device(config.device))
+    return EdgeCategoriesTask(module, header, config, strings["train"], strings["val"], tables)
+
+
+def new_model(config: EdgeCategoriesConfig, tables: CategoryTables, cycles: int, seed: int) -> EdgeCategoriesModel:
+    """Build a model with random weights."""
+    return seeded(seed, lambda: make_model(config, tables, cycles))
+
+
 def is_open(batch: CategoryBatch) -> Tensor:
-    """Tokens that may have more than one category, bool (n, longest)."""
-    return (batch.allowed.sum(dim=-1) > 1) & batch.there_is
+    """Return the tokens with more than one allowed category, bool (n, longest)."""
+    return (batch.allowed.sum(dim=-1) > 1) & batch.is_token
+
+
+KIND = Kind(EdgeCategoriesConfig, prepare, new_task)

@@ -1,1 +1,1 @@
-"""A VAE of graphs of parts, as StructureNet is (Mo and others 2019): boxes within boxes, edges where they touch."""
+"""A VAE of part graphs, a baseline (StructureNet, Mo et al. 2019): boxes within boxes, edges where they touch."""

@@ -1,8 +1,8 @@
-"""Part graphs to points of a latent space and back, over the nodes of a level at once (StructureNet §4).
+"""A VAE of part graphs that processes all nodes of a level at once (StructureNet §4).
 
-Encoding climbs from the cuboids to the root: the parts of a node hear of those that they touch, and the node is the
-greatest of what is said of them. Decoding goes down again: a node says which of so many parts are there, which of them
-touch, and, after these have heard of each other, their boxes, which of them have parts, and the code of each.
+The encoder goes from the cuboids up to the root: parts exchange messages with those that they touch, and a node is the
+maximum over its parts. The decoder goes down: a node predicts which of MAX_CHILDREN parts exist and which of them
+touch; after messages between these, their boxes, whether they have parts, and their codes.
 """
 
 from __future__ import annotations
@@ -22,11 +22,15 @@ from stages.training.part_graph_vae.settings import PartGraphVaeConfig
 
 @dataclass(frozen=True)
 class DecodedParts:
-    """What is said of the parts of n nodes. there, inner: logits float (n, MOST_CHILDREN); touching: logits float (n,
-    MOST_CHILDREN, MOST_CHILDREN), symmetric; boxes: float (n, MOST_CHILDREN, 9); codes: float (n, MOST_CHILDREN,
-    hidden), of the parts as nodes."""
+    """The predicted parts of n nodes.
 
-    there: Tensor
+    exists, inner: float (n, MAX_CHILDREN), logits.
+    touching: float (n, MAX_CHILDREN, MAX_CHILDREN), symmetric logits.
+    boxes: float (n, MAX_CHILDREN, 9).
+    codes: float (n, MAX_CHILDREN, hidden), of the parts as nodes.
+    """
+
+    exists: Tensor
     inner: Tensor
     touching: Tensor
     boxes: Tensor
@@ -36,63 +40,66 @@ class DecodedParts:
 class PartGraphVae(LatentGaussian):
     """A VAE of part graphs."""
 
-    def __init__(self, entry: PartGraphVaeConfig) -> None:
-        super().__init__(entry.latent)
-        hidden = entry.hidden
+    def __init__(self, config: PartGraphVaeConfig) -> None:
+        super().__init__(config.latent)
+        hidden = config.hidden
         self.read_box = nn.Sequential(nn.Linear(BOX_WIDTH, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, hidden))
         self.read_node = nn.Linear(hidden, hidden)
-        self.heard = MessagePassing(hidden, entry.message_rounds)
-        self.mean = nn.Linear(hidden, entry.latent)
-        self.log_variance = nn.Linear(hidden, entry.latent)
-        self.root = nn.Linear(entry.latent, hidden)
+        self.encoder_messages = MessagePassing(hidden, config.message_rounds)
+        self.mean = nn.Linear(hidden, config.latent)
+        self.log_variance = nn.Linear(hidden, config.latent)
+        self.root = nn.Linear(config.latent, hidden)
         self.parts = nn.Sequential(
             nn.Linear(hidden, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, MAX_CHILDREN * hidden)
         )
-        self.there = nn.Linear(hidden, 1)
+        self.exists = nn.Linear(hidden, 1)
         self.edges = nn.Linear(hidden, hidden)
-        self.told = MessagePassing(hidden, entry.message_rounds)
-        self.said = nn.Sequential(nn.Linear(hidden, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, BOX_WIDTH + 1))
+        self.decoder_messages = MessagePassing(hidden, config.message_rounds)
+        self.boxes = nn.Sequential(nn.Linear(hidden, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, BOX_WIDTH + 1))
         self.below = nn.Sequential(nn.Linear(hidden, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, hidden))
 
-    def encode(self, levels: Sequence[GraphLevel]) -> tuple[Tensor, Tensor]:
-        """Mean and logarithm of the variance, float (shapes, latent) each."""
+    def encode(self, batch: Sequence[GraphLevel]) -> tuple[Tensor, Tensor]:
+        """Return mean and logarithm of the variance, float (shapes, latent) each."""
         codes: Tensor | None = None
-        for level in reversed(levels):
-            seen: Tensor = self.read_box(level.boxes)
+        for level in reversed(batch):
+            features: Tensor = self.read_box(level.boxes)
             if codes is not None:
-                flat = seen.flatten(0, 1).index_put((level.opened,), self.read_node(codes), accumulate=True)
-                seen = flat.view_as(seen)
-            heard = self.heard(seen, level.touching)
-            codes = heard.masked_fill(level.there[..., None] == 0, -torch.inf).amax(dim=1)
+                flat = features.flatten(0, 1).index_put((level.opened,), self.read_node(codes), accumulate=True)
+                features = flat.view_as(features)
+            mixed = self.encoder_messages(features, level.touching)
+            codes = mixed.masked_fill(level.part_mask[..., None] == 0, -torch.inf).amax(dim=1)
         assert codes is not None
         return self.mean(codes), self.log_variance(codes)
 
     def decode(self, codes: Tensor) -> DecodedParts:
-        """What nodes of codes (n, hidden) say of their parts; those of roots are `root` of a point."""
-        seen: Tensor = leaky_relu(self.parts(codes), 0.2).view(len(codes), MAX_CHILDREN, codes.shape[1])
-        there = self.there(seen)[..., 0]
-        ends = self.edges(seen)
+        """Predict the parts of nodes with codes (n, hidden). The code of a root is `root` of a latent point."""
+        features: Tensor = leaky_relu(self.parts(codes), 0.2).view(len(codes), MAX_CHILDREN, codes.shape[1])
+        exists = self.exists(features)[..., 0]
+        ends = self.edges(features)
         touching = ends @ ends.transpose(1, 2) / ends.shape[-1] ** 0.5
-        sure = torch.sigmoid(there)
-        told = self.told(seen, torch.sigmoid(touching) * sure[:, :, None] * sure[:, None])
-        boxes, inner = self.said(told).split([BOX_WIDTH, 1], dim=-1)
-        return DecodedParts(there, inner[..., 0], touching, boxes, self.below(told))
+        probability = torch.sigmoid(exists)
+        weights = torch.sigmoid(touching) * probability[:, :, None] * probability[:, None]
+        mixed = self.decoder_messages(features, weights)
+        boxes, inner = self.boxes(mixed).split([BOX_WIDTH, 1], dim=-1)
+        return DecodedParts(exists, inner[..., 0], touching, boxes, self.below(mixed))
 
 
 class MessagePassing(nn.Module):
-    """Rounds in which parts hear of those that they touch."""
+    """Rounds of messages between touching parts."""
 
     def __init__(self, hidden: int, rounds: int) -> None:
         super().__init__()
         self.rounds = nn.ModuleList(nn.Linear(2 * hidden, hidden) for _ in range(rounds))
         self.joined = nn.Linear((rounds + 1) * hidden, hidden)
 
-    def forward(self, seen: Tensor, touching: Tensor) -> Tensor:
-        """What is said of parts, float (n, k, hidden), after all rounds, from what was, and how surely each touches
-        each, float (n, k, k)."""
+    def forward(self, features: Tensor, touching: Tensor) -> Tensor:
+        """Return the features of parts after all rounds, float (n, k, hidden).
+
+        touching: float (n, k, k), the probability of each edge.
+        """
         shares = touching / touching.sum(dim=-1, keepdim=True).clamp(min=1.0)
-        states = [seen]
-        for each in self.rounds:
-            states.append(leaky_relu(each(torch.cat([states[-1], shares @ states[-1]], dim=-1)), 0.2))
-        found: Tensor = self.joined(torch.cat(states, dim=-1))
-        return found
+        states = [features]
+        for layer in self.rounds:
+            states.append(leaky_relu(layer(torch.cat([states[-1], shares @ states[-1]], dim=-1)), 0.2))
+        outputs: Tensor = self.joined(torch.cat(states, dim=-1))
+        return outputs

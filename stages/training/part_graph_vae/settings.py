@@ -1,4 +1,4 @@
-"""What the config says of a VAE of part graphs."""
+"""The config of a VAE of part graphs."""
 
 from __future__ import annotations
 
@@ -10,21 +10,23 @@ from stages.training.model_config import KitModelConfig, LearningSource
 
 
 class PartGraphVaeConfig(KitModelConfig):
-    """A VAE of the part graphs that ShapeAssembly programs make: a baseline that knows parts of parts and what touches,
-    and no attachments. Its kits are the names of `shapeassembly.programs` and `shapeassembly.hierarchies`."""
+    """A VAE of the part graphs of ShapeAssembly programs: a baseline with hierarchy and contacts, without attachments.
+
+    Its kits are the names of `shapeassembly.programs` and `shapeassembly.hierarchies`.
+    """
 
     learns_from: ClassVar[LearningSource] = "programs"
 
-    kind: Literal["part_graph_vae"] = Field(description="a VAE of graphs of parts, in the way of StructureNet")
+    kind: Literal["part_graph_vae"] = Field(description="a VAE of part graphs, like StructureNet")
     latent: int = Field(256, ge=1, le=4096, description="dimensions of the latent space")
-    hidden: int = Field(256, ge=2, le=8192, description="numbers that stand for a part")
-    message_rounds: int = Field(2, ge=0, le=16, description="how often parts hear of those that they touch")
+    hidden: int = Field(256, ge=2, le=8192, description="size of a part's features")
+    message_rounds: int = Field(2, ge=0, le=16, description="rounds of messages between touching parts")
     number_weight: float = Field(
-        50.0, ge=0, le=10_000, description="weight of the absolute error of numbers, beside the nats of choices"
+        50.0, ge=0, le=10_000, description="weight of the absolute error of numbers, relative to the nats of choices"
     )
     kl_weight: float = Field(0.1, ge=0, le=10, description="weight of the divergence from the prior, in nats")
     precision: Literal["auto", "float32", "bfloat16"] = Field(
         "float32",
-        description="numbers of the forward pass; its many small layers gain nothing from bfloat16; `auto`: bfloat16 "
-        "where the processor or the GPU reckons with it",
+        description="precision of the forward pass; its many small layers gain nothing from bfloat16; `auto`: bfloat16 "
+        "where processor or GPU support it",
     )

@@ -1,4 +1,4 @@
-"""A trained VAE of part graphs, read from its published weights alone."""
+"""A trained VAE of part graphs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import torch
 from stages.shapeassembly.execution.interpreter import Execution
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.training.box_vectors import box_from_vector
-from stages.training.checkpoint import CheckpointError, load_checkpoint
+from stages.training.checkpoint import load_module
 from stages.training.latent import LatentPoints
 from stages.training.part_graph_vae.batches import GraphCorpus, batch_of
 from stages.training.part_graph_vae.corpus import graph_nodes
@@ -26,7 +26,7 @@ SHAPES_PER_BATCH = 256
 
 @dataclass(frozen=True)
 class TrainedPartGraphVae:
-    """header: what the weights say of themselves."""
+    """A VAE of part graphs with its header."""
 
     module: PartGraphVae
     header: Mapping[str, Any]
@@ -39,68 +39,61 @@ class TrainedPartGraphVae:
     @torch.no_grad()
     def encode(self, shapes: Sequence[Execution]) -> LatentPoints:
         """Encode executed programs: posterior means, float32 (n, latent). Raises Rejected as `graph_nodes`."""
-        graphs = GraphCorpus.of([graph_nodes(each) for each in shapes])
-        found: LatentPoints = self.module.encode(batch_of(graphs, np.arange(len(graphs))))[0].numpy()
-        return found
+        graphs = GraphCorpus.of([graph_nodes(shape) for shape in shapes])
+        means: LatentPoints = self.module.encode(batch_of(graphs, np.arange(len(graphs))))[0].numpy()
+        return means
 
-    def points(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> LatentPoints:
-        """Random points, float32 (count, latent), of where shapes stand, as `Standing.points`."""
-        return self.module.points(count, rng, temperature)
+    def sample_points(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> LatentPoints:
+        """Draw points of the aggregate posterior, as `LatentGaussian.sample_points`."""
+        return self.module.sample_points(count, rng, temperature)
 
     def sample(
         self, count: int, rng: np.random.Generator, temperature: float = 1.0
     ) -> tuple[list[tuple[Box, ...]], int]:
-        """The cuboids of so many shapes, and how many were begun for them: those without one count too. temperature:
-        as `Standing.points`. Raises ValueError where nearly all have none."""
-        kept: list[tuple[Box, ...]] = []
-        begun = 0
-        while len(kept) < count:
-            if begun > 50 * (count + SHAPES_PER_BATCH):
-                raise ValueError(f"{len(kept)} of {begun} shapes had a cuboid; train the model longer")
-            for each in self.decode(self.points(SHAPES_PER_BATCH, rng, temperature)):
-                if len(kept) < count:
-                    begun += 1
-                    kept += [each] if each else []
-        return kept, begun
+        """Sample shapes, as cuboids. Returns the shapes and the number of attempts; empty shapes are attempts too.
+
+        temperature: as in `LatentGaussian.sample_points`.
+        Raises ValueError where nearly all shapes are empty.
+        """
+        shapes: list[tuple[Box, ...]] = []
+        attempts = 0
+        while len(shapes) < count:
+            if attempts > 50 * (count + SHAPES_PER_BATCH):
+                raise ValueError(f"{len(shapes)} of {attempts} shapes had a cuboid; train the model longer")
+            for boxes in self.decode(self.sample_points(SHAPES_PER_BATCH, rng, temperature)):
+                if len(shapes) < count:
+                    attempts += 1
+                    shapes += [boxes] if boxes else []
+        return shapes, attempts
 
     @torch.no_grad()
     def decode(self, points: LatentPoints) -> list[tuple[Box, ...]]:
-        """The cuboids at each point of the latent space, float32 (n, latent)."""
+        """Decode latent points, float32 (n, latent), to cuboids."""
         codes = self.module.root(torch.from_numpy(points))
-        found: list[list[Box]] = [[] for _ in points]
+        boxes: list[list[Box]] = [[] for _ in points]
         shapes = list(range(len(points)))
         for depth in range(MAX_DEPTH):
             if not shapes:
                 break
-            said = self.module.decode(codes)
-            there = (said.there > 0).numpy()
-            # A node without parts, and what is below the last level, is the cuboid that was said of it.
-            inner = (said.inner > 0).numpy() & there & (depth + 1 < MAX_DEPTH)
-            below = self._have_parts(said.codes[torch.from_numpy(inner)])
+            parts = self.module.decode(codes)
+            exists = (parts.exists > 0).numpy()
+            # A node without parts, or below the last level, is a cuboid with the predicted box.
+            inner = (parts.inner > 0).numpy() & exists & (depth + 1 < MAX_DEPTH)
+            below = self._have_parts(parts.codes[torch.from_numpy(inner)])
             inner[inner] = below
-            for row, place in np.argwhere(there & ~inner).tolist():
-                found[shapes[row]].append(box_from_vector(said.boxes[row, place].double().numpy()))
-            codes = said.codes[torch.from_numpy(inner)]
+            for row, part in np.argwhere(exists & ~inner).tolist():
+                boxes[shapes[row]].append(box_from_vector(parts.boxes[row, part].double().numpy()))
+            codes = parts.codes[torch.from_numpy(inner)]
             shapes = [shapes[row] for row in np.nonzero(inner)[0].tolist()]
-        return [tuple(each) for each in found]
+        return [tuple(cuboids) for cuboids in boxes]
 
     def _have_parts(self, codes: torch.Tensor) -> np.ndarray:
-        """Which nodes of codes (n, hidden) have a part, bool (n,)."""
-        found: np.ndarray = (self.module.decode(codes).there > 0).any(dim=1).numpy()
-        return found
+        """Return which nodes of codes (n, hidden) have a part, bool (n,)."""
+        flags: np.ndarray = (self.module.decode(codes).exists > 0).any(dim=1).numpy()
+        return flags
 
 
 def load_part_graph_vae(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedPartGraphVae:
-    """The model in a file of weights, on the CPU.
-
-    Raises CheckpointError for whatever is not one, or says something else of itself than `expected`, such as
-    `{"kit": "chair"}`.
-    """
-    tensors, header = load_checkpoint(path, {"kind": "part_graph_vae", **(expected or {})})
-    module = PartGraphVae(
-        PartGraphVaeConfig.model_validate({"name": "trained", "kind": "part_graph_vae", **header["settings"]})
-    )
-    if module.state_dict().keys() != tensors.keys():
-        raise CheckpointError(f"{path} has other tensors than this version of Shapemill: train it again (make train)")
-    module.load_state_dict(tensors)
-    return TrainedPartGraphVae(module.eval(), header)
+    """Read the model in a file of weights, as `load_module`. expected: such as `{"kit": "chair"}`."""
+    kind = {"kind": "part_graph_vae", **(expected or {})}
+    return TrainedPartGraphVae(*load_module(path, kind, PartGraphVaeConfig, lambda config, _: PartGraphVae(config)))

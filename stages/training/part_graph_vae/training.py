@@ -1,99 +1,77 @@
-"""How a VAE of part graphs learns: by the parts of each node in the order of its program, so that none has to be
-assigned, for which StructureNet looks for the cheapest assignment of unordered ones."""
+"""Train a VAE of part graphs.
+
+Parts are in the order of their program, so none has to be assigned; StructureNet searches for the cheapest assignment
+of unordered parts.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import torch
 from torch import Generator, Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
-from pipeline.stage import Outcome, Task
+from pipeline.stage import Task
+from stages.training.corpus import read_description, read_splits
+from stages.training.kind import Kind
 from stages.training.latent import reparameterize
 from stages.training.loop import resolve_device
 from stages.training.part_graph_vae.batches import GraphBatch, GraphCorpus, batches
-from stages.training.part_graph_vae.corpus import prepare_corpus, read_corpus
+from stages.training.part_graph_vae.corpus import prepare
 from stages.training.part_graph_vae.model import PartGraphVae
 from stages.training.part_graph_vae.settings import PartGraphVaeConfig
-from stages.training.training_task import sample_digests, weighted_means
-
-
-def prepare(task: Task) -> Outcome:
-    """The shapes of a category, as graphs of parts."""
-    return prepare_corpus(task)
-
-
-def entry(settings: Mapping[str, Any]) -> PartGraphVaeConfig:
-    """The entry whose JSON is `settings`."""
-    return PartGraphVaeConfig.model_validate(settings)
-
-
-def learner(task: Task, entry: PartGraphVaeConfig, seed: int) -> PartGraphVaeTask:
-    """A model with fresh weights beside the shapes of its category."""
-    described, graphs = read_corpus(task, task.shard.params["data"])
-    header = {**described, "data": sample_digests(task, "safetensors")}
-    module = new_model(entry, seed).to(resolve_device(entry.device))
-    return PartGraphVaeTask(module, header, entry, graphs["train"], graphs["val"])
-
-
-def new_model(entry: PartGraphVaeConfig, seed: int) -> PartGraphVae:
-    """A model with random weights, by its seed alone."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
-        return PartGraphVae(entry)
+from stages.training.training_task import TrainingTask, sample_digests, seeded
 
 
 @dataclass(frozen=True)
-class PartGraphVaeTask:
-    """The `Learner` of a VAE of part graphs."""
+class PartGraphVaeTask(TrainingTask):
+    """Training of a VAE of part graphs."""
 
-    module: PartGraphVae
-    header: Mapping[str, Any]
-    entry: PartGraphVaeConfig
-    train: GraphCorpus
-    val: GraphCorpus
-
-    def batches(self, rng: np.random.Generator) -> Iterator[GraphBatch]:
-        """Random batches of train, one pass after another."""
-        device = next(self.module.parameters()).device
-        while True:
-            for levels in batches(self.train, self.entry.batch_size, rng):
-                yield [level.to(device) for level in levels]
+    def epoch(self, samples: GraphCorpus, rng: np.random.Generator | None) -> Iterator[GraphBatch]:
+        return batches(samples, self.config.batch_size, rng)
 
     def losses(self, batch: GraphBatch, step: int, noise: Generator) -> dict[str, Tensor]:
-        """Means over shapes: nats of what is there, has parts and touches, absolute errors of the numbers of boxes, and
-        the divergence from the prior."""
-        points, divergence = reparameterize(*self.module.encode(batch), noise)
-        nats, errors = (each / len(points) for each in reconstruction(self.module, batch, points))
-        loss = nats + self.entry.number_weight * errors + self.entry.kl_weight * divergence
+        """Compute means over shapes: nats of choices, absolute errors of boxes, divergence from the prior."""
+        mean, log_variance = self.module.encode(batch)
+        points, divergence = reparameterize(mean, log_variance, noise)
+        nats, errors = (total / len(points) for total in reconstruction(self.module, batch, points))
+        loss = nats + self.config.number_weight * errors + self.config.kl_weight * divergence
         return {"loss": loss, "nats": nats, "errors": errors, "divergence": divergence}
 
-    def validate(self, noise: Generator) -> dict[str, float]:
-        """The same on val; and the module learns where the shapes of train stand."""
-        device = next(self.module.parameters()).device
-        train, val = (batches(each, self.entry.batch_size, None) for each in (self.train, self.val))
-        self.module.fit_posterior(self.module.encode([level.to(device) for level in levels]) for levels in train)
-        found = ((self.losses([each.to(device) for each in levels], 0, noise), len(levels[0].boxes)) for levels in val)
-        return weighted_means(found, len(self.val))
+
+def new_task(task: Task, config: PartGraphVaeConfig, seed: int) -> PartGraphVaeTask:
+    """Build a task with fresh weights."""
+    graphs = read_splits(task, GraphCorpus)
+    header = {**read_description(task), "data": sample_digests(task, "safetensors")}
+    module = new_model(config, seed).to(resolve_device(config.device))
+    return PartGraphVaeTask(module, header, config, graphs["train"], graphs["val"])
+
+
+def new_model(config: PartGraphVaeConfig, seed: int) -> PartGraphVae:
+    """Build a model with random weights."""
+    return seeded(seed, lambda: PartGraphVae(config))
 
 
 def reconstruction(module: PartGraphVae, levels: GraphBatch, points: Tensor) -> tuple[Tensor, Tensor]:
-    """Sums over all shapes at these points of the latent space: nats of choices, and absolute errors of numbers."""
+    """Return sums over the shapes at latent points: nats of choices, and absolute errors of boxes."""
     nats, errors = points.new_zeros(()), points.new_zeros(())
     codes = module.root(points)
     for level in levels:
-        said = module.decode(codes)
-        both = torch.triu(level.there[:, :, None] * level.there[:, None], diagonal=1)
-        nats = nats + _nats(said.there, level.there, None) + _nats(said.inner, level.inner, level.there)
-        nats = nats + _nats(said.touching, level.touching, both)
-        errors = errors + ((said.boxes - level.boxes).abs().sum(dim=-1) * level.there).sum()
-        codes = said.codes.flatten(0, 1)[level.opened]
+        parts = module.decode(codes)
+        mask = level.part_mask
+        pairs = torch.triu(mask[:, :, None] * mask[:, None], diagonal=1)
+        nats = nats + _nats(parts.exists, mask, None) + _nats(parts.inner, level.inner, mask)
+        nats = nats + _nats(parts.touching, level.touching, pairs)
+        errors = errors + ((parts.boxes - level.boxes).abs().sum(dim=-1) * mask).sum()
+        codes = parts.codes.flatten(0, 1)[level.opened]
     return nats, errors
 
 
 def _nats(logits: Tensor, flags: Tensor, weights: Tensor | None) -> Tensor:
     return binary_cross_entropy_with_logits(logits.float(), flags, weight=weights, reduction="sum")
+
+
+KIND = Kind(PartGraphVaeConfig, prepare, new_task)

@@ -1,1 +1,1 @@
-"""Models that write ShapeAssembly programs word by word: a language model whose mask is the grammar."""
+"""A language model of ShapeAssembly programs, masked by the grammar."""

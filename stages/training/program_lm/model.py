@@ -1,7 +1,7 @@
-"""A transformer that says which word of a program comes next.
+"""A transformer that predicts the next word of a program.
 
-Beside the word before, it sees what the grammar knows of the next: its field, the cuboid that the line is about, the
-one that the assembly expands, and the sizes of these.
+Besides the word before, its inputs are the grammar's context of the next word: its field, the line's cuboid, the cuboid
+that the assembly expands, and their sizes.
 """
 
 from __future__ import annotations
@@ -17,55 +17,66 @@ from stages.training.program_vae.partial_assembly import MAX_DEPTH
 from stages.training.transformer import TransformerBlock
 
 Cache = list[tuple[Tensor, Tensor]]
-"""Keys and values of each block, float (n, most, width) each."""
+"""Keys and values of each block, float (n, longest, width) each."""
 
 
 class ProgramLm(nn.Module):
-    """`values`, float64 (fields, STEPS + 1), says what the steps of numbers stand for."""
+    """A language model of programs.
 
-    def __init__(self, entry: ProgramLmConfig, longest: int) -> None:
+    values: float64 (fields, NUMBER_STEPS + 1), the number of each step.
+    """
+
+    def __init__(self, config: ProgramLmConfig, longest: int) -> None:
         super().__init__()
-        self.words = nn.Embedding(VOCABULARY_SIZE, entry.width)
+        self.words = nn.Embedding(VOCABULARY_SIZE, config.width)
         self.cues = nn.ModuleList(
-            nn.Embedding(many, entry.width) for many in (len(TokenField), SLOT_COUNT, SLOT_COUNT, MAX_DEPTH)
+            nn.Embedding(size, config.width) for size in (len(TokenField), SLOT_COUNT, SLOT_COUNT, MAX_DEPTH)
         )
-        self.places = nn.Embedding(longest, entry.width)
-        self.sizes = nn.Linear(SIZE_INPUTS, entry.width)
-        self.blocks = nn.ModuleList(TransformerBlock(entry.width, entry.dropout) for _ in range(entry.layers))
-        self.norm = nn.LayerNorm(entry.width)
-        self.logits = nn.Linear(entry.width, VOCABULARY_SIZE)
+        self.places = nn.Embedding(longest, config.width)
+        self.sizes = nn.Linear(SIZE_INPUTS, config.width)
+        self.blocks = nn.ModuleList(TransformerBlock(config.width, config.dropout) for _ in range(config.layers))
+        self.norm = nn.LayerNorm(config.width)
+        self.logits = nn.Linear(config.width, VOCABULARY_SIZE)
         self.values: Tensor
         self.register_buffer("values", torch.zeros(len(TokenField), NUMBER_STEPS + 1, dtype=torch.float64))
         self.barred: Tensor
         self.register_buffer("barred", torch.from_numpy(~field_words()), persistent=False)
 
-    def forward(self, before: Tensor, cues: Tensor, seen: Tensor, places: Tensor) -> Tensor:
-        """Logits float (k, WORDS) of the words at `places` in programs x longest, int64 (k,), from the words before
-        each, int64 (n, longest), and what is known of each, int64 (n, longest, 4) and float (n, longest, SEEN)."""
-        states = self._embedded(before, cues, seen, torch.arange(before.shape[1], device=before.device))
+    def forward(self, before: Tensor, cues: Tensor, sizes: Tensor, places: Tensor) -> Tensor:
+        """Return logits, float (k, VOCABULARY_SIZE), of the words at some places.
+
+        before: int64 (n, longest), the word before each.
+        cues: int64 (n, longest, 4).
+        sizes: float (n, longest, SIZE_INPUTS).
+        places: int64 (k,), index in programs x longest.
+        """
+        states = self._embed(before, cues, sizes, torch.arange(before.shape[1], device=before.device))
         for block in self.blocks:
             states, _, _ = block(states, None)
-        return self._said(states.flatten(0, 1)[places], cues.flatten(0, 1)[places])
+        return self._masked_logits(states.flatten(0, 1)[places], cues.flatten(0, 1)[places])
 
     def start(self, count: int) -> Cache:
-        """The cache of so many programs."""
+        """Return an empty cache for `count` programs."""
         shape = (count, *self.places.weight.shape)
         return [(self.norm.weight.new_zeros(shape), self.norm.weight.new_zeros(shape)) for _ in self.blocks]
 
-    def step(self, before: Tensor, cues: Tensor, seen: Tensor, places: Tensor, cache: Cache) -> Tensor:
-        """Logits float (n, WORDS) of words at these places, int64 (n,); what is cached behind them does not count."""
-        states = self._embedded(before, cues, seen, places)
+    def step(self, before: Tensor, cues: Tensor, sizes: Tensor, places: Tensor, cache: Cache) -> Tensor:
+        """Return logits, float (n, VOCABULARY_SIZE), of one word of each program.
+
+        places: int64 (n,), the index of the word; cached entries behind it are ignored.
+        """
+        states = self._embed(before, cues, sizes, places)
         for block, (keys, values) in zip(self.blocks, cache, strict=True):
             assert isinstance(block, TransformerBlock)
             states = block.step(states, keys, values, places)
-        return self._said(states, cues)
+        return self._masked_logits(states, cues)
 
-    def _embedded(self, before: Tensor, cues: Tensor, seen: Tensor, places: Tensor) -> Tensor:
-        found: Tensor = self.words(before) + self.places(places) + self.sizes(torch.log1p(seen / THIN_SHARE))
+    def _embed(self, before: Tensor, cues: Tensor, sizes: Tensor, places: Tensor) -> Tensor:
+        embedded: Tensor = self.words(before) + self.places(places) + self.sizes(torch.log1p(sizes / THIN_SHARE))
         for number, table in enumerate(self.cues):
-            found = found + table(cues[..., number])
-        return found
+            embedded = embedded + table(cues[..., number])
+        return embedded
 
-    def _said(self, states: Tensor, cues: Tensor) -> Tensor:
+    def _masked_logits(self, states: Tensor, cues: Tensor) -> Tensor:
         logits: Tensor = self.logits(self.norm(states)).float()
         return logits.masked_fill(self.barred[cues[..., 0]], -torch.inf)

@@ -1,8 +1,7 @@
 """ShapeAssembly programs as words of one vocabulary: commands, cuboids, flags, faces, axes, counts and numbers.
 
-An assembly is its lines and STOP; behind it stand the assemblies that expand its cuboids, in the order of their
-declarations, each followed by its own. First of all come the sizes of the root's bounding box. Which word may stand
-where is said by the field that it fills.
+A program begins with the sizes of the root's bounding box. An assembly is its lines and STOP, followed by the
+assemblies that expand its cuboids, depth first. Each word fills a field, which determines the possible words.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from stages.training.program_vae.partial_assembly import MAX_COPIES
 
 
 class TokenField(IntEnum):
-    """What a word says."""
+    """The field that a word fills."""
 
     ROOT_X, ROOT_Y, ROOT_Z = 0, 1, 2
     COMMAND = 3
@@ -54,15 +53,14 @@ COMMAND_FIELDS: dict[int, tuple[TokenField, ...]] = {
     TRANSLATE: (TokenField.MOVED, TokenField.AXIS, TokenField.COPIES, TokenField.DISTANCE),
     REFLECT: (TokenField.MOVED, TokenField.AXIS),
 }  # fmt: skip
-"""What follows each command."""
+"""The fields after each command."""
 
 NUMBER_STEPS = 64
-"""Steps from 0 to 1 of a number. Real chairs whose numbers are rounded so are rooted and stable as before."""
+"""Steps of a number from 0 to 1. Real chairs with numbers rounded to these steps stay rooted and stable."""
 
 _COMMANDS, _SLOTS, _BUILDS, _FACES, _AXES, _COPIES = 7, SLOT_COUNT, 4, len(FACES), len(AXES), MAX_COPIES
 _STARTS = np.cumsum([0, _COMMANDS, _SLOTS, _BUILDS, _FACES, _AXES, _COPIES, NUMBER_STEPS + 1]).tolist()
 VOCABULARY_SIZE: int = _STARTS[-1]
-"""Words of the vocabulary."""
 
 _KIND = {
     TokenField.COMMAND: 0, TokenField.MOVED: 1, TokenField.TARGET: 1, TokenField.FIRST: 1, TokenField.SECOND: 1,
@@ -70,34 +68,33 @@ _KIND = {
 }  # fmt: skip
 _NUMBER = 6
 
-NUMBER_FIELDS = tuple(each for each in TokenField if each not in _KIND)
-"""The fields that numbers fill."""
+NUMBER_FIELDS = tuple(field for field in TokenField if field not in _KIND)
 
 THIN_SHARE = 0.1
-"""Sizes are counted by the logarithm of 1 + share / THIN, so that those of thin parts are told apart."""
+"""Sizes are quantised by the logarithm of 1 + share / THIN_SHARE, which resolves thin parts."""
 
 Word = tuple[TokenField, int, float]
-"""A field, the word that fills it, and the number that it stands for, if any."""
+"""A field, the word that fills it, and the word's exact number, if any."""
 
 
 def first_word(field: TokenField) -> int:
-    """The first word of those that may fill a field; the others stand behind it."""
+    """Return the first word of a field; its other words follow."""
     start: int = _STARTS[_KIND.get(field, _NUMBER)]
     return start
 
 
 def field_words() -> BoolArray:
-    """Which words may fill which field, bool (fields, WORDS)."""
-    found = np.zeros((len(TokenField), VOCABULARY_SIZE), np.bool_)
+    """Return the words of each field, bool (fields, VOCABULARY_SIZE)."""
+    words = np.zeros((len(TokenField), VOCABULARY_SIZE), np.bool_)
     for field in TokenField:
         kind = _KIND.get(field, _NUMBER)
-        found[field, _STARTS[kind] : _STARTS[kind + 1]] = True
-    found[TokenField.COMMAND, START] = False
-    return found
+        words[field, _STARTS[kind] : _STARTS[kind + 1]] = True
+    words[TokenField.COMMAND, START] = False
+    return words
 
 
 def step_of(field: TokenField, number: float) -> int:
-    """The step of a number: of a size, a share of the box around, or of a coordinate."""
+    """Return the step of a number: a size, as a share of the box around, or a coordinate."""
     number = min(max(number, 0.0), 1.0)
     return round(
         NUMBER_STEPS
@@ -106,32 +103,33 @@ def step_of(field: TokenField, number: float) -> int:
 
 
 def number_of_step(field: TokenField, step: int) -> float:
-    """The number in the middle of a step."""
+    """Return the number in the middle of a step."""
     share = step / NUMBER_STEPS
     return float(THIN_SHARE * np.expm1(share * np.log1p(1 / THIN_SHARE))) if field <= TokenField.SIZE_Z else share
 
 
 def program_words(program: AssemblyProgram, unit: float) -> list[Word]:
-    """The words of a program. unit: the length that the sizes of its root are shares of.
+    """Return the words of a program.
 
-    Raises ProgramError where an assembly has more than ten cuboids, names cuboids that no line declares (copies among
-    them), is expanded twice, or copies too often.
+    unit: length of which the sizes of the root are shares.
+    Raises ProgramError where an assembly has more than ten cuboids, names a cuboid that no line declares, such as a
+    copy, is expanded twice, or copies too often.
     """
     words = [_number(TokenField(axis), size / unit) for axis, size in enumerate(program.root.bbox.dims)]
     seen: set[str] = set()
-    ahead = [program.root]
-    while ahead:
-        block = ahead.pop()
+    pending = [program.root]
+    while pending:
+        block = pending.pop()
         if block.name in seen:
             raise ProgramError("expanded twice", f"{block.name} stands for two cuboids; give each its own")
         seen.add(block.name)
         words += _block(block, program)
-        ahead += [program.named[each.name] for each in reversed(block.cuboids) if each.name in program.named]
+        pending += [program.named[cuboid.name] for cuboid in reversed(block.cuboids) if cuboid.name in program.named]
     return words
 
 
 def _block(block: Block, program: AssemblyProgram) -> Iterator[Word]:
-    slots = {name: slot for slot, name in enumerate([BBOX, *(each.name for each in block.cuboids)])}
+    slots = {name: slot for slot, name in enumerate([BBOX, *(cuboid.name for cuboid in block.cuboids)])}
     if len(slots) > SLOT_COUNT:
         raise ProgramError(
             "too many cuboids", f"{block.name} has {len(slots) - 1}, at most {SLOT_COUNT - 1} are learnt"
@@ -159,8 +157,8 @@ def _line(line: Line, block: Block, expanded: bool, slot: Callable[[TokenField, 
             slot(TokenField.MOVED, line.moved),
             slot(TokenField.TARGET, line.target),
         )
-        for place, number in enumerate((*line.source, *line.goal)):
-            yield _number(TokenField(TokenField.SOURCE_X + place), number)
+        for index, number in enumerate((*line.source, *line.goal)):
+            yield _number(TokenField(TokenField.SOURCE_X + index), number)
     elif isinstance(line, Squeeze):
         yield from (_choice(TokenField.COMMAND, SQUEEZE), slot(TokenField.MOVED, line.moved))
         yield from (slot(TokenField.FIRST, line.first), slot(TokenField.SECOND, line.second))
@@ -180,8 +178,8 @@ def _line(line: Line, block: Block, expanded: bool, slot: Callable[[TokenField, 
         yield _number(TokenField.DISTANCE, line.distance)
 
 
-def _choice(field: TokenField, place: int) -> Word:
-    return field, first_word(field) + place, 0.0
+def _choice(field: TokenField, index: int) -> Word:
+    return field, first_word(field) + index, 0.0
 
 
 def _number(field: TokenField, number: float) -> Word:
@@ -189,14 +187,17 @@ def _number(field: TokenField, number: float) -> Word:
 
 
 def step_values(words: list[list[Word]]) -> FloatArray:
-    """What each step of each field stands for, float64 (fields, STEPS + 1): the median of the numbers of programs that
-    it was said of, so that those that recur, such as 0, 0.5 and 1, are exact; where there are none, its middle."""
-    found = np.array([[number_of_step(field, step) for step in range(NUMBER_STEPS + 1)] for field in TokenField])
-    told = [(field, word, number) for program in words for field, word, number in program if field in NUMBER_FIELDS]
-    of = np.array([field * (NUMBER_STEPS + 1) + word - first_word(field) for field, word, _ in told])
-    numbers = np.array([number for _, _, number in told])
-    order = np.argsort(of, kind="stable")
-    kinds, starts = np.unique(of[order], return_index=True)
-    for kind, some in zip(kinds.tolist(), np.split(numbers[order], starts[1:]), strict=True):
-        found.flat[kind] = np.median(some)
-    return found
+    """Return the number of each step of each field, float64 (fields, NUMBER_STEPS + 1).
+
+    It is the median of the numbers in the programs, so that recurring ones, such as 0, 0.5 and 1, are exact; for an
+    unused step its middle.
+    """
+    values = np.array([[number_of_step(field, step) for step in range(NUMBER_STEPS + 1)] for field in TokenField])
+    used = [(field, word, number) for program in words for field, word, number in program if field in NUMBER_FIELDS]
+    steps = np.array([field * (NUMBER_STEPS + 1) + word - first_word(field) for field, word, _ in used])
+    numbers = np.array([number for _, _, number in used])
+    order = np.argsort(steps, kind="stable")
+    kinds, starts = np.unique(steps[order], return_index=True)
+    for kind, of_step in zip(kinds.tolist(), np.split(numbers[order], starts[1:]), strict=True):
+        values.flat[kind] = np.median(of_step)
+    return values

@@ -1,95 +1,78 @@
-"""How a language model of programs learns: the nats of each word after those before it."""
+"""Train a language model of programs: the nats of each word given those before."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import torch
 from torch import Generator, Tensor
 from torch.nn.functional import cross_entropy
 
-from pipeline.stage import Outcome, Task
+from pipeline.stage import Task
 from stages.shape.arrays import FloatArray
+from stages.training.corpus import read_arrays, read_description, read_splits
+from stages.training.kind import Kind
 from stages.training.loop import resolve_device
 from stages.training.program_lm.batches import WordBatch, WordCorpus, batches
-from stages.training.program_lm.corpus import prepare_corpus, read_corpus
+from stages.training.program_lm.corpus import prepare
 from stages.training.program_lm.model import ProgramLm
 from stages.training.program_lm.settings import ProgramLmConfig
 from stages.training.program_lm.tokens import NUMBER_STEPS, VOCABULARY_SIZE
-from stages.training.training_task import sample_digests, weighted_means
+from stages.training.training_task import TrainingTask, sample_digests, seeded
 
 FIRST_NUMBER_WORD = VOCABULARY_SIZE - NUMBER_STEPS - 1
 
 
-def prepare(task: Task) -> Outcome:
-    """The programs of a category, as words."""
-    return prepare_corpus(task)
+@dataclass(frozen=True)
+class ProgramLmTask(TrainingTask):
+    """Training of a language model of programs."""
+
+    def epoch(self, samples: WordCorpus, rng: np.random.Generator | None) -> Iterator[WordBatch]:
+        return batches(samples, self.config.batch_size, rng)
+
+    def losses(self, batch: WordBatch, step: int, noise: Generator) -> dict[str, Tensor]:
+        """Compute the mean nats of a program, and of its numbers; inputs are jittered."""
+        return self._nats(batch, jittered(batch.before, self.config.jitter, noise))
+
+    def validation_losses(self, batch: WordBatch, noise: Generator) -> dict[str, Tensor]:
+        """Compute the same without jitter."""
+        return self._nats(batch, batch.before)
+
+    def _nats(self, batch: WordBatch, before: Tensor) -> dict[str, Tensor]:
+        logits = self.module(before, batch.cues, batch.sizes, batch.places)
+        words = batch.words.flatten()[batch.places]
+        nats = cross_entropy(logits, words, reduction="none")
+        numbers = (nats * (words >= FIRST_NUMBER_WORD)).sum() / len(batch)
+        return {"loss": nats.sum() / len(batch), "numbers": numbers}
 
 
-def entry(settings: Mapping[str, Any]) -> ProgramLmConfig:
-    """The entry whose JSON is `settings`."""
-    return ProgramLmConfig.model_validate(settings)
+def new_task(task: Task, config: ProgramLmConfig, seed: int) -> ProgramLmTask:
+    """Build a task with fresh weights."""
+    description, words = read_description(task), read_splits(task, WordCorpus)
+    values = read_arrays(task, "values")["values"]
+    header = {**description, "data": sample_digests(task, "safetensors")}
+    module = new_model(config, values, description["longest"], seed).to(resolve_device(config.device))
+    return ProgramLmTask(module, header, config, words["train"], words["val"])
 
 
-def learner(task: Task, entry: ProgramLmConfig, seed: int) -> ProgramLmTask:
-    """A model with fresh weights beside the programs of its category."""
-    described, values, texts = read_corpus(task, task.shard.params["data"])
-    header = {**described, "data": sample_digests(task, "safetensors")}
-    module = new_model(entry, values, described["longest"], seed).to(resolve_device(entry.device))
-    return ProgramLmTask(module, header, entry, texts["train"], texts["val"])
-
-
-def new_model(entry: ProgramLmConfig, values: FloatArray, longest: int, seed: int) -> ProgramLm:
-    """A model with random weights, by its seed alone, of programs of at most `longest` words."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
-        module = ProgramLm(entry, longest)
+def new_model(config: ProgramLmConfig, values: FloatArray, longest: int, seed: int) -> ProgramLm:
+    """Build a model of programs of at most `longest` words with random weights."""
+    module = seeded(seed, lambda: ProgramLm(config, longest))
     module.values.copy_(torch.from_numpy(values))
     return module
 
 
-@dataclass(frozen=True)
-class ProgramLmTask:
-    """The `Learner` of a language model of programs."""
-
-    module: ProgramLm
-    header: Mapping[str, Any]
-    entry: ProgramLmConfig
-    train: WordCorpus
-    val: WordCorpus
-
-    def batches(self, rng: np.random.Generator) -> Iterator[WordBatch]:
-        """Random batches of train, one pass after another."""
-        device = next(self.module.parameters()).device
-        while True:
-            for batch in batches(self.train, self.entry.batch_size, rng):
-                yield batch.to(device)
-
-    def losses(self, batch: WordBatch, step: int, noise: Generator) -> dict[str, Tensor]:
-        """Nats of a program, in the mean; of them those of its numbers."""
-        return self._nats(batch, jittered(batch.before, self.entry.jitter, noise))
-
-    def validate(self, noise: Generator) -> dict[str, float]:
-        """The same on val, nothing jittered."""
-        device = next(self.module.parameters()).device
-        val = (batch.to(device) for batch in batches(self.val, self.entry.batch_size, None))
-        return weighted_means(((self._nats(each, each.before), len(each.words)) for each in val), len(self.val))
-
-    def _nats(self, batch: WordBatch, before: Tensor) -> dict[str, Tensor]:
-        logits = self.module(before, batch.cues, batch.seen, batch.places)
-        words = batch.words.flatten()[batch.places]
-        nats = cross_entropy(logits, words, reduction="none")
-        loss = nats.sum() / len(batch.words)
-        return {"loss": loss, "numbers": (nats * (words >= FIRST_NUMBER_WORD)).sum() / len(batch.words)}
-
-
 def jittered(before: Tensor, share: float, noise: Generator) -> Tensor:
-    """Words before each, int64 (n, longest), of whose numbers a share is a step lower or higher: what is written later
-    is seldom just what was read."""
-    drawn = torch.rand(before.shape, generator=noise, device=before.device)
-    moved = before + torch.where(drawn < share / 2, -1, 1)
-    numbers = (before >= FIRST_NUMBER_WORD) & (drawn < share)
-    return torch.where(numbers, moved.clamp(FIRST_NUMBER_WORD, VOCABULARY_SIZE - 1), before)
+    """Shift a share of the numbers among input words, int64 (n, longest), by one step up or down.
+
+    Sampled programs seldom repeat training numbers exactly.
+    """
+    uniform = torch.rand(before.shape, generator=noise, device=before.device)
+    shifted = before + torch.where(uniform < share / 2, -1, 1)
+    numbers = (before >= FIRST_NUMBER_WORD) & (uniform < share)
+    return torch.where(numbers, shifted.clamp(FIRST_NUMBER_WORD, VOCABULARY_SIZE - 1), before)
+
+
+KIND = Kind(ProgramLmConfig, prepare, new_task)

@@ -1,1 +1,1 @@
-"""Models that write ShapeAssembly programs: the hierarchical sequence VAE (shapeassembly §6)."""
+"""The hierarchical sequence VAE of ShapeAssembly programs (shapeassembly §6)."""

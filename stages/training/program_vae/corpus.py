@@ -1,86 +1,57 @@
-"""The programs of a category, made ready: read once from the collection, as numbers."""
+"""Prepare the programs of a category as arrays of lines."""
 
 from __future__ import annotations
-
-import json
-from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
 from pipeline.errors import Rejected
-from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Task
-from stages.shape.sample import read_samples
 from stages.shapeassembly.editing.ablations import without_alignment, without_macros, without_order
 from stages.shapeassembly.editing.flattening import without_hierarchy
 from stages.shapeassembly.syntax.errors import ProgramError
-from stages.shapeassembly.syntax.parser import parse
 from stages.shapeassembly.syntax.program import AssemblyProgram
+from stages.training.corpus import category_programs, write_arrays, write_description
 from stages.training.program_vae.batches import ProgramCorpus
 from stages.training.program_vae.lines import AssemblyLines, assembly_lines
 from stages.training.program_vae.settings import Ablation
 
 
-def prepare_corpus(task: Task) -> Outcome:
-    """Files of the shard: `.<split>.safetensors`, the `ProgramCorpus` of train and val; `.json`, how many there are.
+def prepare(task: Task) -> Outcome:
+    """Write `.<split>.safetensors`, the `ProgramCorpus` of train and val, and `.json`, their counts.
 
-    Programs that 63 numbers a line cannot say, and those of more than `longest` lines, are refused. Raises Rejected
-    where train or val keeps no program.
+    Rejects programs that 63 numbers a line cannot represent, and those of more than `max_length` lines. Raises Rejected
+    where a split keeps no program.
     """
-    from safetensors.numpy import save
-
-    params, name = task.shard.params, task.shard.name
+    params = task.shard.params
     counts: dict[str, dict[str, int]] = {}
     for split in ("train", "val"):
         kept: list[list[AssemblyLines]] = []
         for key, program in category_programs(task, split):
             try:
-                nodes = assembly_lines(ablate_program(program, params.get("ablate", "nothing"), task.rng("order", key)))
+                ablated = ablate_program(program, params.get("ablate", "nothing"), task.rng("order", key))
+                assemblies = assembly_lines(ablated)
             except (ProgramError, Rejected) as error:
                 task.reject(key, error.reason, str(error))
                 continue
-            if sum(len(node.numbers) for node in nodes) > params["longest"]:
+            if sum(len(assembly.numbers) for assembly in assemblies) > params["max_length"]:
                 task.reject(key, "longer than training.max_length")
                 continue
-            kept.append(nodes)
+            kept.append(assemblies)
         if not kept:
-            raise Rejected(f"{params['kit']} has no programs of at most {params['longest']} lines in split {split}")
+            raise Rejected(f"{params['kit']} has no programs of at most {params['max_length']} lines in split {split}")
         programs = ProgramCorpus.of(kept)
         counts[split] = {"programs": len(programs), "assemblies": len(programs.boxes), "lines": len(programs.lines)}
-        with task.output(f"{name}.{split}.safetensors") as stream:
-            stream.write(save(programs.arrays()))
-    with task.output(f"{name}.json") as stream:
-        stream.write(json_bytes({"counts": counts}))
+        write_arrays(task, f"{task.shard.name}.{split}.safetensors", programs.arrays())
+    write_description(task, {"counts": counts})
     return Outcome(samples=0, summary=counts)
 
 
-def ablate_program(program: AssemblyProgram, without: Ablation, rng: np.random.Generator) -> AssemblyProgram:
-    """The program without a part of the language. Raises ProgramError and Rejected where it cannot be told so."""
-    if without == "hierarchy":
+def ablate_program(program: AssemblyProgram, ablation: Ablation, rng: np.random.Generator) -> AssemblyProgram:
+    """Rewrite a program without a part of the language. Raises ProgramError and Rejected where that is impossible."""
+    if ablation == "hierarchy":
         return without_hierarchy(program)
-    if without == "macros":
+    if ablation == "macros":
         return without_macros(program)
-    if without == "order":
+    if ablation == "order":
         return without_order(program, rng)
-    return without_alignment(program) if without == "align" else program
-
-
-def read_corpus(task: Task, data: str) -> tuple[dict[str, Any], dict[str, ProgramCorpus]]:
-    """What `prepare_corpus` wrote in shard `data`: the counts, and the programs of train and val."""
-    from safetensors.numpy import load_file
-
-    described = json.loads(task.input("training", f"{data}.json").read_bytes())
-    paths = {split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")}
-    return described, {split: ProgramCorpus.of_arrays(load_file(path)) for split, path in paths.items()}
-
-
-def category_programs(task: Task, split: str) -> Iterator[tuple[str, AssemblyProgram]]:
-    """The programs of the category in a split, with the keys of their samples."""
-    params = task.shard.params
-    shards = [shard for shard, of in params["splits"].items() if of == split]
-    for done, shard in enumerate(shards):
-        for sample in read_samples(task.input(params["producer"], f"{shard}.tar")):
-            if sample.kit == params["kit"]:
-                yield sample.key, parse(sample.text)
-        task.progress(done + 1, len(shards))
+    return without_alignment(program) if ablation == "align" else program

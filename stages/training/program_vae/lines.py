@@ -1,4 +1,4 @@
-"""Lines of ShapeAssembly programs as 63 numbers each, and back to what they choose (shapeassembly §6.1)."""
+"""Lines of ShapeAssembly programs as 63 numbers each (shapeassembly §6.1)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ START, STOP, CUBOID, ATTACH, SQUEEZE, TRANSLATE, REFLECT = range(7)
 Rows = npt.NDArray[np.float32]
 
 SLOT_COUNT = 11
-"""The cuboids that a line may name: the bounding box, and ten in the order of their declarations."""
+"""Cuboids that a line may name: the bounding box, and ten in the order of their declarations."""
 
 COMMAND, INDICES = slice(0, 7), slice(7, 40)
 DIMS, POINTS, AXIS, COPIES, FACE, UV, ALIGNED = (
@@ -35,17 +35,17 @@ DIMS, POINTS, AXIS, COPIES, FACE, UV, ALIGNED = (
 )  # fmt: skip
 LINE_WIDTH = 63
 COPIES_UNIT = 10.0
-"""Copies are counted in tens, so that they weigh like the other numbers."""
+"""Divisor of copy counts, so that they are of the order of the other numbers."""
 
 
 @dataclass(frozen=True)
 class AssemblyLines:
     """One assembly, without the line of its bounding box.
 
-    numbers: float32 (lines + 1, 63), the last line being STOP; children: int64 (lines + 1,), the number of the
-    assembly that expands the cuboid of the line, counted within the program, root first, breadth first; or -1;
-    box: float64 (3,), the sizes of the bounding box; parent, line: of the assembly and the line that it expands, -1
-    for the root.
+    numbers: float32 (lines + 1, 63), the last line is STOP.
+    children: int64 (lines + 1,), the assembly that expands the line's cuboid, counted breadth first, or -1.
+    box: float64 (3,), sizes of the bounding box.
+    parent, line: the assembly and line that it expands, -1 for the root.
     """
 
     numbers: Rows
@@ -56,40 +56,40 @@ class AssemblyLines:
 
 
 def assembly_lines(program: AssemblyProgram) -> list[AssemblyLines]:
-    """The assemblies of a program, root first, breadth first.
+    """Return the assemblies of a program, breadth first.
 
-    Raises ProgramError where an assembly has more than ten cuboids, names cuboids that no line declares (copies among
-    them), or is expanded twice.
+    Raises ProgramError where an assembly has more than ten cuboids, names a cuboid that no line declares, such as a
+    copy, or is expanded twice.
     """
-    found: list[AssemblyLines] = []
-    ahead = [(program.root, -1, -1)]
+    assemblies: list[AssemblyLines] = []
+    queue = [(program.root, -1, -1)]
     seen = {program.root.name}
-    for number, (block, parent, line) in enumerate(ahead):
+    for number, (block, parent, line) in enumerate(queue):
         children = np.full(len(block.lines) + 1, -1)
-        for place, each in enumerate(block.lines):
-            below = program.named.get(each.name) if isinstance(each, Cuboid) else None
+        for index, statement in enumerate(block.lines):
+            below = program.named.get(statement.name) if isinstance(statement, Cuboid) else None
             if below is not None:
                 if below.name in seen:
                     raise ProgramError("expanded twice", f"{below.name} stands for two cuboids; give each its own")
                 seen.add(below.name)
-                children[place] = len(ahead)
-                ahead.append((below, number, place))
-        found.append(AssemblyLines(_numbers(block), children, np.array(block.bbox.dims), parent, line))
-    return found
+                children[index] = len(queue)
+                queue.append((below, number, index))
+        assemblies.append(AssemblyLines(_numbers(block), children, np.array(block.bbox.dims), parent, line))
+    return assemblies
 
 
 def _numbers(block: Block) -> Rows:
-    slots = {name: slot for slot, name in enumerate([BBOX, *(each.name for each in block.cuboids)])}
+    slots = {name: slot for slot, name in enumerate([BBOX, *(cuboid.name for cuboid in block.cuboids)])}
     if len(slots) > SLOT_COUNT:
         raise ProgramError(
             "too many cuboids", f"{block.name} has {len(slots) - 1}, at most {SLOT_COUNT - 1} are learnt"
         )
     numbers = np.zeros((len(block.lines) + 1, LINE_WIDTH), np.float32)
     for row, line in zip(numbers, block.lines, strict=False):
-        for place, name in enumerate(_named(line)):
+        for position, name in enumerate(_named(line)):
             if name not in slots:
                 raise ProgramError("names a copy", f"{block.name}: {name!r} is made by no Cuboid line")
-            row[INDICES.start + SLOT_COUNT * place + slots[name]] = 1
+            row[INDICES.start + SLOT_COUNT * position + slots[name]] = 1
         _fill(row, line)
     numbers[-1, STOP] = 1
     return numbers

@@ -1,10 +1,13 @@
-"""An assembly while it is written: which lines may follow, by the rules of decoding (shapeassembly App. D).
+"""An assembly that is being decoded: the lines that may follow by the rules of shapeassembly App. D.
 
-Coordinates are clamped to 0 to 1, sizes to 0.01 and those of the bounding box; the bounding box is attached to at its
-top and bottom alone; a cuboid is attached to another once, to the bounding box at its top and at its bottom; the
-bounding box is never moved, has no sub-program, and bears others as what is grounded does; only grounded cuboids are
-attached to or copied; cuboids are declared first, then attached, then copied; and no cuboid reaches further out of the
-bounding box than by a tenth of its size. What is not grounded in the end is left out.
+- Coordinates are clamped to 0 to 1, sizes to 0.01 and those of the bounding box.
+- A cuboid is attached to another once, and to the bounding box once at its top and once at its bottom, nowhere else.
+- The bounding box is never moved, has no sub-program, and counts as grounded.
+- Only grounded cuboids are attached to or copied.
+- Cuboids are declared first, then attached, then copied.
+- No cuboid reaches out of the bounding box by more than a tenth of its size.
+
+Cuboids that stay ungrounded are left out.
 """
 
 from __future__ import annotations
@@ -37,16 +40,16 @@ from stages.shapeassembly.syntax.program import (
 from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SLOT_COUNT, SQUEEZE, STOP, TRANSLATE
 
 MAX_DEPTH = 4
-"""Levels of a program; the real ones have three."""
+"""Levels of a program; real ones have three."""
 
 MAX_LINES = 60
-"""Lines after which an assembly ends; those of the real programs end before."""
+"""Lines of an assembly; real ones have fewer."""
 
 MAX_COPIES = 40
-"""Copies of one translate; the real programs have 29 at most."""
+"""Copies of a translate; real programs have at most 29."""
 
 MAX_LOGIT_GAP = 4.6
-"""Commands a hundred times less likely than the likeliest that may follow are no way out, in nats."""
+"""Commands with a lower logit relative to the best are not tried: 4.6 nats are a factor of 100."""
 
 _PHASES = {CUBOID: 0, ATTACH: 1, SQUEEZE: 1, TRANSLATE: 2, REFLECT: 2}
 
@@ -54,16 +57,22 @@ LineChoice = tuple[int, ...]
 """A command, and the slots of the cuboids that it names."""
 
 Joint = tuple[int, ...]
-"""What an assembly may have once: a cuboid on another, on the bottom or the top of the bounding box, or copied along an
-axis by a command."""
+"""What an assembly may have once:
+
+a cuboid attached to another, or to one end of the bounding box, or copied along an axis.
+"""
 
 AttachedLine = Attach | Squeeze | Translate | Reflect
-"""A line behind the declarations."""
+"""A line after the declarations."""
 
 
 @dataclass(frozen=True)
 class LineNumbers:
-    """What else a line needs: points (6,), face, u and v (2,), axis, copies and distance."""
+    """The other arguments of a line.
+
+    points: (6,), both points of an attachment.
+    uv: (2,), of a squeeze.
+    """
 
     points: FloatArray
     face: int
@@ -75,8 +84,14 @@ class LineNumbers:
 
 @dataclass
 class PartialAssembly:
-    """An assembly in a bounding box of sizes `box`. sizes, aligned: of each cuboid declared; below: for each, what
-    expands it, if anything; lines: those after the declarations, cuboids called by their slots."""
+    """An assembly up to some line.
+
+    box: sizes of the bounding box.
+    sizes, aligned: of each declared cuboid.
+    below: the assembly that expands each cuboid, or None.
+    lines: the lines after the declarations; cuboids are named by their slots.
+    written: number of lines, declarations included.
+    """
 
     box: Point
     sizes: list[Point] = field(default_factory=list)
@@ -89,7 +104,7 @@ class PartialAssembly:
     _joined: set[Joint] = field(default_factory=set)
 
     def commands(self) -> np.ndarray:
-        """Which commands may follow, bool (7,)."""
+        """Return the commands that may follow, bool (7,)."""
         allowed = np.zeros(7, bool)
         grounded = len(self._grounded) > 1
         allowed[STOP] = grounded
@@ -99,27 +114,34 @@ class PartialAssembly:
             allowed[[TRANSLATE, REFLECT]] = grounded
         return allowed
 
-    def choices(self, logits: FloatArray, indices: FloatArray, most: int) -> list[LineChoice]:
-        """The likeliest lines that may follow, at most `most` of each command, by the logits (7,) of commands and, for
-        each command, (7, 3, 11) of slots: the likeliest command first, as the paper goes back from what cannot be."""
+    def choices(self, logits: FloatArray, indices: FloatArray, limit: int) -> list[LineChoice]:
+        """Return the lines that may follow, the likeliest command first, as the paper backtracks.
+
+        logits: (7,), of the commands.
+        indices: (7, 3, 11), logits of the slots for each command.
+        limit: number of lines of each command.
+        """
         allowed = self.commands()
-        least = logits[allowed].max(initial=-np.inf) - MAX_LOGIT_GAP
-        found: list[LineChoice] = []
+        threshold = logits[allowed].max(initial=-np.inf) - MAX_LOGIT_GAP
+        lines: list[LineChoice] = []
         for command in np.argsort(-logits, kind="stable").tolist():
-            if allowed[command] and logits[command] >= least:
-                found += self._likeliest(command, indices[command])[:most]
-        return found
+            if allowed[command] and logits[command] >= threshold:
+                lines += self._likeliest(command, indices[command])[:limit]
+        return lines
 
     def _likeliest(self, command: int, logits: FloatArray) -> list[LineChoice]:
-        """The lines of one command, the likeliest first."""
+        """Return the lines of one command, the likeliest first."""
         score = {
-            each: sum(float(logits[place, slot]) for place, slot in enumerate(each)) for each in self.named(command)
+            slots: sum(float(logits[position, slot]) for position, slot in enumerate(slots))
+            for slots in self.named(command)
         }
-        return [(command, *each) for each in sorted(score, key=lambda each: (-score[each], each))]
+        return [(command, *slots) for slots in sorted(score, key=lambda slots: (-score[slots], slots))]
 
     def named(self, command: int) -> list[tuple[int, ...]]:
-        """The slots that a line of this command may name, in their order; whether they are joined already in all ways
-        that there are, its numbers say."""
+        """Return the slots that a line of a command may name.
+
+        Joints that depend on its numbers are checked by `line`.
+        """
         if command in (STOP, CUBOID):
             return [()]
         declared, grounded = range(1, len(self.sizes) + 1), sorted(self._grounded)
@@ -134,11 +156,11 @@ class PartialAssembly:
         return named
 
     def free(self, joints: Sequence[Joint]) -> bool:
-        """Whether the assembly has none of them yet."""
-        return not any(each in self._joined for each in joints)
+        """Return whether the assembly has none of the joints yet."""
+        return not any(joint in self._joined for joint in joints)
 
     def declare(self, sizes: FloatArray, aligned: bool, below: PartialAssembly | None) -> None:
-        """A cuboid, its sizes clamped."""
+        """Declare a cuboid with clamped sizes."""
         clamped = np.clip(sizes.astype(float), MIN_CUBOID_SIZE, np.maximum(self.box, MIN_CUBOID_SIZE))
         x, y, z = np.round(np.maximum(clamped, MIN_DECLARED_SIZE), 3).tolist()
         self.sizes.append((x, y, z))
@@ -147,8 +169,10 @@ class PartialAssembly:
         self.written += 1
 
     def line(self, choice: LineChoice, numbers: LineNumbers) -> tuple[AttachedLine, list[Joint]] | None:
-        """The line, its numbers to three decimals, with its joints; None where it breaks a rule that can be told$
-        without executing it."""
+        """Return a line, its numbers to three decimals, with its joints.
+
+        Returns None where it breaks a rule that can be checked without execution.
+        """
         command, moved, *others = choice
         line: AttachedLine
         if command == ATTACH:
@@ -176,7 +200,7 @@ class PartialAssembly:
         return (line, joints) if self.free(joints) else None
 
     def put(self, choice: LineChoice, line: AttachedLine, joints: Sequence[Joint]) -> None:
-        """Writes a line."""
+        """Add a line."""
         command, moved, *_ = choice
         self._joined.update(joints)
         self._grounded.add(moved)
@@ -185,43 +209,52 @@ class PartialAssembly:
         self.written += 1
 
     def with_line(self, line: AttachedLine, moved: int) -> PartialAssembly:
-        """With one line more, by which the cuboid of a slot is grounded: to be looked at, not to be written on."""
+        """Return the assembly with another line, which grounds a cuboid: for checks only."""
         return replace(self, lines=[*self.lines, line], _grounded={*self._grounded, moved})
 
     def fits(self) -> bool:
-        """Whether what is grounded stays within the bounding box."""
+        """Return whether what is grounded stays within the bounding box."""
         try:
             return not protruding_parts(self.block("Program_0", {}))
         except ProgramError:
             return False
 
     def block(self, name: str, names: dict[int, str]) -> Block:
-        """The assembly, what is not grounded left out; `names` of expanded cuboids by slot."""
+        """Return the assembly without ungrounded cuboids.
+
+        names: the names of expanded cuboids, by slot.
+        """
         kept = [slot for slot in range(1, len(self.sizes) + 1) if slot in self._grounded]
-        called = {_name(0): BBOX}
-        called |= {_name(slot): names.get(slot, f"cube{place}") for place, slot in enumerate(kept)}
-        cuboids = tuple(Cuboid(called[_name(slot)], self.sizes[slot - 1], self.aligned[slot - 1]) for slot in kept)
-        return Block(name, Cuboid(BBOX, self.box, True), (*cuboids, *(_renamed(line, called) for line in self.lines)))
+        names_of_slots = {_name(0): BBOX}
+        names_of_slots |= {_name(slot): names.get(slot, f"cube{index}") for index, slot in enumerate(kept)}
+        cuboids = tuple(
+            Cuboid(names_of_slots[_name(slot)], self.sizes[slot - 1], self.aligned[slot - 1]) for slot in kept
+        )
+        return Block(
+            name, Cuboid(BBOX, self.box, True), (*cuboids, *(_renamed(line, names_of_slots) for line in self.lines))
+        )
 
     @property
     def grounded(self) -> list[int]:
-        """The slots of the cuboids that are grounded."""
+        """The slots of the grounded cuboids."""
         return sorted(self._grounded - {0})
 
     def program(self) -> AssemblyProgram | None:
-        """The program whose root is this assembly, its assemblies named in breadth-first order; a cuboid whose
-        sub-program has no cuboid is one. None where it cannot be executed: each of its assemblies could be, and copies
-        of copies may still be too many."""
-        ahead: list[PartialAssembly] = [self]
+        """Return the program with this assembly as its root; assemblies are named breadth first.
+
+        A cuboid whose sub-program is empty stays a cuboid. Returns None where the program cannot be executed: each
+        assembly can, but copies of copies may be too many.
+        """
+        queue: list[PartialAssembly] = [self]
         blocks: list[Block] = []
-        while len(blocks) < len(ahead):
-            draft = ahead[len(blocks)]
+        while len(blocks) < len(queue):
+            draft = queue[len(blocks)]
             names = {}
             for slot in draft.grounded:
                 below = draft.below[slot - 1]
                 if below is not None and below.grounded:
-                    names[slot] = f"Program_{len(ahead)}"
-                    ahead.append(below)
+                    names[slot] = f"Program_{len(queue)}"
+                    queue.append(below)
             blocks.append(draft.block(f"Program_{len(blocks)}", names))
         program = AssemblyProgram(tuple(blocks))
         try:
@@ -231,16 +264,19 @@ class PartialAssembly:
         return program
 
 
-def joints_of(choice: LineChoice, way: int) -> list[Joint]:
-    """The joints of a line. way: of a copy the axis, of a squeeze the face, of an attach the face of the target that is
-    attached to, of which only top and bottom count, and only of the bounding box."""
+def joints_of(choice: LineChoice, end: int) -> list[Joint]:
+    """Return the joints of a line.
+
+    end: the axis of a copy, the face of a squeeze, the face of the target of an attachment; only top and bottom of the
+        bounding box matter.
+    """
     command, moved, *others = choice
     if command == ATTACH:
-        return [_joint(moved, others[0], FACES[way] == "top")]
+        return [_joint(moved, others[0], FACES[end] == "top")]
     if command == SQUEEZE:
         first, second = others
-        return [_joint(moved, first, FACES[way] == "top"), _joint(moved, second, FACES[way] == "bot")]
-    return [(moved, -1 if command == REFLECT else -2, way)]
+        return [_joint(moved, first, FACES[end] == "top"), _joint(moved, second, FACES[end] == "bot")]
+    return [(moved, -1 if command == REFLECT else -2, end)]
 
 
 def _joint(moved: int, target: int, top: bool) -> Joint:
@@ -251,11 +287,11 @@ def _name(slot: int) -> str:
     return f"slot{slot}"
 
 
-def _renamed(line: Line, called: dict[str, str]) -> Line:
+def _renamed(line: Line, names: dict[str, str]) -> Line:
     if isinstance(line, Attach):
-        return replace(line, moved=called[line.moved], target=called[line.target])
+        return replace(line, moved=names[line.moved], target=names[line.target])
     if isinstance(line, Squeeze):
-        first, second = called[line.first], called[line.second]
-        return replace(line, moved=called[line.moved], first=first, second=second)
+        first, second = names[line.first], names[line.second]
+        return replace(line, moved=names[line.moved], first=first, second=second)
     assert not isinstance(line, Cuboid)
-    return replace(line, moved=called[line.moved])
+    return replace(line, moved=names[line.moved])

@@ -1,4 +1,4 @@
-"""A trained model of ShapeAssembly programs, read from its published weights alone."""
+"""A trained VAE of ShapeAssembly programs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from stages.shapeassembly.syntax.program import AssemblyProgram
-from stages.training.checkpoint import CheckpointError, load_checkpoint
+from stages.training.checkpoint import load_module
 from stages.training.latent import LatentPoints
 from stages.training.program_vae.batches import ProgramCorpus, batch_of
 from stages.training.program_vae.decoding import decode_programs
@@ -24,7 +24,7 @@ PROGRAMS_PER_BATCH = 128
 
 @dataclass(frozen=True)
 class TrainedProgramVae:
-    """header: what the weights say of themselves."""
+    """A VAE of programs with its header."""
 
     module: ProgramVae
     header: Mapping[str, Any]
@@ -39,49 +39,44 @@ class TrainedProgramVae:
         """Encode programs: posterior means, float32 (n, latent). Raises ProgramError as `assembly_lines`."""
         means: list[LatentPoints] = [np.empty((0, self.latent), np.float32)]
         for start in range(0, len(programs), PROGRAMS_PER_BATCH):
-            read = ProgramCorpus.of([assembly_lines(each) for each in programs[start : start + PROGRAMS_PER_BATCH]])
+            read = ProgramCorpus.of(
+                [assembly_lines(program) for program in programs[start : start + PROGRAMS_PER_BATCH]]
+            )
             means.append(self.module.encode(batch_of(read, np.arange(len(read))))[0].numpy())
         return np.concatenate(means)
 
     def decode(self, points: LatentPoints, *, reject: bool) -> list[AssemblyProgram | None]:
-        """A program for each point, float32 (n, latent), as `decode_programs`."""
-        found: list[AssemblyProgram | None] = []
+        """Decode latent points, float32 (n, latent), as `decode_programs`."""
+        programs: list[AssemblyProgram | None] = []
         for start in range(0, len(points), PROGRAMS_PER_BATCH):
-            found += decode_programs(self.module, points[start : start + PROGRAMS_PER_BATCH], reject=reject)
-        return found
+            programs += decode_programs(self.module, points[start : start + PROGRAMS_PER_BATCH], reject=reject)
+        return programs
 
-    def points(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> LatentPoints:
-        """Random points, float32 (count, latent), of where programs stand, as `Standing.points`."""
-        return self.module.points(count, rng, temperature)
+    def sample_points(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> LatentPoints:
+        """Draw points of the aggregate posterior, as `LatentGaussian.sample_points`."""
+        return self.module.sample_points(count, rng, temperature)
 
     def sample(
         self, count: int, rng: np.random.Generator, temperature: float = 1.0
     ) -> tuple[list[AssemblyProgram], int]:
-        """So many programs of random `points`, and how many it took: those that are rejected count too. Raises
-        ValueError where nearly all are rejected."""
-        kept: list[AssemblyProgram] = []
-        drawn = 0
-        while len(kept) < count:
-            if drawn > 50 * (count + PROGRAMS_PER_BATCH):
-                raise ValueError(f"{len(kept)} of {drawn} random points gave a program; train the model longer")
-            for each in self.decode(self.points(PROGRAMS_PER_BATCH, rng, temperature), reject=True):
-                if len(kept) < count:
-                    drawn += 1
-                    kept += [] if each is None else [each]
-        return kept, drawn
+        """Sample programs. Returns the programs and the number of attempts; rejected programs are attempts too.
+
+        temperature: as in `LatentGaussian.sample_points`.
+        Raises ValueError where nearly all are rejected.
+        """
+        programs: list[AssemblyProgram] = []
+        attempts = 0
+        while len(programs) < count:
+            if attempts > 50 * (count + PROGRAMS_PER_BATCH):
+                raise ValueError(f"{len(programs)} of {attempts} random points gave a program; train the model longer")
+            for program in self.decode(self.sample_points(PROGRAMS_PER_BATCH, rng, temperature), reject=True):
+                if len(programs) < count:
+                    attempts += 1
+                    programs += [] if program is None else [program]
+        return programs, attempts
 
 
 def load_program_vae(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedProgramVae:
-    """The model in a file of weights, on the CPU.
-
-    Raises CheckpointError for whatever is not one, or says something else of itself than `expected`, such as
-    `{"kit": "chair"}`.
-    """
-    tensors, header = load_checkpoint(path, {"kind": "program_vae", **(expected or {})})
-    module = ProgramVae(
-        ProgramVaeConfig.model_validate({"name": "trained", "kind": "program_vae", **header["settings"]})
-    )
-    if module.state_dict().keys() != tensors.keys():
-        raise CheckpointError(f"{path} has other tensors than this version of Shapemill: train it again (make train)")
-    module.load_state_dict(tensors)
-    return TrainedProgramVae(module.eval(), header)
+    """Read the model in a file of weights, as `load_module`. expected: such as `{"kit": "chair"}`."""
+    kind = {"kind": "program_vae", **(expected or {})}
+    return TrainedProgramVae(*load_module(path, kind, ProgramVaeConfig, lambda config, _: ProgramVae(config)))

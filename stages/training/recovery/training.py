@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
@@ -21,6 +21,8 @@ from stages.programs.program import Program, find_program
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.clouds import chamfer_squared
 from stages.sketches.settings import SketchesConfig
+from stages.training.corpus import read_description
+from stages.training.kind import Kind
 from stages.training.loop import resolve_device
 from stages.training.recovery.augmentation import augment_clouds, augment_drawings, quantized_cloud, unpack_drawings
 from stages.training.recovery.clouds import frame_of
@@ -31,6 +33,7 @@ from stages.training.recovery.outputs import ParameterOutputs
 from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.shapes import TRAIN_INTERVAL, VALIDATION_INTERVAL, nearest_valid_values, random_shapes
 from stages.training.recovery.surface import sample_points, shape_points
+from stages.training.training_task import TrainingTask, seeded
 
 VALIDATED_SHAPES = 64
 """Validation shapes whose recovery is measured."""
@@ -79,37 +82,29 @@ def prepare(task: Task) -> Outcome:
     return Outcome(samples=0, summary={"shapes": params["shapes"]})
 
 
-def entry(settings: Mapping[str, Any]) -> RecoveryModelConfig:
-    """The entry whose JSON is `settings`."""
-    return RecoveryModelConfig.model_validate(settings)
-
-
-def learner(task: Task, entry: RecoveryModelConfig, seed: int) -> RecoveryTask:
+def new_task(task: Task, config: RecoveryModelConfig, seed: int) -> RecoveryTask:
     """Make a network with fresh weights, and read its training and validation inputs."""
     from safetensors.numpy import load_file
 
     params = task.shard.params
-    program, data, pools = find_program(params["program"]), params["data"], params["pools"]
-    described = json.loads(task.input("training", f"{data}.json").read_bytes())
-    validation = task.input("training", f"{data}.safetensors")
+    program, description = find_program(params["program"]), read_description(task)
+    validation = task.input("training", f"{params['data']}.safetensors")
     header = {
         "parameters": parameter_descriptions(program),
         # the same in every round, since a round reads the weights of the round before by it
-        "counts": {"train, a round": {"shapes": entry.shapes_per_round}, "val": {"shapes": entry.validation_shapes}},
-        "sketches": described["views"],
+        "counts": {"train, a round": {"shapes": config.shapes_per_round}, "val": {"shapes": config.validation_shapes}},
+        "sketches": description["views"],
         "data": {"val": file_digest(validation)},
     }
-    pooled = [load_file(task.input("training", f"{pool}.safetensors")) for pool in pools]
+    pooled = [load_file(task.input("training", f"{pool}.safetensors")) for pool in params["pools"]]
     train = {key: np.concatenate([arrays[key] for arrays in pooled]) for key in ("inputs", "classes")}
-    module = new_network(entry, program, seed).to(resolve_device(entry.device))
-    return RecoveryTask(module, header, entry, program, train, load_file(validation), described["texts"])
+    module = new_network(config, program, seed).to(resolve_device(config.device))
+    return RecoveryTask(module, header, config, train, load_file(validation), program, description["texts"])
 
 
-def new_network(entry: RecoveryModelConfig, program: Program, seed: int) -> RecoveryNet:
+def new_network(config: RecoveryModelConfig, program: Program, seed: int) -> RecoveryNet:
     """Make a network for a program with random weights, by its seed alone."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
-        return RecoveryNet(entry, program.parameters)
+    return seeded(seed, lambda: RecoveryNet(config, program.parameters))
 
 
 def parameter_descriptions(program: Program) -> list[list[Any]]:
@@ -118,29 +113,20 @@ def parameter_descriptions(program: Program) -> list[list[Any]]:
 
 
 @dataclass(frozen=True)
-class RecoveryTask:
-    """The `Learner` of a recovery model.
+class RecoveryTask(TrainingTask):
+    """Training of a recovery model.
 
     train, val: their `inputs` and `classes`
     texts: the validation shapes
     """
 
-    module: RecoveryNet
-    header: Mapping[str, Any]
-    entry: RecoveryModelConfig
     program: Program
-    train: Mapping[str, npt.NDArray[Any]]
-    val: Mapping[str, npt.NDArray[Any]]
     texts: Sequence[str]
-
-    @property
-    def device(self) -> torch.device:
-        return next(self.module.parameters()).device
 
     @cached_property
     def outputs(self) -> ParameterOutputs:
         """How the outputs of the network are read, on its device."""
-        return ParameterOutputs.of(self.entry, self.program.parameters).to(self.device)
+        return ParameterOutputs.of(self.config, self.program.parameters).to(self.device)
 
     def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
         """Yield augmented inputs of random shapes; all inputs are on the device."""
@@ -148,11 +134,11 @@ class RecoveryTask:
         inputs = torch.from_numpy(self.train["inputs"]).to(self.device)
         classes = torch.from_numpy(self.train["classes"].astype(np.int64)).to(self.device)
         while True:
-            rows = torch.from_numpy(rng.integers(len(classes), size=self.entry.batch_size)).to(self.device)
-            if self.entry.input == "points":
-                augmented = augment_clouds(inputs[rows], self.entry.points, self.entry.augmented_share, noise)
+            rows = torch.from_numpy(rng.integers(len(classes), size=self.config.batch_size)).to(self.device)
+            if self.config.input == "points":
+                augmented = augment_clouds(inputs[rows], self.config.points, self.config.augmented_share, noise)
             else:
-                augmented = augment_drawings(inputs[rows], self.entry.augmented_share, rng, noise)
+                augmented = augment_drawings(inputs[rows], self.config.augmented_share, rng, noise)
             yield augmented, classes[rows]
 
     def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
@@ -169,8 +155,8 @@ class RecoveryTask:
         begins, in sides of their boxes
         """
         inputs = torch.from_numpy(self.val["inputs"]).to(self.device)
-        read = unpack_drawings if self.entry.input == "sketch" else Tensor.float
-        logits = torch.cat([self.module(read(batch)) for batch in torch.split(inputs, self.entry.batch_size)])
+        read = unpack_drawings if self.config.input == "sketch" else Tensor.float
+        logits = torch.cat([self.module(read(batch)) for batch in torch.split(inputs, self.config.batch_size)])
         classes = torch.from_numpy(self.val["classes"].astype(np.int64)).to(self.device)
         counts = self.outputs.counts
         probabilities, visible = self.outputs.probabilities(logits), classes < counts
@@ -191,3 +177,6 @@ class RecoveryTask:
         shapes = (nearest_valid_values(self.program, start), self.program.schema.from_text(text))
         clouds = (shape_points(self.program.parts(values), CHAMFER_POINTS) for values in shapes)
         return chamfer_squared(*(frame_of(cloud).normalized(cloud) for cloud in clouds))
+
+
+KIND = Kind(RecoveryModelConfig, prepare, new_task)

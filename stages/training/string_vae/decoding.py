@@ -1,4 +1,4 @@
-"""Points of the latent space to strings, token by token; where a mask says what may come, with ways back."""
+"""Decode latent points to strings, token by token; with a grammar mask, dead ends are left by backtracking."""
 
 from __future__ import annotations
 
@@ -15,47 +15,52 @@ from stages.training.string_vae.model import StringVae
 from stages.training.string_vae.vocabulary import END_TOKEN
 
 STRINGS_PER_BATCH = 256
-"""Strings that are written side by side."""
 MAX_DEAD_ENDS = 8
-"""After so many dead ends a string is ended without further cycles."""
+"""After so many dead ends a string is finished without further cycles."""
 
 
 @dataclass
 class PartialString:
-    """One string on its way. kept: its tokens up to where it was cut; banned: tokens that must not come next there;
-    acyclic: whether no cycle may begin any more; ends: dead ends so far."""
+    """A string that is being decoded.
+
+    kept: its tokens up to where it was cut.
+    banned: tokens that must not follow there.
+    acyclic: whether no further cycle may begin.
+    dead_ends: number of dead ends.
+    codes: its tokens.
+    """
 
     kept: list[int] = field(default_factory=list)
     banned: set[int] = field(default_factory=set)
     acyclic: bool = False
-    ends: int = 0
+    dead_ends: int = 0
     codes: list[int] = field(default_factory=list)
 
     def cut(self, numbers: int) -> None:
-        """Go back from a dead end; tokens from `numbers` on are cycle numbers.
+        """Backtrack from a dead end; tokens from `numbers` on are cycle numbers.
 
-        One token the first time, twice as far each time after, and what stood there is banned there: so a choice that
-        was wrong far before is reached soon. In the end to where no cycle was open: from there the grammar has a way to
-        the end that opens none, unless none of its strings is a tree.
+        The first time by one token, then twice as far each time, and the token there is banned, so that an early wrong
+        choice is reached soon. The last time to where no cycle was open: from there the grammar has an acyclic way to
+        the end, unless none of its strings is a tree.
         """
-        self.ends += 1
-        if self.ends == MAX_DEAD_ENDS:
+        self.dead_ends += 1
+        if self.dead_ends == MAX_DEAD_ENDS:
             self.kept, self.banned, self.acyclic = self.codes[: self._last_acyclic(numbers)], set(), True
             return
-        place = max(len(self.codes) - 2 ** (self.ends - 1), 0)
-        stood = set(self.codes[place : place + 1])
-        self.banned = stood | (self.banned if place == len(self.kept) else set())
-        self.kept = self.codes[:place]
+        index = max(len(self.codes) - 2 ** (self.dead_ends - 1), 0)
+        removed = set(self.codes[index : index + 1])
+        self.banned = removed | (self.banned if index == len(self.kept) else set())
+        self.kept = self.codes[:index]
 
     def _last_acyclic(self, numbers: int) -> int:
-        """How many of the tokens can be kept so that no cycle is open."""
-        opened: set[int] = set()
+        """Return the length of the longest prefix without an open cycle."""
+        open_cycles: set[int] = set()
         last = 0
-        for place, code in enumerate(self.codes):
+        for index, code in enumerate(self.codes):
             if code >= numbers:
-                opened ^= {code}
-            if not opened:
-                last = place + 1
+                open_cycles ^= {code}
+            if not open_cycles:
+                last = index + 1
         return last
 
 
@@ -63,29 +68,29 @@ class PartialString:
 def decode_codes(
     module: StringVae,
     points: npt.NDArray[np.float32],
-    most: int,
+    max_tokens: int,
     rules: CompiledGrammar | None,
     cycles: int,
     rng: np.random.Generator | None,
     temperature: float,
-    begun: Sequence[PartialString] = (),
+    partial: Sequence[PartialString] = (),
 ) -> list[list[int]]:
-    """The tokens of a string for each point, float32 (n, latent), at most `most`, without an end.
+    """Decode latent points, float32 (n, latent), to token numbers: at most `max_tokens` a string, without an end.
 
-    Each token is drawn by its probability, at a temperature, or, without an `rng`, is the likeliest. With `rules`, only
-    tokens that can still lead to a string of the grammar are taken; where none is left, the string goes back and on by
-    another way, so that all are strings of the grammar, if some of its strings are trees. Strings that are `begun`, one
-    for each point, go on from there.
+    rules: only tokens that can still lead to a string of the grammar are taken; at a dead end the string backtracks, so
+        that all results are strings of the grammar, if some of its strings are trees.
+    rng: samples each token at a temperature; without it, the likeliest tokens are taken.
+    partial: one string for each point to continue.
     """
     module.eval()
-    found: list[list[int]] = []
+    strings: list[list[int]] = []
     for start in range(0, len(points), STRINGS_PER_BATCH):
-        here = torch.from_numpy(points[start : start + STRINGS_PER_BATCH])
-        drafts = list(begun[start : start + STRINGS_PER_BATCH]) or [PartialString() for _ in range(len(here))]
+        batch = torch.from_numpy(points[start : start + STRINGS_PER_BATCH])
+        drafts = list(partial[start : start + STRINGS_PER_BATCH]) or [PartialString() for _ in range(len(batch))]
         waiting = list(range(len(drafts)))
         for _ in range(MAX_DEAD_ENDS + 1 if rules is not None else 1):
-            ended = _write(
-                module, here[waiting], [drafts[row] for row in waiting], most, rules, cycles, rng, temperature
+            ended = _decode(
+                module, batch[waiting], [drafts[row] for row in waiting], max_tokens, rules, cycles, rng, temperature
             )
             waiting = [row for row, has_ended in zip(waiting, ended, strict=True) if not has_ended]
             if not waiting:
@@ -93,33 +98,33 @@ def decode_codes(
             if rules is not None:
                 for row in waiting:
                     drafts[row].cut(len(rules.counted) + 3)
-        found += [draft.codes for draft in drafts]
-    return found
+        strings += [draft.codes for draft in drafts]
+    return strings
 
 
-def _write(
+def _decode(
     module: StringVae,
     points: Tensor,
     drafts: list[PartialString],
-    most: int,
+    max_tokens: int,
     rules: CompiledGrammar | None,
     cycles: int,
     rng: np.random.Generator | None,
     temperature: float,
 ) -> list[bool]:
-    """Write each draft on from where it was cut; which have come to an end."""
+    """Decode each string from where it was cut. Returns which have come to an end."""
     from stages.strings.grammar_mask import NO_TOKEN, GrammarMask
 
     device = next(module.parameters()).device
     points = points.to(device)
-    acceptor = None if rules is None else GrammarMask(rules, cycles, len(drafts), most)
+    acceptor = None if rules is None else GrammarMask(rules, cycles, len(drafts), max_tokens)
     state = module.start(points)
-    shown = torch.full((len(drafts),), END_TOKEN, device=device)
+    before = torch.full((len(drafts),), END_TOKEN, device=device)
     ended, dead = np.zeros(len(drafts), np.bool_), np.zeros(len(drafts), np.bool_)
     for draft in drafts:
         draft.codes = []
-    for place in range(most + 1):
-        logits, state = module.step(shown, points, state)
+    for index in range(max_tokens + 1):
+        logits, state = module.step(before, points, state)
         scores = logits.double().cpu().numpy()
         if rng is not None:
             scores += temperature * rng.gumbel(size=scores.shape)
@@ -128,10 +133,10 @@ def _write(
         else:
             kept = np.full(len(drafts), NO_TOKEN)
             for row, draft in enumerate(drafts):
-                if place < len(draft.kept):
-                    kept[row] = draft.kept[place]
+                if index < len(draft.kept):
+                    kept[row] = draft.kept[index]
                     continue
-                if place == len(draft.kept):
+                if index == len(draft.kept):
                     scores[row, list(draft.banned)] = -np.inf
                 if draft.acyclic:
                     scores[row, scores.shape[1] - cycles :] = -np.inf
@@ -146,5 +151,5 @@ def _write(
             break
         if acceptor is not None:
             acceptor.take(tokens)
-        shown = torch.from_numpy(tokens).to(device)
+        before = torch.from_numpy(tokens).to(device)
     return list(ended)

@@ -1,4 +1,4 @@
-"""The latent space as a graph of strings, on which interpolation is a shortest path (strings §5.3)."""
+"""A graph of strings in latent space; interpolations are shortest paths (strings §5.3)."""
 
 from __future__ import annotations
 
@@ -15,21 +15,24 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from stages.shape.graphs.histograms import histogram_metric
 
 POINT_NEIGHBOURS = 4
-"""Neighbours of a node in the search graph besides its equals: "between 3 and 5" (strings §5.3)."""
+"""Neighbours of a node besides strings of the same graph: "between 3 and 5" (strings §5.3)."""
 STRING_NEIGHBOURS = 3
 """The same in the naive graph (strings Table 2)."""
 
 Links = npt.NDArray[np.int64]
 """Pairs of nodes, int64 (m, 2)."""
 Histograms = npt.NDArray[np.int64]
-"""How many parts of each type each shape has, int64 (n, types)."""
+"""Parts of each type of each shape, int64 (n, types)."""
 Codes = npt.NDArray[np.int16]
 
 
 @dataclass(frozen=True)
 class PathFigures:
-    """Of all shortest paths of a graph (strings Table 2): connected components of the graph; mean and greatest weight
-    of the paths between two nodes that are connected."""
+    """Figures of all shortest paths of a graph (strings Table 2).
+
+    components: connected components.
+    mean, greatest: weight of the paths between connected nodes.
+    """
 
     components: int
     mean: float
@@ -37,21 +40,23 @@ class PathFigures:
 
 
 def search_graph(points: npt.NDArray[np.float32], graphs: Sequence[str], histograms: Histograms) -> csr_matrix:
-    """The search graph of strings: each is joined to those nearest in latent space, and to all of the same graph.
+    """Return the search graph: strings are joined to the nearest in latent space, and to all of the same graph.
 
-    points: float32 (n, latent); graphs: what names the shape graph of each; histograms: int64 (n, types), its parts.
-    The weights are E: 0 between equals. float64 (n, n), symmetric; a zero that is stored is an edge.
+    points: float32 (n, latent).
+    graphs: an identifier of each string's graph.
+    histograms: int64 (n, types).
+    Weights are E, 0 between strings of one graph: float64 (n, n), symmetric, stored zeros are edges.
     """
     return _weighted(nearest_points(points, POINT_NEIGHBOURS), graphs, histograms)
 
 
 def naive_graph(codes: Sequence[Codes], graphs: Sequence[str], histograms: Histograms) -> csr_matrix:
-    """The same, but joined to the nearest strings by edit distance of their tokens (strings Table 2)."""
+    """Return the same graph with the nearest strings by edit distance (strings Table 2)."""
     return _weighted(nearest_strings(codes, STRING_NEIGHBOURS), graphs, histograms)
 
 
 def path_figures(graph: csr_matrix) -> PathFigures:
-    """The figures of Table 2 of a graph of at least one node."""
+    """Return the figures of Table 2 of a graph with at least one node."""
     components, _ = connected_components(graph, directed=False)
     lengths = dijkstra(graph, directed=False)
     paths = lengths[np.isfinite(lengths) & ~np.eye(len(lengths), dtype=np.bool_)]
@@ -59,7 +64,7 @@ def path_figures(graph: csr_matrix) -> PathFigures:
 
 
 def interpolation(graph: csr_matrix, first: int, second: int) -> list[int]:
-    """The nodes of a shortest path, both ends among them; empty where there is none."""
+    """Return the nodes of a shortest path with both ends, or an empty list where there is none."""
     lengths, before = dijkstra(graph, directed=False, indices=first, return_predecessors=True)
     if not np.isfinite(lengths[second]):
         return []
@@ -70,7 +75,7 @@ def interpolation(graph: csr_matrix, first: int, second: int) -> list[int]:
 
 
 def nearest_points(points: npt.NDArray[np.float32], count: int) -> Links:
-    """Each point with the `count` nearest others."""
+    """Link each point to the `count` nearest others."""
     from scipy.spatial import cKDTree
 
     count = min(count, len(points) - 1)
@@ -81,8 +86,9 @@ def nearest_points(points: npt.NDArray[np.float32], count: int) -> Links:
 
 
 def nearest_strings(codes: Sequence[Codes], count: int) -> Links:
-    """Each string with the `count` nearest others by edit distance of their tokens; of those as near the first."""
-    first = np.concatenate([[0], np.cumsum([len(each) for each in codes])]).astype(np.int64)
+    """Link each string to the `count` nearest others by edit distance of their tokens, the first ones at equal
+    distance."""
+    first = np.concatenate([[0], np.cumsum([len(string) for string in codes])]).astype(np.int64)
     distances = _edit_distances(np.concatenate(codes), first)
     np.fill_diagonal(distances, np.iinfo(np.int32).max)
     near = np.argsort(distances, axis=1, kind="stable")[:, : min(count, len(codes) - 1)]
@@ -90,13 +96,13 @@ def nearest_strings(codes: Sequence[Codes], count: int) -> Links:
 
 
 def _weighted(links: Links, graphs: Sequence[str], histograms: Histograms) -> csr_matrix:
-    """The links and chains of equals, which make them as near as all their pairs would."""
+    """Weight the links, and chains of strings of one graph, which replace all their pairs."""
     equals: dict[str, list[int]] = {}
     for node, graph in enumerate(graphs):
         equals.setdefault(graph, []).append(node)
     chains = [pair for nodes in equals.values() for pair in pairwise(nodes)]
     joined = np.concatenate([links, np.array(chains, np.int64).reshape(-1, 2)])
-    joined = np.unique(np.sort(joined, axis=1), axis=0)  # a pair that stood twice would weigh twice as much
+    joined = np.unique(np.sort(joined, axis=1), axis=0)  # duplicates would add up
     weights = histogram_metric(histograms[joined[:, 0]], histograms[joined[:, 1]])
     both = np.concatenate([joined, joined[:, ::-1]])
     return csr_matrix((np.tile(weights, 2), (both[:, 0], both[:, 1])), shape=(len(graphs), len(graphs)))
@@ -104,7 +110,7 @@ def _weighted(links: Links, graphs: Sequence[str], histograms: Histograms) -> cs
 
 @numba.njit(cache=True)
 def _edit_distances(codes, first):
-    """Edit distances of all pairs of strings, int32 (n, n); string i is `codes[first[i]:first[i + 1]]`."""
+    """Return the edit distances of all pairs of strings, int32 (n, n); string i is `codes[first[i]:first[i + 1]]`."""
     n = len(first) - 1
     distances = np.zeros((n, n), np.int32)
     row = np.empty(int((first[1:] - first[:-1]).max()) + 1, np.int32)

@@ -1,8 +1,8 @@
-"""Ways to new strings through the latent space.
+"""Sample new strings through the latent space.
 
-Those of strings §5.2 start searches at points of their own and ask the decoder around them, with offsets that grow,
-until they find a valid string that is not known, or the offsets are as large as they may be. Two more draw points, and
-decode each once.
+The three methods of strings §5.2 start searches at different points and decode around them with growing offsets, until
+they reach a valid string that is not known, or the maximum offset. Two more methods sample points, and decode each
+once.
 """
 
 from __future__ import annotations
@@ -13,33 +13,40 @@ from itertools import pairwise
 
 import numpy as np
 
-from stages.training.string_vae.trained import LatentPoints, TrainedStringVae
+from stages.training.latent import LatentPoints
+from stages.training.string_vae.trained import TrainedStringVae
 
 MAX_OFFSET = 0.25
-"""Largest offset of a perturbation in each dimension (strings §5.2)."""
+"""Maximum offset of a perturbation in each dimension (strings §5.2)."""
 MAX_OFFSET_BETWEEN = 0.1
-"""The same around points between training samples: smaller, as the paper has it, which does not say by how much."""
+"""The same around points between training samples; smaller, by a factor that the paper does not give."""
 OFFSET_STEPS = 10
-"""Offsets grow in so many equal steps to the largest; not published."""
+"""Equal steps to the maximum offset; not published."""
 PATH_SEGMENTS = 32
-"""Length of a path, in segments (strings §5.2)."""
+"""Length of a path (strings §5.2)."""
 STOPS_PER_SEGMENT = 4
-"""Points on a line, and on each segment of a path, at equal distances; not published."""
+"""Equidistant points on a line, and on each segment of a path; not published."""
 SAMPLING_TEMPERATURE = 0.7
-"""Of the tokens at points that are drawn. Of castles of 44 parts in the median, at `gaussian` points, the likeliest
-tokens give 44 parts, and one string in three comes twice; at 0.7 they have 51, and 98 of a hundred differ; at 1 they
-have 62."""
+"""Token temperature at sampled points. For castles with a median of 44 parts, at `gaussian` points: the likeliest
+tokens give 44 parts, and every third string is a repetition; 0.7 gives 51 parts and 98 % distinct strings, 1 gives 62
+parts.
+"""
 MAX_ENCODED_STRINGS = 2048
-"""Training strings that a Gaussian is fitted to at most."""
+"""Training strings that the Gaussian is fitted to."""
 
 
 @dataclass(frozen=True)
 class LatentSearchResult:
-    """What a search has found: a valid string, not known where it started, or None; `asked`: strings that were decoded,
-    `valid`: how many of them were valid; point: float32 (latent,), where the last was."""
+    """The result of a search.
+
+    string: a valid string that was not known, or None.
+    decoded: number of decoded strings.
+    valid: how many of them were valid.
+    point: float32 (latent,), of the last one.
+    """
 
     string: str | None
-    asked: int
+    decoded: int
     valid: int
     point: LatentPoints = field(compare=False)
 
@@ -51,11 +58,11 @@ def perturb(
     largest: float,
     rng: np.random.Generator,
 ) -> list[LatentSearchResult]:
-    """A search around each point, float32 (n, latent), for a valid string other than those `known` there.
+    """Search around each point, float32 (n, latent), for a valid string that is not `known` there.
 
-    Each offset is larger than the one before in every dimension, of random sign. Strings are the likeliest of a point.
+    Offsets grow in every dimension, with random signs. Strings are the likeliest of a point.
     """
-    found = [LatentSearchResult(None, 0, 0, each) for each in points]
+    results = [LatentSearchResult(None, 0, 0, point) for point in points]
     searching = list(range(len(points)))
     bounds = np.linspace(0, largest, OFFSET_STEPS + 1)
     for low, high in pairwise(bounds.tolist()):
@@ -63,31 +70,33 @@ def perturb(
         offsets = rng.uniform(low, high, shape) * rng.choice([-1.0, 1.0], shape)
         moved = (points[searching] + offsets).astype(np.float32)
         still = []
-        for place, string, point in zip(searching, model.decode(moved, None), moved, strict=True):
+        for index, string, point in zip(searching, model.decode(moved, None), moved, strict=True):
             valid = model.is_valid(string)
-            is_new = valid and string not in known[place]
-            before = found[place]
-            found[place] = LatentSearchResult(string if is_new else None, before.asked + 1, before.valid + valid, point)
+            is_new = valid and string not in known[index]
+            before = results[index]
+            results[index] = LatentSearchResult(
+                string if is_new else None, before.decoded + 1, before.valid + valid, point
+            )
             if not is_new:
-                still.append(place)
+                still.append(index)
         searching = still
         if not searching:
             break
-    return found
+    return results
 
 
 def linear_points(first: LatentPoints, second: LatentPoints, stops: int) -> LatentPoints:
-    """Points on the line between two others, float32 (latent,), at equal distances: (stops, latent)."""
+    """Return equidistant points between two others, float32 (stops, latent)."""
     shares = np.arange(1, stops + 1)[:, None] / (stops + 1)
     return (first + shares * (second - first)).astype(np.float32)
 
 
 def path_points(first: LatentPoints, second: LatentPoints, samples: LatentPoints, segments: int) -> LatentPoints:
-    """A path between two points along `samples`, float32 (n, latent): its corners, (segments + 1, latent).
+    """Return the corners of a path between two points along `samples`, float32 (segments + 1, latent).
 
-    Each segment is split at the sample that is nearest to both of its ends together, and that the path has not passed,
-    again and again until there are as many segments; `segments` is a power of two. With too few samples the path ends
-    with fewer.
+    Each segment is split at the unused sample with the smallest sum of distances to both ends, until there are
+    `segments`, a power of two. With too few samples the path has fewer.
+    samples: float32 (n, latent).
     """
     path = [first, second]
     free = np.ones(len(samples), np.bool_)
@@ -109,33 +118,34 @@ def path_points(first: LatentPoints, second: LatentPoints, samples: LatentPoints
 
 
 def gaussian_points(samples: LatentPoints, count: int, rng: np.random.Generator) -> LatentPoints:
-    """Points (count, latent) of the Gaussian with the mean and the covariance of `samples`, float32 (n, latent)."""
+    """Sample points of the Gaussian with mean and covariance of `samples`: float32 (count, latent)."""
     centre: LatentPoints = samples.mean(axis=0)
-    spread = rng.standard_normal((count, len(samples))) / np.sqrt(len(samples))
-    points: LatentPoints = (centre + spread @ (samples - centre)).astype(np.float32)
+    weights = rng.standard_normal((count, len(samples))) / np.sqrt(len(samples))
+    points: LatentPoints = (centre + weights @ (samples - centre)).astype(np.float32)
     return points
 
 
 def sample(
     model: TrainedStringVae,
-    way: str,
+    method: str,
     strings: Sequence[str],
     count: int,
     rng: np.random.Generator,
     temperature: float = SAMPLING_TEMPERATURE,
 ) -> list[LatentSearchResult]:
-    """`count` searches of one of WAYS among training strings.
+    """Run `count` searches from training strings.
 
-    temperature: of the tokens where points are drawn: 1 as the model says how likely they are, less for likelier ones.
+    method: one of SAMPLING_METHODS.
+    temperature: of the tokens at sampled points.
     """
-    if way in _SEARCHES:
-        return _SEARCHES[way](model, strings, count, rng)
-    points = _DRAWS[way](model, strings, count, rng)
-    found = []
+    if method in _SEARCHES:
+        return _SEARCHES[method](model, strings, count, rng)
+    points = _DRAWS[method](model, strings, count, rng)
+    results = []
     for string, point in zip(model.decode(points, rng, temperature), points, strict=True):
         valid = model.is_valid(string)
-        found.append(LatentSearchResult(string if valid else None, 1, int(valid), point))
-    return found
+        results.append(LatentSearchResult(string if valid else None, 1, int(valid), point))
+    return results
 
 
 def _prior(model: TrainedStringVae, strings: Sequence[str], count: int, rng: np.random.Generator) -> LatentPoints:
@@ -144,14 +154,14 @@ def _prior(model: TrainedStringVae, strings: Sequence[str], count: int, rng: np.
 
 def _gaussian(model: TrainedStringVae, strings: Sequence[str], count: int, rng: np.random.Generator) -> LatentPoints:
     chosen = rng.choice(len(strings), min(len(strings), MAX_ENCODED_STRINGS), replace=False)
-    return gaussian_points(model.encode([strings[int(place)] for place in chosen]), count, rng)
+    return gaussian_points(model.encode([strings[int(index)] for index in chosen]), count, rng)
 
 
 def _perturbation(
     model: TrainedStringVae, strings: Sequence[str], count: int, rng: np.random.Generator
 ) -> list[LatentSearchResult]:
-    chosen = [strings[int(place)] for place in rng.choice(len(strings), count)]
-    return perturb(model, model.encode(chosen), [frozenset({each}) for each in chosen], MAX_OFFSET, rng)
+    chosen = [strings[int(index)] for index in rng.choice(len(strings), count)]
+    return perturb(model, model.encode(chosen), [frozenset({string}) for string in chosen], MAX_OFFSET, rng)
 
 
 def _linear(
@@ -159,9 +169,9 @@ def _linear(
 ) -> list[LatentSearchResult]:
     lines = -(-count // STOPS_PER_SEGMENT)
     pairs = [rng.choice(len(strings), 2, replace=False).tolist() for _ in range(lines)]
-    ends = model.encode([strings[place] for pair in pairs for place in pair]).reshape(lines, 2, -1)
+    ends = model.encode([strings[index] for pair in pairs for index in pair]).reshape(lines, 2, -1)
     points = np.concatenate([linear_points(first, second, STOPS_PER_SEGMENT) for first, second in ends])
-    known = [frozenset(strings[place] for place in pair) for pair in pairs for _ in range(STOPS_PER_SEGMENT)]
+    known = [frozenset(strings[index] for index in pair) for pair in pairs for _ in range(STOPS_PER_SEGMENT)]
     return perturb(model, points[:count], known[:count], MAX_OFFSET_BETWEEN, rng)
 
 
@@ -189,5 +199,6 @@ _SEARCHES: dict[str, LatentSearch] = {
 _DRAWS: dict[str, PointSampler] = {"prior": _prior, "gaussian": _gaussian}
 
 SAMPLING_METHODS = (*_SEARCHES, *_DRAWS)
-"""The ways by name: the published three in their published order, the best last; beside them points of the prior, and
-points where the training strings stand, as a Gaussian: a weak divergence lets them stand somewhat beside the prior."""
+"""The three published methods in their published order, then samples of the prior, and of the Gaussian of the encoded
+training strings. With a weak divergence the latter differs from the prior, and works best.
+"""

@@ -1,4 +1,4 @@
-"""A trained string VAE, read from its published weights alone."""
+"""A trained string VAE."""
 
 from __future__ import annotations
 
@@ -8,29 +8,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import torch
 
-from stages.strings.alphabet import make_alphabet
 from stages.strings.compiled_grammar import CompiledGrammar, compile_patterns
 from stages.strings.decoder import decode
 from stages.strings.encoder import canonical_string
 from stages.strings.tokens import StringError
-from stages.training.checkpoint import load_checkpoint
+from stages.training.checkpoint import load_module
+from stages.training.latent import LatentPoints
+from stages.training.string_vae.corpus import vocabulary_of
 from stages.training.string_vae.decoding import PartialString, decode_codes
 from stages.training.string_vae.model import StringVae
 from stages.training.string_vae.settings import StringVaeConfig
 from stages.training.string_vae.vocabulary import END_TOKEN, Vocabulary
-
-LatentPoints = npt.NDArray[np.float32]
-"""Points of a latent space, float32 (n, latent)."""
 
 STRINGS_PER_BATCH = 256
 
 
 @dataclass(frozen=True)
 class TrainedStringVae:
-    """header: what the weights say of themselves."""
+    """A string VAE with its vocabulary, the grammar of its kit, and its header."""
 
     module: StringVae
     vocabulary: Vocabulary
@@ -44,11 +41,11 @@ class TrainedStringVae:
 
     @property
     def is_masked(self) -> bool:
-        """Whether its decoder takes only tokens that can lead to a string of the grammar."""
+        """Whether its decoder is restricted to tokens that can lead to a string of the grammar."""
         return bool(self.header["settings"]["decoder"] != "plain")
 
-    def written_for(self, string: str) -> str:
-        """What the decoder is to write for a string: the string itself, or the canonical one of its graph."""
+    def target_of(self, string: str) -> str:
+        """Return the target of the decoder for a string: itself, or the canonical one of its graph."""
         if not self.header["canonical"]:
             return string
         alphabet = self.vocabulary.alphabet
@@ -57,19 +54,21 @@ class TrainedStringVae:
 
     @torch.no_grad()
     def encode(self, strings: Sequence[str]) -> LatentPoints:
-        """The mean of each string in the latent space. Raises StringError for a token that is not known, and ValueError
-        for an empty string."""
+        """Encode strings: posterior means, float32 (n, latent).
+
+        Raises StringError for an unknown token, and ValueError for an empty string.
+        """
         means: list[LatentPoints] = [np.empty((0, self.latent), np.float32)]
         device = next(self.module.parameters()).device
         for start in range(0, len(strings), STRINGS_PER_BATCH):
             codes = [
-                np.append(self.vocabulary.codes(each), END_TOKEN).astype(np.int64)
-                for each in strings[start : start + STRINGS_PER_BATCH]
+                np.append(self.vocabulary.codes(string), END_TOKEN).astype(np.int64)
+                for string in strings[start : start + STRINGS_PER_BATCH]
             ]
-            lengths = torch.tensor([len(each) for each in codes])
+            lengths = torch.tensor([len(string) for string in codes])
             padded = np.zeros((len(codes), int(lengths.max())), np.int64)
-            for row, each in enumerate(codes):
-                padded[row, : len(each)] = each
+            for row, string in enumerate(codes):
+                padded[row, : len(string)] = string
             mean, _ = self.module.encode(torch.from_numpy(padded).to(device), lengths)
             means.append(mean.cpu().numpy())
         return np.concatenate(means)
@@ -79,20 +78,21 @@ class TrainedStringVae:
         points: LatentPoints,
         rng: np.random.Generator | None,
         temperature: float = 1.0,
-        begun: Sequence[PartialString] = (),
+        partial: Sequence[PartialString] = (),
     ) -> list[str]:
-        """A string for each point: each token drawn at a temperature, or, without `rng`, the likeliest. Those that are
-        `begun`, one for each point, go on from there.
+        """Decode each point to a string.
 
-        A plain decoder may answer what is no string; a masked one does so only if no string of the grammar is a tree.
+        rng: samples each token at a temperature; without it, the likeliest tokens are taken.
+        partial: one string for each point to continue.
+        A plain decoder may return what is no string; a masked one does so only if no string of the grammar is a tree.
         """
         rules = self.rules if self.is_masked else None
-        most, cycles = self.header["most"], self.vocabulary.cycles
-        written = decode_codes(self.module, points, most, rules, cycles, rng, temperature, begun)
-        return [self.vocabulary.string(each) for each in written]
+        max_tokens, cycles = self.header["max_tokens"], self.vocabulary.cycles
+        codes = decode_codes(self.module, points, max_tokens, rules, cycles, rng, temperature, partial)
+        return [self.vocabulary.string(string) for string in codes]
 
     def is_valid(self, string: str) -> bool:
-        """Whether it is a string of the grammar that the model has learnt from (strings §5.1)."""
+        """Return whether a string is of the grammar that the model was trained on (strings §5.1)."""
         from stages.strings.grammar_mask import follows_grammar
 
         try:
@@ -103,15 +103,11 @@ class TrainedStringVae:
 
 
 def load_string_vae(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedStringVae:
-    """The string VAE in a file of weights, on the CPU.
+    """Read the model in a file of weights, as `load_module`. expected: such as `{"kit": "castle"}`."""
 
-    Raises CheckpointError for whatever is not one, or says something else of itself than `expected`, such as
-    `{"kit": "castle"}`.
-    """
-    tensors, header = load_checkpoint(path, {"kind": "string_vae", **(expected or {})})
-    vocabulary = Vocabulary(make_alphabet(header["names"]), header["cycles"])
-    # weights from before there was `cycle_attention` have none
-    entry = StringVaeConfig.model_validate({"name": "trained", "cycle_attention": False, **header["settings"]})
-    module = StringVae(entry, len(vocabulary), header["cycles"], header["most"] + 1)
-    module.load_state_dict(tensors)
-    return TrainedStringVae(module.eval(), vocabulary, compile_patterns(header["patterns"], header["cycles"]), header)
+    def build(config: StringVaeConfig, header: Mapping[str, Any]) -> StringVae:
+        return StringVae(config, len(vocabulary_of(header)), header["cycles"], header["max_tokens"] + 1)
+
+    module, header = load_module(path, {"kind": "string_vae", **(expected or {})}, StringVaeConfig, build)
+    rules = compile_patterns(header["patterns"], header["cycles"])
+    return TrainedStringVae(module, vocabulary_of(header), rules, header)

@@ -1,4 +1,4 @@
-"""The tokens that a string VAE knows, by number."""
+"""The tokens of a string VAE, by number."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from stages.strings.alphabet import Alphabet
 from stages.strings.tokens import StringError, number_text, number_value, split_tokens
 
 END_TOKEN = 0
-"""The token that ends a string, and, as what stands before it, begins one."""
+"""The token that ends a string, and that precedes its first token."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Vocabulary:
         return len(self.texts)
 
     def codes(self, string: str) -> npt.NDArray[np.int16]:
-        """The tokens of a string, int16 (n,), without an end. Raises StringError for one that is not known."""
+        """Return the tokens of a string, int16 (n,), without an end. Raises StringError for an unknown token."""
         codes = []
         index = 0
         for text in split_tokens(string):
@@ -49,7 +49,7 @@ class Vocabulary:
         return np.array(codes, dtype=np.int16)
 
     def string(self, codes: Sequence[int] | npt.NDArray[np.integer]) -> str:
-        """The string of some tokens, up to the first end."""
+        """Return the string of some tokens, up to the first end."""
         texts = []
         for code in codes:
             if code == END_TOKEN:

@@ -42,7 +42,7 @@ def model(maker: Instantiator) -> TrainedStringVae:
     settings = StringVaeConfig(name="tiny", latent=4, embedding=4, hidden=16)
     header = {
         "settings": settings.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
-        "most": MOST,
+        "max_tokens": MOST,
         "patterns": patterns_json(rules),
         "names": list(maker.kit.labels),
         "cycles": 2,

@@ -37,7 +37,7 @@ def publish_model(
         "names": list(kit.labels),
         "cycles": vocabulary.cycles,
         "canonical": True,
-        "most": MOST,
+        "max_tokens": MOST,
         "patterns": patterns_json(compile_grammar(kit.grammar, len(kit.labels), vocabulary.cycles)),
         **(changed or {}),
     }

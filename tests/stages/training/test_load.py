@@ -79,7 +79,7 @@ def test_models_of_programs_are_trained_and_read_again(tmp_path: Path) -> None:
     points = trained.encode([parse(path.read_text()) for path in EXAMPLES[:3]])
     assert points.shape == (3, 8)
     train = [parse(each.text) for each in read_samples(next((out / ".work/toy/shapeassembly").glob("toy-train-*.tar")))]
-    codes, drawn = trained.encode(train), trained.points(20_000, np.random.default_rng(0))
+    codes, drawn = trained.encode(train), trained.sample_points(20_000, np.random.default_rng(0))
     assert np.allclose(drawn.mean(axis=0), codes.mean(axis=0), atol=0.05 * drawn.std())
     noise = np.linalg.eigvalsh(np.cov(drawn.T) - np.cov(codes.T, bias=True))
     assert noise.min() > -0.05 * drawn.var(), "they spread further than the means, by what encoding leaves open"

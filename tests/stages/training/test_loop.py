@@ -29,10 +29,15 @@ def test_half_precision_is_chosen_only_where_the_processor_reckons_with_it() -> 
 
 @dataclass(frozen=True)
 class _Halving:
-    """A learner that shall halve numbers, with modules that draw by themselves what they leave out."""
+    """A task that learns to halve numbers, with a module that draws its own dropout."""
 
     module: nn.Module
+    config: ProgramLmConfig
     header: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def device(self) -> torch.device:
+        return torch.device("cpu")
 
     def batches(self, rng: np.random.Generator) -> Iterator[torch.Tensor]:
         while True:
@@ -51,9 +56,9 @@ def _trained(before: int, seed: int) -> torch.Tensor:
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(0)
         module = nn.Sequential(nn.Linear(4, 4), nn.Dropout(0.5))
-    entry = ProgramLmConfig(name="halving", kind="program_lm", steps=5, max_rounds=1)
-    trainee = TrainState.of(_Halving(module), entry)
-    train(trainee, entry, np.random.default_rng(seed), lambda done, total: None)
+    config = ProgramLmConfig(name="halving", kind="program_lm", steps=5, max_rounds=1)
+    state = TrainState.of(_Halving(module, config))
+    train(state, np.random.default_rng(seed), lambda done, total: None)
     return module[0].weight.detach()
 
 
@@ -76,21 +81,21 @@ class _Half(nn.Module):
 
 def _rounds(stops: bool) -> dict[str, torch.Tensor]:
     """What is kept after two rounds, which are taken up again after each where it `stops`."""
-    entry = ProgramLmConfig(name="halving", kind="program_lm", steps=5, max_rounds=2)
+    config = ProgramLmConfig(name="halving", kind="program_lm", steps=5, max_rounds=2)
 
     def fresh() -> TrainState:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(0)
-            return TrainState.of(_Halving(_Half()), entry)
+            return TrainState.of(_Halving(_Half(), config))
 
-    trainee = fresh()
+    state = fresh()
     for number in range(2):
-        train(trainee, entry, np.random.default_rng(number), lambda done, total: None)
+        train(state, np.random.default_rng(number), lambda done, total: None)
         if stops:
-            tensors, step = {name: each.clone() for name, each in trainee.tensors().items()}, trainee.step
-            trainee = fresh()
-            trainee.restore(tensors, step)
-    return trainee.tensors()
+            tensors, step = {name: each.clone() for name, each in state.tensors().items()}, state.step
+            state = fresh()
+            state.restore(tensors, step)
+    return state.tensors()
 
 
 def test_a_training_with_a_layer_that_nothing_uses_goes_on_as_if_it_had_not_stopped() -> None:

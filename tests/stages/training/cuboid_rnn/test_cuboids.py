@@ -50,11 +50,11 @@ def test_a_batch_says_axis_after_axis_and_what_stood_before() -> None:
     np.testing.assert_allclose(batch.numbers[0, :6].reshape(2, 3, 3).mT.flatten(1), rows[:, :9], atol=1e-6)
     assert batch.kinds.tolist() == [[3, 0, END_KIND], [0, END_KIND, END_KIND]]
     assert batch.flags[:, ::3].tolist() == [[[1, 1], [0, 0], [0, 0]], [[0, 0], [0, 0], [0, 0]]]
-    assert batch.there.sum(dim=1).tolist() == [6, 3]
-    assert batch.asked.sum(dim=1).tolist() == [3, 2]
-    assert not batch.shown[:, 0, :5].any()
-    assert (batch.shown[:, 1:, :3] == batch.numbers[:, :-1]).all()
-    assert (batch.shown[0, :, 5:].argmax(dim=-1) == torch.arange(9) % 3).all()
+    assert batch.step_mask.sum(dim=1).tolist() == [6, 3]
+    assert batch.kind_mask.sum(dim=1).tolist() == [3, 2]
+    assert not batch.inputs[:, 0, :5].any()
+    assert (batch.inputs[:, 1:, :3] == batch.numbers[:, :-1]).all()
+    assert (batch.inputs[0, :, 5:].argmax(dim=-1) == torch.arange(9) % 3).all()
 
 
 def test_a_density_is_that_of_the_mixture_and_an_upright_cuboid_has_no_turn() -> None:

@@ -150,9 +150,9 @@ def learner(settings: EdgeCategoriesConfig, shapes: int = 12) -> EdgeCategoriesT
         new_model(settings, CategoryTables.of(space()), CYCLES, 1),
         {},
         settings,
+        strings,
+        strings,
         CategoryTables.of(space()),
-        strings,
-        strings,
     )
 
 
@@ -161,7 +161,7 @@ def trained_model(**changes: Any) -> TrainedEdgeCategories:
     """A model that has learnt some shapes."""
     settings = entry(learning_rate=0.01, **changes)
     learning = learner(settings)
-    train(TrainState.of(learning, settings), settings, np.random.default_rng(2), lambda done, total: None)
+    train(TrainState.of(learning), np.random.default_rng(2), lambda done, total: None)
     module = make_model(settings, CategoryTables.of(space()), CYCLES)
     module.load_state_dict(learning.module.state_dict())
     return TrainedEdgeCategories(module.eval(), space(), header(settings))

@@ -36,7 +36,7 @@ from tests.stages.training.edge_categories.networks import (
 )
 from tests.toy_kits.program_chairs import write_chairs
 
-READERS = ("lstm", "autoregressive")
+DECODERS = ("lstm", "autoregressive")
 
 
 def strings(seed: int, count: int = 0) -> list[Encoded]:
@@ -68,7 +68,7 @@ def test_a_batch_holds_the_mask_of_each_token_by_the_labels_of_its_edge() -> Non
         assert np.array_equal(batch.allowed[place, :count].numpy(), space().allowed(encoded.string))
         assert batch.categories[place, :count].tolist() == right(seed).tolist()
         assert (batch.codes[place, count:] == PAD_CODE).all()
-        assert batch.there_is[place].sum() == count == len(split_tokens(encoded.string))
+        assert batch.is_token[place].sum() == count == len(split_tokens(encoded.string))
 
 
 def test_batches_hold_each_string_once() -> None:
@@ -79,7 +79,7 @@ def test_batches_hold_each_string_once() -> None:
         assert max(map(len, seen)) <= 4
 
 
-@pytest.mark.parametrize("decoder", READERS)
+@pytest.mark.parametrize("decoder", DECODERS)
 def test_a_string_is_judged_alike_whatever_stands_beside_it(decoder: str) -> None:
     module = random_model(decoder=decoder).module
     rows = sorted((labelled(network(seed, size), 0, 0)[0] for seed, size in ((1, 2), (2, 5))), key=len)
@@ -113,17 +113,17 @@ def test_frames_of_a_walker_are_those_of_the_categories() -> None:
     np.testing.assert_allclose(pose_vectors(frames[parts], 1.0), pose_vectors(placed.poses, 1.0), atol=1e-4)
 
 
-@pytest.mark.parametrize("decoder", READERS)
+@pytest.mark.parametrize("decoder", DECODERS)
 def test_token_by_token_a_model_says_what_it_says_of_the_whole(decoder: str) -> None:
     model = random_model(decoder=decoder)
     (encoded,) = strings(5)
-    steps = model.steps([encoded.string, "A", encoded.string])
+    steps = model.decoding([encoded.string, "A", encoded.string])
     for category in right(5).tolist():
         steps.scores()
         steps.take(np.array([category, category if steps.token == 0 else 0, category]))
-    assert steps.chosen()[0].tolist() == steps.chosen()[2].tolist() == right(5).tolist()
+    assert steps.categories()[0].tolist() == steps.categories()[2].tolist() == right(5).tolist()
     (whole,) = model.log_probabilities([encoded.string], [right(5)])
-    again = model.steps([encoded.string])
+    again = model.decoding([encoded.string])
     for token, category in enumerate(right(5).tolist()):
         np.testing.assert_allclose(again.scores()[0], whole[token], rtol=1e-3, atol=1e-3)
         again.take(np.array([category]))
@@ -132,7 +132,7 @@ def test_token_by_token_a_model_says_what_it_says_of_the_whole(decoder: str) -> 
 def test_strings_that_are_kept_go_on_as_they_would_have() -> None:
     model = random_model(decoder="autoregressive")
     texts = [strings(seed)[0].string for seed in (1, 2)]
-    both, kept = model.steps(texts), model.steps(texts)
+    both, kept = model.decoding(texts), model.decoding(texts)
     for each in (both, kept):
         for _ in range(3):
             each.take(each.scores().argmax(axis=1))
@@ -140,7 +140,7 @@ def test_strings_that_are_kept_go_on_as_they_would_have() -> None:
     np.testing.assert_allclose(kept.scores(), both.scores()[[1, 1]], atol=1e-5)
 
 
-@pytest.mark.parametrize("decoder", READERS)
+@pytest.mark.parametrize("decoder", DECODERS)
 def test_only_what_the_mask_allows_is_chosen(decoder: str) -> None:
     model = random_model(decoder=decoder)
     for seed in range(3):
@@ -186,7 +186,7 @@ def model_entry(model: TrainedEdgeCategories) -> EdgeCategoriesConfig:
 def test_it_learns_and_a_walker_learns_what_no_token_can_know_by_itself() -> None:
     """Where the first of several rods goes is anybody's guess, but those after it must go elsewhere."""
     found = {}
-    for decoder in READERS:
+    for decoder in DECODERS:
         model = trained_model(decoder=decoder)
         learning = learner(model_entry(model))
         with torch.no_grad():
@@ -206,12 +206,12 @@ def test_strings_vote_for_a_shape_that_closes_and_all_read_it_alike() -> None:
     # as seen from the first: its nodes are those of its own order
     order = np.argsort(several[0].nodes)
     others = [Encoded(each.string, order[each.nodes]) for each in several[1:]]
-    ballots = model.vote(several)
-    likely = [each.log_probability for each in ballots]
+    results = model.vote(several)
+    likely = [each.log_probability for each in results]
     assert likely
     assert likely == sorted(likely, reverse=True)
     spans = []
-    for encoded, categories in zip(several, ballots[0].categories, strict=True):
+    for encoded, categories in zip(several, results[0].categories, strict=True):
         places = space().place(encoded.string, categories).poses[:, :3, 3]
         spans.append(np.sort(np.linalg.norm(places[:, None] - places, axis=2), axis=None))
     np.testing.assert_allclose(np.array(spans[1:]), np.tile(spans[0], (len(spans) - 1, 1)), atol=1e-6)
@@ -219,7 +219,7 @@ def test_strings_vote_for_a_shape_that_closes_and_all_read_it_alike() -> None:
     np.testing.assert_allclose(np.exp(scores).sum(axis=1), 1.0)
 
 
-@pytest.mark.parametrize("decoder", READERS)
+@pytest.mark.parametrize("decoder", DECODERS)
 def test_weights_come_back_from_their_file_and_only_for_their_kit(decoder: str, tmp_path: Path) -> None:
     model = random_model(decoder=decoder)
     path = tmp_path / "weights.safetensors"
@@ -239,6 +239,6 @@ def test_strings_of_other_spanning_trees_vote_for_a_shape_if_all_that_they_tell_
     strings = trees.strings(trees.graph(ring), 5, np.random.default_rng(0))
     truth = [each.categories for each in space().label(ring, strings, either_hand=True)]
     model = random_model(decoder="autoregressive")
-    (ballot,) = model.vote(strings, truth)
-    for read, wanted in zip(ballot.categories, truth, strict=True):
+    (result,) = model.vote(strings, truth)
+    for read, wanted in zip(result.categories, truth, strict=True):
         np.testing.assert_array_equal(read, wanted)

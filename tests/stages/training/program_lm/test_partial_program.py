@@ -125,9 +125,9 @@ def test_what_expands_a_cuboid_is_as_large_and_none_is_expanded_too_deep() -> No
     said(text, 50, 50, 50)
     for depth in range(1, MAX_DEPTH):
         said(text, CUBOID, 40, 40, 40, 3)
-        size = text.seen()[:3] * (VALUES[[TokenField.SIZE_X, TokenField.SIZE_Y, TokenField.SIZE_Z], 40])
+        size = text.size_inputs()[:3] * (VALUES[[TokenField.SIZE_X, TokenField.SIZE_Y, TokenField.SIZE_Z], 40])
         said(text, ATTACH, 1, 0, 32, 0, 32, 32, 0, 32, STOP)
         assert text.cue == (TokenField.COMMAND, 0, 1, depth)
-        np.testing.assert_allclose(text.seen()[:3], size, atol=1e-3)
+        np.testing.assert_allclose(text.size_inputs()[:3], size, atol=1e-3)
     said(text, CUBOID, 40, 40, 40)
     assert may(text) == {0, 1}

@@ -49,7 +49,7 @@ def test_words_one_by_one_are_said_as_in_whole_programs_wherever_each_stands_and
     module = new_model(ENTRY, VALUES, LONGEST, 1)
     (batch,) = batches(TEXTS, 2, None)
     whole = torch.zeros(*batch.words.shape, VOCABULARY_SIZE)
-    whole.flatten(0, 1)[batch.places] = module(batch.before, batch.cues, batch.seen, batch.places)
+    whole.flatten(0, 1)[batch.places] = module(batch.before, batch.cues, batch.sizes, batch.places)
     cache = module.start(2)
     # The second program is ahead of the first; the first goes back once, over places that hold other words.
     for first, second in [(0, 0), (1, 1), (2, 2), (3, 3), (1, 4), (2, 5), (3, 6), (4, 7)]:
@@ -58,7 +58,7 @@ def test_words_one_by_one_are_said_as_in_whole_programs_wherever_each_stands_and
         shown = batch.before[rows, places].clone()
         if (first, second) in [(2, 2), (3, 3)]:
             shown[0] = 20
-        said = module.step(shown, batch.cues[rows, places], batch.seen[rows, places], places, cache)
+        said = module.step(shown, batch.cues[rows, places], batch.sizes[rows, places], places, cache)
         torch.testing.assert_close(said[1], whole[1, second], atol=1e-4, rtol=1e-4)
         if shown[0] == batch.before[0, first]:
             torch.testing.assert_close(said[0], whole[0, first], atol=1e-4, rtol=1e-4)

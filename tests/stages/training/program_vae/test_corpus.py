@@ -37,7 +37,7 @@ def test_order_is_drawn_from_the_generator_alone() -> None:
 
 def test_models_that_learn_the_same_share_what_is_made_ready() -> None:
     def entry(without: Ablation) -> ProgramVaeConfig:
-        return ProgramVaeConfig(name="any", kind="program_vae", without=without)
+        return ProgramVaeConfig(name="any", kind="program_vae", ablate=without)
 
     assert entry("nothing").prepared == {}
     assert entry("macros").prepared == {"ablate": "macros"}

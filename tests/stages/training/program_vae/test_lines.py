@@ -80,8 +80,8 @@ def test_levels_hold_the_assemblies_of_one_depth_and_know_where_they_stand() -> 
     assert roots.expanded.tolist() == [True, False, False]
     assert roots.opened.tolist() == [0]
     np.testing.assert_allclose(roots.sizes[0, :3], [[1.0, 1.2, 0.8], [0.9, 0.5, 0.7], [0.4, 0.1, 0.3]])
-    assert roots.shown[0, 0].nonzero().flatten().tolist() == [0]
-    assert (roots.shown[:, 1:] == roots.lines[:, :-1]).all()
+    assert roots.before[0, 0].nonzero().flatten().tolist() == [0]
+    assert (roots.before[:, 1:] == roots.lines[:, :-1]).all()
 
 
 def test_a_pass_sees_every_program_once_and_arrays_come_back() -> None:

@@ -70,7 +70,7 @@ def numbered() -> StringCorpus:
 def wrapped(module: torch.nn.Module, settings: StringVaeConfig) -> TrainedStringVae:
     header = {
         "settings": settings.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
-        "most": MOST,
+        "max_tokens": MOST,
         "patterns": patterns_json(rules()),
         "names": list(toy_training.LABELS),
         "cycles": 2,
@@ -94,6 +94,6 @@ def trained_vae(decoder: str = "masked", **changes: Any) -> TrainedStringVae:
     """A model that has learnt the strings of the toy, some hundred steps."""
     settings = entry(decoder=decoder, learning_rate=0.01, **changes)
     strings = numbered()
-    learner = StringVaeTask(new_model(settings, VOCABULARY, MOST, 1), {}, settings, VOCABULARY, True, strings, strings)
-    train(TrainState.of(learner, settings), settings, np.random.default_rng(2), lambda done, total: None)
+    learner = StringVaeTask(new_model(settings, VOCABULARY, MOST, 1), {}, settings, strings, strings, VOCABULARY, True)
+    train(TrainState.of(learner), np.random.default_rng(2), lambda done, total: None)
     return wrapped(learner.module, settings)

@@ -67,7 +67,7 @@ class Asked:
 def test_offsets_grow_in_every_dimension_until_a_new_valid_string_is_found() -> None:
     model = Asked(["known", "invalid", "known", "new", "never asked"])
     found = perturb(model, np.zeros((1, 3), np.float32), [frozenset({"known"})], 0.25, np.random.default_rng(0))
-    assert [(each.string, each.asked, each.valid) for each in found] == [("new", 4, 3)]
+    assert [(each.string, each.decoded, each.valid) for each in found] == [("new", 4, 3)]
     sizes = np.abs(np.concatenate(model.points))
     assert (np.diff(sizes, axis=0) > 0).all()
     assert sizes.max() <= 0.25

@@ -45,9 +45,9 @@ def test_a_cycle_is_open_from_its_number_to_the_same_number_again() -> None:
 
 
 def test_looking_back_bears_on_open_cycles_alone_each_by_where_it_began() -> None:
-    assert random_vae("plain", cycle_attention=True).module.ends is None
+    assert random_vae("plain", cycle_attention=True).module.cycle_attention is None
     module = random_vae("masked", cycle_attention=True).module
-    assert module.ends is not None
+    assert module.cycle_attention is not None
     codes, points = torch.tensor([[1, 7, 2, 6, 1, 6, 1, 7, 1]]), torch.zeros((1, 8))
     before = module.decode(shifted(codes), points, until_of(codes))
     plain, _ = module.decoder(shifted(codes), points)
@@ -135,7 +135,7 @@ def test_equal_draws_write_equal_strings() -> None:
 def test_it_learns_to_write_the_canonical_string_of_what_it_has_read(decoder: str) -> None:
     right = {}
     for name, model in (("trained", trained_vae(decoder)), ("random", random_vae(decoder))):
-        pairs = zip(map(model.written_for, toy_strings()), model.decode(model.encode(toy_strings()), None), strict=True)
+        pairs = zip(map(model.target_of, toy_strings()), model.decode(model.encode(toy_strings()), None), strict=True)
         right[name] = np.mean([one == other for one, other in pairs])
     assert right["random"] < 0.05
     assert right["trained"] > 0.5
@@ -146,9 +146,9 @@ def test_half_precision_learns_nearly_the_same() -> None:
     for precision in ("float32", "bfloat16"):
         settings, strings = entry(precision=precision, steps=4), numbered()
         learner = StringVaeTask(
-            new_model(settings, VOCABULARY, MOST, 1), {}, settings, VOCABULARY, True, strings, strings
+            new_model(settings, VOCABULARY, MOST, 1), {}, settings, strings, strings, VOCABULARY, True
         )
-        learnt = train(TrainState.of(learner, settings), settings, np.random.default_rng(2), lambda done, total: None)
+        learnt = train(TrainState.of(learner), np.random.default_rng(2), lambda done, total: None)
         losses.append(learnt["loss"])
     assert losses[0] != losses[1]
     assert losses[1] == pytest.approx(losses[0], rel=0.02)
@@ -166,7 +166,7 @@ def test_batches_hold_every_string_once_beside_what_is_to_be_written(canonical: 
             assert read[read_length - 1] == codes[length - 1] == END_TOKEN
             assert len(VOCABULARY.codes(text)) == read_length - 1
             assert len(VOCABULARY.codes(written)) == length - 1
-            assert written == (model.written_for(text) if canonical else text)
+            assert written == (model.target_of(text) if canonical else text)
             assert allowed.gather(-1, codes[:, None]).all()
             assert not allowed[:length].all(dim=-1).any()
     assert sorted(seen) == sorted(toy_strings())
@@ -215,16 +215,3 @@ def test_low_temperature_writes_the_likeliest_string_and_a_higher_one_others_mor
     ]
     assert same[0] == 64
     assert same[0] > same[1] > same[2]
-
-
-def test_weights_from_before_models_looked_back_are_read_as_they_are(tmp_path: Path) -> None:
-    model = random_vae("masked", cycle_attention=False)
-    settings = {
-        key: value for key, value in model.header["settings"].items() if key not in ("cycle_attention", "dropout")
-    }
-    path = tmp_path / "weights.safetensors"
-    path.write_bytes(
-        checkpoint_bytes(model.module.state_dict(), {**model.header, "kind": "string_vae", "settings": settings})
-    )
-    points = np.random.default_rng(0).standard_normal((5, 8)).astype(np.float32)
-    assert load_string_vae(path).decode(points, None) == model.decode(points, None)
