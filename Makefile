@@ -46,10 +46,12 @@ TABLE   ?=
 SAMPLES ?= 100
 ## ROUNDS   rounds of `make chaos`
 ROUNDS  ?= 20
+## VERSION  version that `make release` makes, such as 0.2.0
+VERSION ?=
 
 # Their values are text: make expands none of it, and recipes read it from the environment, as "$$CONFIG", so that no
 # shell expands it either. A recipe never says $(CONFIG).
-VARIABLES := CONFIG OUT WORKERS SEED STALL_TIMEOUT CLUSTER MESH PROGRAM INPUT UP MODEL TABLE SAMPLES ROUNDS
+VARIABLES := CONFIG OUT WORKERS SEED STALL_TIMEOUT CLUSTER MESH PROGRAM INPUT UP MODEL TABLE SAMPLES ROUNDS VERSION
 $(foreach name,$(VARIABLES),$(eval override $(name) := $$(value $(name))))
 ifeq ($(value WORKERS),)
 override WORKERS := $(shell nproc 2>/dev/null || echo 1)
@@ -135,7 +137,7 @@ doctor: setup  ## Try everything that Shapemill needs on this machine, with the 
 
 # Working on it ------------------------------------------------------------------------------------------------------
 
-.PHONY: test chaos style lint bench kits config-docs lock
+.PHONY: test chaos style lint bench kits config-docs release lock
 test: style  ## Check style and types and run the tests, on WORKERS cores
 	@$(PYTHON) -m mypy > types.tmp & types=$$!; code=0; \
 	$(PYTHON) -m pytest --numprocesses "$$WORKERS" --dist loadfile --no-loadscope-reorder || code=$$?; \
@@ -152,9 +154,10 @@ bench: setup  ## Measure every stage and every piece against a public peer, and 
 	$(PYTHON) -m tests.bench
 kits: setup  ## Write the shipped exemplars from their source
 	$(PYTHON) datasets/exemplars/source
-config-docs: setup  ## Write the table of all config keys, configs/README.md, from the code
-	$(SHAPEMILL) config-docs > configs/README.md.tmp
-	mv configs/README.md.tmp configs/README.md
+config-docs: setup  ## Write the tables of config keys in configs/sections from the code
+	$(SHAPEMILL) config-docs
+release: setup  ## Join the fragments of changes/ into the changelog, set VERSION and tag it
+	$(PYTHON) changes/release.py "$$VERSION"
 lock: setup  ## Choose the newest versions of everything and pin them in requirements.lock
 	$(PYTHON) -m venv --clear .venv/lock
 	$(PYTHON) -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; \

@@ -13,6 +13,7 @@ import shutil
 import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -134,10 +135,10 @@ def cluster(
 
 @SYSTEM_COMMANDS.command(rich_help_panel=SYSTEM)
 def config_docs(context: typer.Context) -> None:
-    """Print the table of all config keys as Markdown."""
-    from pipeline.config_docs import config_tables
+    """Write the keys of every config section into its page in configs/sections."""
+    from pipeline.config_docs import write_config_pages
 
-    print(config_tables(find_stages(context.obj)), end="")
+    write_config_pages(Path("configs/sections"), find_stages(context.obj))
 
 
 def _slice(text: str) -> tuple[int, int]:

@@ -1,4 +1,4 @@
-"""The keys of a config as a Markdown table, written from the models that check them."""
+"""The keys of a config as Markdown pages, one a section, written from the models that check them."""
 
 from __future__ import annotations
 
@@ -14,25 +14,44 @@ from pydantic_core import PydanticUndefined
 from pipeline.config import DatasetFacts, StrictModel
 from pipeline.stage import Stage
 
-
-def config_tables(stages: Mapping[str, Stage]) -> str:
-    """One table for the dataset's own facts and one for each stage's section, as a Markdown page."""
-    page = [
-        "# What a config may say",
-        "",
-        "Written by `make keys` from the models that check a config. Paths are relative to the folder in which make "
-        "runs. A key that is not listed here is an error, and so is a value of another type or out of range.",
-        "",
-        *_table("The dataset itself", "", DatasetFacts),
-    ]
-    for name, stage in stages.items():
-        page += _table(f"Section `{name}`", f"{name}.", stage.config)
-    return "\n".join(page).rstrip() + "\n"
+HEADING = "\n## Keys\n"
+"""What stands between the part of a page that people write and the part that is generated."""
 
 
-def _table(title: str, prefix: str, model: type[StrictModel]) -> list[str]:
+def write_config_pages(folder: Path, stages: Mapping[str, Stage]) -> list[Path]:
+    """Write the keys of every section into its page in `folder`; what a page says above them stays.
+
+    Returns the pages. Pages that are missing begin with their title alone.
+    """
+    pages = []
+    for name, model in _sections(stages).items():
+        page = folder / f"{name}.md"
+        head = page.read_text(encoding="utf-8").partition(HEADING)[0] if page.exists() else f"# Section `{name}`\n"
+        page.write_text(f"{head}{HEADING}\n{section_table(name, model)}", encoding="utf-8")
+        pages.append(page)
+    return pages
+
+
+def outdated_pages(folder: Path, stages: Mapping[str, Stage]) -> list[str]:
+    """Return the names of sections whose page is missing or lists other keys than the models do."""
+    names = []
+    for name, model in _sections(stages).items():
+        page = folder / f"{name}.md"
+        keys = page.read_text(encoding="utf-8").partition(HEADING)[2] if page.exists() else ""
+        if keys.lstrip("\n") != section_table(name, model):
+            names.append(name)
+    return names
+
+
+def section_table(name: str, model: type[StrictModel]) -> str:
+    """Return the keys of one section as a Markdown table; those of `dataset` have no prefix."""
+    prefix = "" if model is DatasetFacts else f"{name}."
     rows = [f"| `{key}` | {kind} | {default} | {text} |" for key, kind, default, text in _rows(prefix, model)]
-    return [f"## {title}", "", "| key | value | default | what it does |", "|---|---|---|---|", *rows, ""]
+    return "\n".join(["| key | value | default | what it does |", "|---|---|---|---|", *rows]) + "\n"
+
+
+def _sections(stages: Mapping[str, Stage]) -> dict[str, type[StrictModel]]:
+    return {"dataset": DatasetFacts, **{name: stage.config for name, stage in stages.items()}}
 
 
 def _rows(prefix: str, model: type[StrictModel]) -> Iterator[tuple[str, str, str, str]]:

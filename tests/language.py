@@ -86,7 +86,8 @@ def prose(path: Path) -> Iterator[tuple[int, str]]:
     """Yield the lines of a file that people read: comments and texts of Python, everything of a page."""
     lines = path.read_text(encoding="utf-8").splitlines()
     if path.suffix != ".py":
-        yield from enumerate(lines, 1)
+        # a page may quote a paper's word
+        yield from ((number, re.sub(r'"[^"]*"', "", line)) for number, line in enumerate(lines, 1))
         return
     for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.end_lineno is not None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
-from pipeline.config_docs import config_tables
+from pipeline.config_docs import outdated_pages, section_table, write_config_pages
 from tests.pipeline.test_config import Bakery
 from tests.stages.shape.collection.absent import ABSENT_STAGES
 
@@ -13,7 +14,9 @@ def test_keys_of_entries_of_several_kinds_say_whose_they_are() -> None:
     """What all kinds know stands once, before what each knows besides."""
     stage = replace(next(iter(ABSENT_STAGES.values())), config=Bakery)
     rows = [
-        line.strip("| ").split(" | ") for line in config_tables({"bakery": stage}).splitlines() if "`bakery." in line
+        line.strip("| ").split(" | ")
+        for line in section_table("bakery", stage.config).splitlines()
+        if "`bakery." in line
     ]
     assert ["`bakery.small[]`", "list of keys below", "", "Small things"] in [
         [each.strip() for each in row] for row in rows
@@ -25,3 +28,14 @@ def test_keys_of_entries_of_several_kinds_say_whose_they_are() -> None:
         ("`bakery.small[].butter`", "Of `roll`: whether it is buttered"),
     ]
     assert ("`bakery.loaves[].grams`", "Weight; unit: grams") in [(row[0], row[-1]) for row in rows]
+
+
+def test_what_people_wrote_above_the_keys_stays(tmp_path: Path) -> None:
+    stages = {"bakery": replace(next(iter(ABSENT_STAGES.values())), config=Bakery)}
+    (tmp_path / "bakery.md").write_text("# Section `bakery`\n\nBread.\n\n## Keys\n\nold\n")
+    assert outdated_pages(tmp_path, stages) == ["dataset", "bakery"]
+    write_config_pages(tmp_path, stages)
+    text = (tmp_path / "bakery.md").read_text()
+    assert text.startswith("# Section `bakery`\n\nBread.\n\n## Keys\n\n| key |")
+    assert "old" not in text
+    assert outdated_pages(tmp_path, stages) == []

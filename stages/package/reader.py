@@ -1,0 +1,146 @@
+"""Finished datasets, sample by sample, as typed values."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.errors import ConfigError
+from pipeline.shards import bytes_array, read_shard
+from stages.shape.arrays import ByteArray
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from stages.shape.shape import Shape
+
+SPLITS = ("train", "val", "test")
+
+
+@dataclass(frozen=True)
+class DatasetSample:
+    """One sample of a dataset. Members are decoded when they are first asked for.
+
+    key: the name of the sample, unique in its dataset.
+    split: `train`, `val` or `test`.
+    members: the bytes of each member, by its name, such as `points.npy`.
+    """
+
+    key: str
+    split: str
+    members: Mapping[str, bytes]
+
+    @cached_property
+    def record(self) -> dict[str, Any]:
+        """The JSON record; `schema.json` of the dataset describes its fields."""
+        record: dict[str, Any] = json.loads(self.members["json"])
+        return record
+
+    @cached_property
+    def mesh(self) -> trimesh.Scene:
+        """The GLB as a trimesh scene, y up: one node a part, named by its label."""
+        import trimesh
+
+        return trimesh.load_scene(io.BytesIO(self.members["glb"]), file_type="glb", process=False)
+
+    @cached_property
+    def shape(self) -> Shape:
+        """The GLB as a `Shape`: part meshes, poses and labels, without contacts."""
+        from stages.package.glb_shape import glb_shape
+
+        return glb_shape(self.members["glb"])
+
+    @property
+    def points(self) -> npt.NDArray[Any]:
+        """Points on the surface, float32 (n, 3)."""
+        return self.array("points")
+
+    @property
+    def normals(self) -> npt.NDArray[Any]:
+        """Unit normals of the points, float32 (n, 3)."""
+        return self.array("normals")
+
+    @property
+    def labels(self) -> npt.NDArray[Any]:
+        """The class of each point, int (n,): its index in `Dataset.classes`."""
+        return self.array("labels")
+
+    @property
+    def instances(self) -> npt.NDArray[Any]:
+        """The part of each point, int (n,): its index in `record["parts"]`."""
+        return self.array("instances")
+
+    @property
+    def contacts(self) -> npt.NDArray[Any]:
+        """Pairs of parts that touch, int32 (2, m)."""
+        return self.array("contacts")
+
+    @cached_property
+    def sketches(self) -> tuple[ByteArray, ...]:
+        """The line drawings, uint8 (h, w) each; `record["sketches"]` has their cameras."""
+        from PIL import Image
+
+        names = sorted(name for name in self.members if name.startswith("sketch") and name.endswith(".png"))
+        return tuple(np.asarray(Image.open(io.BytesIO(self.members[name])), dtype=np.uint8) for name in names)
+
+    @property
+    def text(self) -> str:
+        """What the sample was made from: strings, parameters, a program or a derivation."""
+        return self.members["txt"].decode()
+
+    def array(self, name: str) -> npt.NDArray[Any]:
+        """Return the member `<name>.npy`. Raises KeyError, with the members that exist, where it is missing."""
+        if f"{name}.npy" not in self.members:
+            raise KeyError(f"{self.key} has no {name}.npy; its members are {', '.join(self.members)}")
+        return bytes_array(self.members[f"{name}.npy"])
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A finished dataset.
+
+    folder: the folder that holds `manifest.json`.
+    manifest: name, version, seed, counts, config and versions.
+    classes: the part label of each class id.
+    """
+
+    folder: Path
+    manifest: Mapping[str, Any]
+    classes: tuple[str, ...]
+
+    @classmethod
+    def open(cls, folder: Path) -> Dataset:
+        """Open the dataset in a folder. Raises ConfigError where it is none, or none that is finished."""
+        try:
+            manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+            listed = json.loads((folder / "classes.json").read_text(encoding="utf-8"))
+        except (OSError, json.JSONDecodeError) as error:
+            raise ConfigError(f"{folder} is no finished dataset: {error}; make it with `make dataset`") from error
+        return cls(folder, manifest, tuple(entry["name"] for entry in listed))
+
+    def __len__(self) -> int:
+        return int(self.manifest["samples"])
+
+    def shards(self, split: str) -> list[Path]:
+        """Return the shard files of a split, in order. Raises ValueError for another word than a split's."""
+        if split not in SPLITS:
+            raise ValueError(f"{split!r} is no split; take one of {', '.join(SPLITS)}")
+        return sorted((self.folder / "data" / split).glob("*.tar"))
+
+    def samples(self, split: str = "") -> Iterator[DatasetSample]:
+        """Yield the samples of one split, or of all, in the order of the shards; one is in memory at a time."""
+        for name in (split,) if split else SPLITS:
+            for path in self.shards(name):
+                for key, members in read_shard(path):
+                    yield DatasetSample(key, name, members)
+
+    def __iter__(self) -> Iterator[DatasetSample]:
+        return self.samples()
