@@ -1,4 +1,4 @@
-"""How `make verify` looks at samples that are a program's parameters."""
+"""The checks of `make verify` for samples that are parameters of a program."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def _faults(sample: PackagedSample) -> Iterator[str]:
     if record["language"] == LANGUAGE.name:
         program = find_program(record["kit"])
         if structure_digest(program, program.schema.from_text(record["text"])) != record["graph"]:
-            yield "its parameters have another structure than its json names"
+            yield "its parameters have another structure than its json says"
 
 
 AUDIT = Audit(faults=_faults)

@@ -1,7 +1,7 @@
-"""Rules over parameters, as text that is data: when a parameter is visible, which combinations are valid.
+"""Conditions over parameters, as text that is data: when a parameter is visible, which combinations are valid.
 
-A rule is made of `and`, `or`, `not`, the comparisons `< <= > >= == !=`, `+ - *`, numbers and names of parameters,
-and means what it means in Python. It is read once and never executed as code; it may be asked of many shapes at once.
+A condition consists of `and`, `or`, `not`, the comparisons `< <= > >= == !=`, `+ - *`, numbers and names of parameters,
+with their meaning in Python. It is parsed once and never executed as code. It can be evaluated for many shapes at once.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ _ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 @dataclass(frozen=True)
 class Condition:
-    """A rule such as `is_monoleg and (not is_monoleg_tent or monoleg_tent_pct < 0.4)`.
+    """A condition such as `is_monoleg and (not is_monoleg_tent or monoleg_tent_pct < 0.4)`.
 
-    Raises ValueError when it is made of anything else than the file's first lines say.
+    Raises ValueError where it contains anything else than the module's docstring lists.
     """
 
     text: str
@@ -44,12 +44,11 @@ class Condition:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The parameters it speaks of, each once, in the order of their first mention."""
+        """The parameters in it, each once, in the order of their first mention."""
         return self._parsed[1]
 
     def holds(self, values: Mapping[str, Any]) -> Any:
-        """Whether it is true of `values`, which has all its `names`: a bool where they are numbers, a bool array (n,)
-        where they are arrays (n,)."""
+        """Whether it holds for `values` of all its `names`: a bool for numbers, a bool array (n,) for arrays (n,)."""
         return self._parsed[0](values)
 
     @cached_property
@@ -57,12 +56,12 @@ class Condition:
         try:
             tree = ast.parse(self.text.strip(), mode="eval").body
         except SyntaxError as error:
-            raise ValueError(f"rule {self.text!r}: {error.msg}") from error
+            raise ValueError(f"condition {self.text!r}: {error.msg}") from error
         names: dict[str, None] = {}
         return self._truth(tree, names), tuple(names)
 
     def _truth(self, node: ast.expr, names: dict[str, None]) -> Term:
-        """What is true or false. Written with `&`, `|` and `==`, which numbers and arrays both have."""
+        """A term that is true or false, made of operators that numbers and arrays both have."""
         match node:
             case ast.BoolOp(op=join, values=parts):
                 terms = [self._truth(part, names) for part in parts]
@@ -85,7 +84,7 @@ class Condition:
                 return operator.itemgetter(name)
             case ast.Constant(value=int() | float() as number):
                 return lambda values: number
-        raise ValueError(f"rule {self.text!r}: {ast.unparse(node)!r} has no place there")
+        raise ValueError(f"condition {self.text!r}: {ast.unparse(node)!r} is not allowed")
 
     def _join(self, function: Callable[[Any, Any], Any], a: ast.expr, b: ast.expr, names: dict[str, None]) -> Term:
         left, right = self._number(a, names), self._number(b, names)

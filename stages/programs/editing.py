@@ -1,4 +1,4 @@
-"""Editing: groups of parameters copied from one shape to another, and the way between two shapes (geocode §4)."""
+"""Editing: copy groups of parameters from one shape to another, and interpolate two shapes (geocode §4)."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from stages.programs.schema import Values
 
 
 def mix(program: Program, target: Values, source: Values, groups: Collection[str]) -> dict[str, Value]:
-    """`target` with the parameters of `groups` as they are in `source`, repaired to the constraints.
+    """Copy the parameters of `groups` from `source` to `target`, and repair the result to satisfy the constraints.
 
-    Repair moves what was not copied first, and what was copied only where there is no other way. Raises
-    ParameterError for a group that is not there.
+    Repair changes copied parameters only where nothing else helps. Raises ParameterError for an unknown group.
     """
     copied = _in_groups(program, groups)
     mixed = {name: (source if name in copied else target)[name] for name in program.schema.by_name}
@@ -24,11 +23,11 @@ def mix(program: Program, target: Values, source: Values, groups: Collection[str
 def interpolate(
     program: Program, first: Values, last: Values, share: float, groups: Collection[str] = ()
 ) -> dict[str, Value]:
-    """The shape at `share` (0 is `first`, 1 is `last`) of the way, repaired to the constraints; of `groups` alone, if
-    any are named: the others stay as they are in `first` (geocode, supplement).
+    """Interpolate from `first` (share 0) to `last` (share 1), and repair the result (geocode, supplement).
 
-    Continuous parameters move linearly, others switch to the nearest of their values. What is visible in one of the
-    shapes only has the value that it has there. Raises ParameterError for a group that is not there.
+    Continuous parameters change linearly, others switch to their nearest value. A parameter that is visible in one of
+    the shapes alone has its value there. With `groups`, only their parameters change. Raises ParameterError for an
+    unknown group.
     """
     moving = _in_groups(program, groups or program.schema.groups)
     start, shown_first = program.schema.canonical(first)
@@ -49,22 +48,22 @@ def _in_groups(program: Program, groups: Collection[str]) -> set[str]:
     for group in groups:
         if group not in program.schema.groups:
             raise ParameterError(f"there is no group {group!r}; groups are {', '.join(program.schema.groups)}")
-    return {each.name for each in program.parameters if each.group in groups}
+    return {parameter.name for parameter in program.parameters if parameter.group in groups}
 
 
 def _between(parameter: Parameter, start: float, end: float, share: float) -> Value:
     value = start + share * (end - start) if share < 1 else end
     if parameter.kind == "continuous":
         return parameter.checked(min(max(value, float(parameter.values[0])), float(parameter.values[-1])))
-    # Halfway between two values the second shape's side wins.
-    toward = range(len(parameter.values)) if start > end else range(len(parameter.values) - 1, -1, -1)
-    return parameter.values[min(toward, key=lambda index: abs(float(parameter.values[index]) - value))]
+    # Halfway between two values, the one on the second shape's side is used.
+    indices = range(len(parameter.values)) if start > end else range(len(parameter.values) - 1, -1, -1)
+    return parameter.values[min(indices, key=lambda index: abs(float(parameter.values[index]) - value))]
 
 
 def _valid(program: Program, values: Values, keep: Collection[str]) -> dict[str, Value]:
-    found = repair(program, values, keep)
-    found = repair(program, values) if found is None else found
-    if found is None:
-        broken = ", ".join(each.condition.text for each in program.violated(values))
-        raise ParameterError(f"{program.name}: no values near these keep {broken}")
-    return found
+    valid = repair(program, values, keep)
+    valid = repair(program, values) if valid is None else valid
+    if valid is None:
+        violated = ", ".join(constraint.condition.text for constraint in program.violated(values))
+        raise ParameterError(f"{program.name}: no values near these satisfy {violated}")
+    return valid

@@ -1,4 +1,4 @@
-"""Whether a parameter takes effect in one shape: asked of the geometry, not of the rules (geocode §4)."""
+"""Whether a parameter takes effect in one shape, decided by its geometry (geocode §4)."""
 
 from __future__ import annotations
 
@@ -12,21 +12,20 @@ from stages.programs.repair import repair
 from stages.programs.schema import Values
 
 MAX_SAME_POSITION_DISTANCE = 1e-6
-"""Vertices nearer than this, in the program's units, are at one place."""
+"""In the program's units."""
 
 
 def has_effect(program: Program, values: Values, name: str, parts: Sequence[Part]) -> bool:
-    """Whether the shape of valid, settled `values`, made of `parts`, changes when the parameter `name` alone changes
-    to the next lower value that it can have here, and when it changes to the next higher.
+    """Whether a shape changes with parameter `name` alone, both to its next lower and to its next higher valid value.
 
-    What comes into view by the change may move to keep the constraints. A parameter that can have no other value
-    here has no effect.
+    values: valid and canonical, of the shape made of `parts`. Parameters that come into view may change to satisfy the
+    constraints. A parameter without another valid value has no effect.
     """
     parameter = program.schema.by_name[name]
     _, visible = program.schema.canonical(values)
-    place = parameter.class_of(values[name])
+    index = parameter.class_of(values[name])
     tried = False
-    for others in (parameter.values[:place][::-1], parameter.values[place + 1 :]):
+    for others in (parameter.values[:index][::-1], parameter.values[index + 1 :]):
         for other in others:
             changed = repair(program, {**values, name: other}, visible)
             if changed is not None:
@@ -38,7 +37,7 @@ def has_effect(program: Program, values: Values, name: str, parts: Sequence[Part
 
 
 def same_geometry(parts: Sequence[Part], others: Sequence[Part]) -> bool:
-    """Whether two shapes are made of the same parts in the same order at the same places."""
+    """Whether two shapes have the same parts in the same order and positions."""
     return len(parts) == len(others) and all(
         a.label == b.label
         and a.mesh.vertices.shape == b.mesh.vertices.shape

@@ -17,10 +17,10 @@ from stages.shape.views.palette import srgb_to_linear
 
 
 def named_values(program: Program, name: str) -> dict[str, Value]:
-    """The values that a command line means: `base`, a whole number for the random shape of that seed, or a JSON file:
-    of parameters, or one that `make recover` has written, which holds them under `parameters`.
+    """The values that a command line names: `base`, the seed of a random shape, or a JSON file.
 
-    Raises ConfigError, which names the file and the parameter, for one that is not there or says no shape.
+    The file holds parameters, at its top level or, as `make recover` writes it, under `parameters`. Raises ConfigError
+    with the file and the parameter for a file that is missing or gives no valid shape.
     """
     if name == "base":
         return program.schema.canonical(program.schema.base)[0]
@@ -32,34 +32,33 @@ def named_values(program: Program, name: str) -> dict[str, Value]:
         raise ConfigError(f"{name}: {error.strerror}; give a JSON file of parameters, a seed, or base") from error
     except (ParameterError, UnicodeDecodeError) as error:
         raise ConfigError(f"{name}: {error}") from error
-    broken = program.violated(values)
-    if broken:
-        raise ConfigError(f"{name}: a {program.name} needs {broken[0].condition.text}: {broken[0].description}")
+    for constraint in program.violated(values):
+        raise ConfigError(f"{name}: a {program.name} needs {constraint.condition.text}: {constraint.description}")
     return values
 
 
 def _parameters(program: Program, text: str) -> str:
-    """The object of parameters in the text of a file. Raises ParameterError for that of another program."""
+    """The JSON of the parameters in the text of a file. Raises ParameterError for those of another program."""
     try:
-        said = json.loads(text)
+        given = json.loads(text)
     except (json.JSONDecodeError, RecursionError):
-        return text  # the schema says what is wrong with it
-    if not isinstance(said, dict) or not isinstance(said.get("parameters"), dict):
+        return text  # the schema reports what is wrong with it
+    if not isinstance(given, dict) or not isinstance(given.get("parameters"), dict):
         return text
-    if said.get("program", program.name) != program.name:
-        raise ParameterError(f"these are parameters of {said['program']!r}, not of {program.name}")
-    return json.dumps(said["parameters"])
+    if given.get("program", program.name) != program.name:
+        raise ParameterError(f"these are parameters of {given['program']!r}, not of {program.name}")
+    return json.dumps(given["parameters"])
 
 
 def random_shapes(program: Program, count: int, seed: int) -> list[dict[str, Value]]:
-    """Values of `count` random valid shapes, no two alike."""
+    """Draw values of `count` different random valid shapes."""
     sampler = Sampler(program, Share(), off_grid=False)
     rng = np.random.default_rng(seed)
     return [sampler.find(None, rng) for _ in range(count)]
 
 
 def shape_glb(program: Program, values: Values) -> bytes:
-    """The shape at `values` as GLB: a node a part at its pose, named by label and number, in its colour."""
+    """The shape at `values` as GLB: one node per part at its pose, named by label and number, in its colour."""
     import trimesh
 
     shape = build_shape(program, values)

@@ -1,4 +1,4 @@
-"""The language of curve programs: a sample is a program's parameters, its shape is what the program makes of them."""
+"""The language of shape programs: a sample is the parameters of a program, from which the program builds its shape."""
 
 from __future__ import annotations
 
@@ -13,19 +13,18 @@ from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
 
 
-class Parameters:
-    """The program of the config."""
+class ProgramDecoder:
+    """Builds the shapes of samples of a program."""
 
     def __init__(self, name: str) -> None:
         self.sources = {name: Source(find_program(name).labels)}
 
     def shape(self, sample: Sample) -> Shape:
-        """The shape of the program called `sample.kit` at the parameters that `sample.text` says. Raises ParameterError
-        for a text that is none of its own."""
+        """Build the shape of the program `sample.kit` from the parameters in `sample.text`. Raises ParameterError."""
         return shape_from_text(sample.kit, sample.text)
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
-        """Nothing: a program begins with numbers."""
+        """Nothing: a program has no exemplars."""
         return ()
 
 
@@ -33,22 +32,21 @@ def _reads(_: Plan) -> tuple[str, ...]:
     return ()
 
 
-def _speaker(task: Task) -> Parameters:
-    return Parameters(task.config.section(ProgramsConfig).program)
+def _decoder(task: Task) -> ProgramDecoder:
+    return ProgramDecoder(task.config.section(ProgramsConfig).program)
 
 
-def _anew(_: DatasetPaths) -> RebuildShape:
+def _rebuild(_: DatasetPaths) -> RebuildShape:
     return lambda record, _: upright(shape_from_text(record["kit"], record["text"]))
 
 
 LANGUAGE = Language(
     name="program",
     reads=_reads,
-    decoder=_speaker,
+    decoder=_decoder,
     graphs=False,
     text="Its parameters as JSON.",
-    rebuild=_anew,
-    coordinates="The unit is about a metre. Shapes stand on the plane y = 0 around the y axis with their front to +z; "
-    "what hangs from a ceiling hangs from that plane. The origin of a mesh is the middle of the box around the part, "
-    "and poses turn nothing.",
+    rebuild=_rebuild,
+    coordinates="The unit is about a metre. Shapes are on the plane y = 0 around the y axis, with their front to +z; "
+    "lamps hang from that plane. The origin of a mesh is the middle of its bounding box, and poses only translate.",
 )

@@ -1,4 +1,4 @@
-"""How far each parameter moves the surface: what can be told from a cloud or a drawing, and what cannot."""
+"""How far each parameter moves the surface: which parameters can be read from a cloud or a drawing."""
 
 from __future__ import annotations
 
@@ -19,20 +19,22 @@ from stages.programs.sampling import NoMoreShapes, Sampler
 from stages.shape.arrays import FloatArray
 
 MIN_RANGE_MOVEMENT, MIN_CLASS_MOVEMENT = 0.005, 0.0025
-"""What is moved less by its whole range, and by one class, as shares of the diagonal, is hard to read."""
+"""A parameter whose whole range, or whose next value, moves the surface less is hard to read; in diagonals."""
+MIN_VISIBLE_SHARE = 0.8
+"""Of the base shapes, for a parameter that is not weak."""
 
 MAX_BASES_PER_SHAPE = 50
-"""So many times as many shapes are drawn as shall show a parameter, and no more."""
+"""Random shapes drawn for each shape in which a parameter is visible."""
 SURFACE_SAMPLES = 4000
-"""Points of each surface whose distance from the other is looked up, beside its vertices."""
+"""Points of each surface whose distances are computed, besides its vertices."""
 
 
 @dataclass(frozen=True)
 class Movement:
-    """What one parameter does to base shapes in which it is visible, as shares of their diagonals.
+    """How one parameter moves the surfaces of base shapes in which it is visible: Hausdorff distances in diagonals.
 
-    far, step: float64 (bases,), by how much its farthest other value and its next one move the surface: the greatest
-    distance of a point of either surface from the other.
+    far: float64 (bases,), by its farthest other value
+    step: float64 (bases,), by its nearest other value
     """
 
     parameter: Parameter
@@ -40,70 +42,70 @@ class Movement:
     step: FloatArray
 
     @property
-    def seen(self) -> float:
-        """The share of the base shapes whose surface its farthest value moves by more than FAINT."""
+    def visible_share(self) -> float:
+        """The share of the base shapes whose surface its farthest value moves noticeably."""
         return float((self.far > MIN_RANGE_MOVEMENT).mean())
 
     @property
     def weak(self) -> bool:
-        """Whether a fifth of the base shapes or more do not show it, or half of them do not tell its classes apart."""
-        return self.seen < 0.8 or float(np.median(self.step)) < MIN_CLASS_MOVEMENT
+        """Whether a fifth of the base shapes do not show it, or half of them do not distinguish its classes."""
+        return self.visible_share < MIN_VISIBLE_SHARE or float(np.median(self.step)) < MIN_CLASS_MOVEMENT
 
 
 def movements(program: Program, count: int, seed: int) -> Iterator[Movement]:
-    """What each parameter does to `count` random valid base shapes in which it is visible, or to all where there are
-    fewer.
+    """Measure each parameter on `count` random valid base shapes in which it is visible, or on all if there are fewer.
 
-    Only values that alone keep every constraint are looked at. Raises ValueError for a parameter that no shape shows.
+    Only values that satisfy every constraint count. Raises ValueError for a parameter that is never visible.
     """
     sampler, rng = Sampler(program, Share(), off_grid=False), np.random.default_rng(seed)
     known: list[_Base] = []
     for parameter in program.parameters:
-        found: list[tuple[float, float]] = []
+        distances: list[tuple[float, float]] = []
         for base in islice(_bases(known, sampler, rng), MAX_BASES_PER_SHAPE * count):
-            found += base.moved_by(parameter)
-            if len(found) == count:
+            distances += base.moved_by(parameter)
+            if len(distances) == count:
                 break
-        if not found:
+        if not distances:
             raise ValueError(f"{program.name}: no shape shows another value of {parameter.name}")
-        far, step = np.array(found).T
+        far, step = np.array(distances).T
         yield Movement(parameter, far, step)
 
 
 def surface_movements(
     program: Program, values: Mapping[str, Value], changes: Sequence[Mapping[str, Value]]
 ) -> FloatArray:
-    """By how much each of some changes moves the surface of the shape at `values`: the greatest distance of a point of
-    either surface from the other, as a share of the shape's diagonal, float64 (changes,).
+    """Measure how far each change moves the surface of the shape at `values`, in diagonals, float64 (changes,).
 
-    A change that breaks a constraint, or at which the program fails, moves it infinitely far."""
-    own = _surface(program, values)
-    found = []
+    The measure is the Hausdorff distance. It is infinite for a change that violates a constraint or fails to build.
+    """
+    surface = _surface(program, values)
+    distances = []
     for change in changes:
         changed = {**values, **change}
         try:
-            found.append(float("inf") if program.violated(changed) else own.apart(_surface(program, changed)))
+            distances.append(np.inf if program.violated(changed) else surface.hausdorff(_surface(program, changed)))
         except BuildError:
-            found.append(float("inf"))
-    return np.array(found)
+            distances.append(np.inf)
+    return np.array(distances)
 
 
-def movement_table(found: Sequence[Movement]) -> str:
-    """The movements as a Markdown table, a line a parameter. Ends with a newline."""
+def movement_table(measured: Sequence[Movement]) -> str:
+    """The movements as a Markdown table, one line per parameter. Ends with a newline."""
     lines = [
         f"| parameter | shapes whose surface the far end of its range moves by more than {MIN_RANGE_MOVEMENT:.1%}"
         " | median, far end "
         "| median, next class | |",
         "|---|---:|---:|---:|---|",
     ]
-    for each in found:
-        far, step = (f"{np.median(share):.2%}" for share in (each.far, each.step))
-        lines.append(f"| `{each.parameter.name}` | {each.seen:.0%} | {far} | {step} | {'weak' if each.weak else ''} |")
+    for movement in measured:
+        far, step = (f"{np.median(distances):.2%}" for distances in (movement.far, movement.step))
+        name, weak = movement.parameter.name, "weak" if movement.weak else ""
+        lines.append(f"| `{name}` | {movement.visible_share:.0%} | {far} | {step} | {weak} |")
     return "\n".join(lines) + "\n"
 
 
 def _bases(known: list[_Base], sampler: Sampler, rng: np.random.Generator) -> Iterator[_Base]:
-    """The known ones first, then new ones, which are known from then on."""
+    """Yield the known bases, then new ones, which are added to them."""
     yield from tuple(known)
     while True:
         try:
@@ -123,48 +125,51 @@ class _Base:
         return _surface(self.program, self.values)
 
     def moved_by(self, parameter: Parameter) -> list[tuple[float, float]]:
-        """By how much the farthest and the next other value move the surface; empty where there is none to see."""
+        """The distances of the farthest and of the nearest other value; empty where the parameter is hidden."""
         if parameter.name not in self.program.schema.canonical(self.values)[1]:
             return []
         own = float(self.values[parameter.name])
         changed = [{**self.values, parameter.name: value} for value in parameter.values if float(value) != own]
         others = sorted(
-            (each for each in changed if not self.program.violated(each)),
-            key=lambda each: abs(float(each[parameter.name]) - own),
+            (values for values in changed if not self.program.violated(values)),
+            key=lambda values: abs(float(values[parameter.name]) - own),
         )
-        moved = [self._moved(each) for each in ([others[-1], others[0]] if len(others) > 1 else others)]
-        return [(moved[0], moved[-1])] if moved else []
-
-    def _moved(self, values: dict[str, Value]) -> float:
-        return self.surface.apart(_surface(self.program, values))
+        extremes = [others[-1], others[0]] if len(others) > 1 else others
+        distances = [self.surface.hausdorff(_surface(self.program, values)) for values in extremes]
+        return [(distances[0], distances[-1])] if distances else []
 
 
 @dataclass(frozen=True, eq=False)
 class _Surface:
-    """points: float32 (n, 3) on it; casting: the surface as Open3D asks for distances; diagonal: of its box."""
+    """A surface ready for distances.
+
+    points: float32 (n, 3), on it
+    scene: the surface in Open3D
+    diagonal: of its bounding box
+    """
 
     points: Any
-    casting: Any
+    scene: Any
     diagonal: float
 
-    def apart(self, other: _Surface) -> float:
-        """The greatest distance of a point of either surface from the other one, as a share of this one's diagonal."""
-        return max(self.greatest(other), other.greatest(self)) / self.diagonal
+    def hausdorff(self, other: _Surface) -> float:
+        """The Hausdorff distance, in diagonals of this surface."""
+        return max(self._max_distance(other), other._max_distance(self)) / self.diagonal
 
-    def greatest(self, other: _Surface) -> float:
+    def _max_distance(self, other: _Surface) -> float:
         """The greatest distance of a point of the other surface from this one."""
-        return float(self.casting.compute_distance(other.points, nthreads=1).numpy().max())
+        return float(self.scene.compute_distance(other.points, nthreads=1).numpy().max())
 
 
 def _surface(program: Program, values: Mapping[str, Value]) -> _Surface:
     import open3d as o3d
 
     mesh = QuadMesh.joined(part.mesh for part in program.parts(values))
-    # The same numbers for each surface: what does not move is looked at in the same places.
+    # The same random numbers for each surface, so that unmoved parts have the same points.
     points, _, _ = sample_surface(mesh.vertices, mesh.triangles, SURFACE_SAMPLES, np.random.default_rng(0))
-    casting = o3d.t.geometry.RaycastingScene(nthreads=1)
-    casting.add_triangles(
+    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+    scene.add_triangles(
         o3d.core.Tensor(mesh.vertices.astype(np.float32)), o3d.core.Tensor(mesh.triangles.astype(np.uint32))
     )
-    every = np.concatenate([mesh.vertices, points]).astype(np.float32)
-    return _Surface(o3d.core.Tensor(every), casting, float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))))
+    tested = np.concatenate([mesh.vertices, points]).astype(np.float32)
+    return _Surface(o3d.core.Tensor(tested), scene, float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))))

@@ -1,9 +1,10 @@
-"""A parameter of a program: its name, kind, range, values, group, and when it is visible (geocode §3.2)."""
+"""Parameters of a program: name, kind, range, values, group, and when they are visible (geocode §3.2)."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -16,18 +17,19 @@ Value = bool | int | float
 
 
 class ParameterError(ValueError):
-    """A parameter that is not there, or a value outside its range; the message names both."""
+    """An unknown parameter, or a value out of range; the message names both."""
 
 
 @dataclass(frozen=True)
 class Parameter:
     """One parameter.
 
-    values: ascending; all values of a discrete or binary parameter, of a continuous one those that datasets are
-    sampled at and that recovery tells apart (geocode §3.3), its range being from the first to the last of them.
-    base: the value that it has while nobody sets it, and wherever it is hidden.
-    group: what `mix` copies together; sentence: what it does, for people.
-    visible_if: when a change of it can be seen; None is always. Its class is `hidden` where it cannot.
+    values: ascending; all values of a discrete or binary parameter; of a continuous one those that datasets are
+    sampled at and that recovery distinguishes (geocode §3.3), from the lowest to the highest of its range
+    base: its value by default, and where it is hidden
+    group: parameters that `mix` copies together
+    description: what it does, for people
+    visible_if: when a change of it can be seen; None: always. Elsewhere its class is the hidden one.
     """
 
     name: str
@@ -39,28 +41,28 @@ class Parameter:
     visible_if: Condition | None = None
 
     def __post_init__(self) -> None:
-        if len(self.values) < 2 or any(a >= b for a, b in zip(self.values, self.values[1:], strict=False)):
+        if len(self.values) < 2 or any(low >= high for low, high in pairwise(self.values)):
             raise ValueError(f"parameter {self.name}: values must be at least two, ascending; got {self.values}")
         self.checked(self.base)
 
     @property
     def classes(self) -> int:
-        """How many classes recovery tells apart: the values, and one more where it can be hidden."""
+        """The number of classes in recovery: the values, and one more where it can be hidden."""
         return len(self.values) + (self.visible_if is not None)
 
     @property
     def range(self) -> str:
-        """Its range, for people: `0.2 to 1.0`, `3, 4, 5`, `false or true`."""
+        """The range for people: `0.2 to 1.0`, `3, 4, 5`, `false or true`."""
         if self.kind == "continuous":
             return f"{self.values[0]} to {self.values[-1]}"
-        return "false or true" if self.kind == "binary" else ", ".join(str(each) for each in self.values)
+        return "false or true" if self.kind == "binary" else ", ".join(map(str, self.values))
 
     def checked(self, value: Any) -> Value:
-        """`value` in the parameter's own type: float, int or bool. Raises ParameterError for one out of range."""
-        yes_or_no = isinstance(value, bool | np.bool_)
-        number_like = isinstance(value, int | float | np.integer | np.floating) and math.isfinite(value)
-        if (yes_or_no and self.kind == "binary") or (number_like and not yes_or_no):
-            number = float(value) + 0.0  # there is one zero, with one text
+        """Convert `value` to the parameter's own type. Raises ParameterError for one out of range."""
+        is_bool = isinstance(value, bool | np.bool_)
+        is_number = isinstance(value, int | float | np.integer | np.floating) and math.isfinite(value)
+        if (is_bool and self.kind == "binary") or (is_number and not is_bool):
+            number = float(value) + 0.0  # no negative zero, which has another text
             if self.kind == "continuous" and self.values[0] <= number <= self.values[-1]:
                 return number
             if self.kind != "continuous" and number in self.values:
@@ -79,25 +81,25 @@ def continuous(
     steps: int,
     base: float,
     group: str,
-    sentence: str,
+    description: str,
     visible_if: str | None = None,
 ) -> Parameter:
-    """A parameter from `low` to `high`, sampled at `steps` values at equal distances, to four decimals."""
-    values = tuple(round(float(each), 4) for each in np.linspace(low, high, steps))
-    return Parameter(name, "continuous", values, base, group, sentence, _rule(visible_if))
+    """Make a parameter from `low` to `high`, with `steps` evenly spaced values, rounded to four decimals."""
+    values = tuple(round(float(value), 4) for value in np.linspace(low, high, steps))
+    return Parameter(name, "continuous", values, base, group, description, _condition(visible_if))
 
 
 def discrete(
-    name: str, low: int, high: int, base: int, group: str, sentence: str, visible_if: str | None = None
+    name: str, low: int, high: int, base: int, group: str, description: str, visible_if: str | None = None
 ) -> Parameter:
-    """A whole number from `low` to `high`, both included."""
-    return Parameter(name, "discrete", tuple(range(low, high + 1)), base, group, sentence, _rule(visible_if))
+    """Make a parameter that is a whole number from `low` to `high`, both included."""
+    return Parameter(name, "discrete", tuple(range(low, high + 1)), base, group, description, _condition(visible_if))
 
 
-def binary(name: str, base: bool, group: str, sentence: str, visible_if: str | None = None) -> Parameter:
-    """A yes or no."""
-    return Parameter(name, "binary", (False, True), base, group, sentence, _rule(visible_if))
+def binary(name: str, base: bool, group: str, description: str, visible_if: str | None = None) -> Parameter:
+    """Make a parameter that is true or false."""
+    return Parameter(name, "binary", (False, True), base, group, description, _condition(visible_if))
 
 
-def _rule(text: str | None) -> Condition | None:
+def _condition(text: str | None) -> Condition | None:
     return None if text is None else Condition(text)

@@ -1,4 +1,4 @@
-"""A program: a pure function from parameters to the parts of a shape, with its schema as data (geocode §3)."""
+"""Shape programs: a pure function from parameters to the parts of a shape, with its schema as data (geocode §3)."""
 
 from __future__ import annotations
 
@@ -28,9 +28,11 @@ class BuildError(ValueError):
 
 @dataclass(frozen=True)
 class Constraint:
-    """A rule that every valid shape keeps. It binds only while all parameters it speaks of are visible.
+    """A condition of every valid shape. It applies while all of its parameters are visible.
 
-    name: what rejects are counted by; rule: over parameters; sentence: why, for people.
+    name: rejected shapes are counted by it
+    condition: over parameters
+    description: the reason, for people
     """
 
     name: str
@@ -40,15 +42,16 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Program:
-    """One program. `PROGRAM = Program(...)` stands in a file of its own, `stages/programs/library/<name>.py`.
+    """One program, `PROGRAM = Program(...)` in a file of its own: `stages/programs/library/<name>.py`.
 
-    name: the file's name; sentence: what it makes.
-    labels: the part labels, in a fixed order; every part that `build` returns has one of them.
-    build: settled values (hidden parameters stand at their base) -> parts in world coordinates, y up, front at +z;
-    pure: no randomness, no state. It is called with valid values only.
-    constraints: which combinations of values are valid.
-    apart: pairs of labels whose parts may not intersect; samples in which they do are refused (geocode §3.1).
-    elevation: from how high pictures look at it, in degrees above the horizon; below it what hangs from a ceiling.
+    name: the file's name
+    description: what it makes
+    labels: the part labels, in a fixed order; every part that `build` returns has one of them
+    build: from canonical, valid values to parts in world coordinates, y up, front at +z; without randomness or state
+    constraints: which combinations of values are valid
+    non_intersecting: pairs of labels whose parts may not intersect; samples in which they do are rejected (geocode
+    §3.1)
+    view_elevation: of pictures, in degrees above the horizon; negative for shapes that hang from a ceiling
     """
 
     name: str
@@ -64,46 +67,46 @@ class Program:
         for constraint in self.constraints:
             for name in constraint.condition.names:
                 if name not in self.schema.by_name:
-                    raise ValueError(f"constraint {constraint.name} speaks of {name}, which is not there")
-        for label in (each for pair in self.non_intersecting for each in pair):
+                    raise ValueError(f"constraint {constraint.name} uses {name}, which is no parameter")
+        for label in (label for pair in self.non_intersecting for label in pair):
             if label not in self.labels:
-                raise ValueError(f"{self.name}: parts {label!r} shall stay apart; labels are {', '.join(self.labels)}")
+                labels = ", ".join(self.labels)
+                raise ValueError(f"{self.name}: non_intersecting has {label!r}, which is no label; labels are {labels}")
 
     @cached_property
     def schema(self) -> Schema:
-        """The parameters together."""
+        """The schema of the parameters."""
         return Schema(self.parameters)
 
     def violated(self, values: Values) -> tuple[Constraint, ...]:
-        """The constraints that `values` break."""
-        settled, visible = self.schema.canonical(values)
+        """The constraints that `values` violate."""
+        canonical, visible = self.schema.canonical(values)
         return tuple(
-            each
-            for each in self.constraints
-            if visible.issuperset(each.condition.names) and not each.condition.holds(settled)
+            constraint
+            for constraint in self.constraints
+            if visible.issuperset(constraint.condition.names) and not constraint.condition.holds(canonical)
         )
 
     def parts(self, values: Values) -> Sequence[Part]:
-        """The parts at `values`; hidden parameters have no say.
-
-        Raises BuildError where `build` raises anything, and says at which values.
-        """
-        settled, _ = self.schema.canonical(values)
+        """Build the parts at `values`. Raises BuildError with the values where `build` raises anything."""
+        canonical, _ = self.schema.canonical(values)
         try:
-            return self.build(settled)
+            return self.build(canonical)
         except Exception as error:
-            why = f"{type(error).__name__}: {error}"
-            raise BuildError(f"program {self.name} fails at {self.schema.to_text(settled)}: {why}") from error
+            reason = f"{type(error).__name__}: {error}"
+            raise BuildError(f"program {self.name} fails at {self.schema.to_text(canonical)}: {reason}") from error
 
 
 def build_shape(program: Program, values: Values) -> Shape:
-    """The shape at `values`: one mesh a part, y up, without contacts."""
+    """Build the shape at `values`: one mesh per part, y up, without contacts."""
     return shape_from_parts(program, program.parts(values))
 
 
 def shape_from_parts(program: Program, parts: Sequence[Part]) -> Shape:
-    """The shape of parts that `program` has made. The origin of each mesh is the middle of the box around it, and the
-    pose says where that is in the world; it turns nothing."""
+    """Make a shape of parts that `program` has built.
+
+    The origin of each mesh is the middle of its bounding box. Poses only translate.
+    """
     placed = [part.part_mesh() for part in parts]
     poses = np.tile(np.eye(4), (len(placed), 1, 1))
     poses[:, :3, 3] = [mesh.bounds.mean(axis=0) for mesh in placed]
@@ -114,23 +117,22 @@ def shape_from_parts(program: Program, parts: Sequence[Part]) -> Shape:
 
 
 def shape_from_text(program: str, text: str) -> Shape:
-    """The shape that a sample's text says, of the program called `program`. Raises ConfigError for a program that is
-    not there, ParameterError for a text that is none of its own."""
+    """Build the shape of a sample from its text, by the program named `program`.
+
+    Raises ConfigError for an unknown program, ParameterError for a text that does not fit it.
+    """
     found = find_program(program)
     return build_shape(found, found.schema.from_text(text))
 
 
 def program_names() -> tuple[str, ...]:
-    """The programs of the library: every file that says PROGRAM at the start of a line. None is imported."""
+    """Names of the programs of the library: files with PROGRAM at the start of a line. Nothing is imported."""
     folder = Path(__file__).parent / "library"
     return tuple(path.stem for path in sorted(folder.glob("*.py")) if re.search(r"(?m)^PROGRAM\b", path.read_text()))
 
 
 def find_program(name: str) -> Program:
-    """The program of a name, or, for a name with a dot, the one in the module of that name.
-
-    Raises ConfigError if there is none.
-    """
+    """Find a program by its name, or by its dotted module. Raises ConfigError if there is none."""
     module = program_module(name)
     try:
         found: Any = getattr(importlib.import_module(module), "PROGRAM", None)
@@ -142,12 +144,11 @@ def find_program(name: str) -> Program:
 
 
 def program_module(name: str) -> str:
-    """The module in which `find_program` finds a program. Raises ConfigError for what names neither a program of the
-    library nor a module."""
+    """The module where `find_program` finds a program. Raises ConfigError for a name of neither program nor module."""
     names = program_names()
     if name in names:
         return f"{__package__}.library.{name}"
-    if "." in name and all(step.isidentifier() for step in name.split(".")):
+    if "." in name and all(word.isidentifier() for word in name.split(".")):
         return name
     close = nearest_word(name, names)
     hint = f"did you mean {close}?" if close else f"programs are {', '.join(names) or 'none'}"

@@ -1,4 +1,4 @@
-"""Repair: the nearest values that keep every constraint."""
+"""Repair: the nearest values that satisfy every constraint."""
 
 from __future__ import annotations
 
@@ -11,28 +11,29 @@ from stages.programs.schema import Values
 
 
 def repair(program: Program, values: Values, keep: Collection[str] = ()) -> dict[str, Value] | None:
-    """Settled `values` that break no constraint, or None where that takes a change of the parameters `keep`.
+    """Canonical values near `values` that violate no constraint, or None where parameters of `keep` had to change.
 
-    Of each broken constraint the parameters that may move do so, to those of their listed values that break fewest
-    constraints, and among these to the nearest: the sum of the moves, as shares of the parameters' ranges, is least.
+    The other parameters of a violated constraint move to those of their listed values that violate the fewest
+    constraints. Among these the sum of the moves is least, in shares of the parameters' ranges.
     """
-    settled, _ = program.schema.canonical(values)
-    broken = program.violated(settled)
-    while broken:
-        movable = [program.schema.by_name[name] for name in broken[0].condition.names if name not in keep]
-        offers = [(settled[each.name], *each.values) for each in movable]
-        moves = [dict(zip((each.name for each in movable), offer, strict=True)) for offer in itertools.product(*offers)]
-        changed = [program.schema.canonical({**settled, **move})[0] for move in moves]
+    canonical, _ = program.schema.canonical(values)
+    violated = program.violated(canonical)
+    while violated:
+        movable = [program.schema.by_name[name] for name in violated[0].condition.names if name not in keep]
+        names = [parameter.name for parameter in movable]
+        candidates = itertools.product(*((canonical[parameter.name], *parameter.values) for parameter in movable))
+        moves = [dict(zip(names, candidate, strict=True)) for candidate in candidates]
+        changed = [program.schema.canonical({**canonical, **move})[0] for move in moves]
         cost = [
-            (len(program.violated(after)), sum(_distance(each, settled, after) for each in movable))
+            (len(program.violated(after)), sum(_distance(parameter, canonical, after) for parameter in movable))
             for after in changed
         ]
         best = min(range(len(moves)), key=cost.__getitem__)
-        if cost[best][0] >= len(broken):
+        if cost[best][0] >= len(violated):
             return None
-        settled = changed[best]
-        broken = program.violated(settled)
-    return settled
+        canonical = changed[best]
+        violated = program.violated(canonical)
+    return canonical
 
 
 def _distance(parameter: Parameter, before: Values, after: Values) -> float:

@@ -1,4 +1,4 @@
-"""The sampling protocol (geocode §4): valid random shapes, each with one parameter that is seen and takes effect."""
+"""The sampling protocol (geocode §4): valid random shapes, each with one visible parameter that takes effect."""
 
 from __future__ import annotations
 
@@ -20,42 +20,42 @@ from stages.shape.physics.judge import unmet_requirement
 from stages.shape.physics.settings import Requirements
 
 MAX_DRAWS_PER_SHAPE = 2000
-"""So many draws of a shard's own are tried for one shape."""
+"""Of the shard's own share."""
 MIN_DRAWS_PER_BATCH, MAX_DRAWS_PER_BATCH = 32, 8192
-"""Draws at a time."""
 
 ValueIndex = tuple[str, int]
 """A parameter and the index of one of its values."""
 
 
 def all_value_indices(program: Program) -> list[ValueIndex]:
-    """Every value of every parameter, in order."""
-    return [(each.name, index) for each in program.parameters for index in range(len(each.values))]
+    """List every value of every parameter, in order."""
+    return [(parameter.name, index) for parameter in program.parameters for index in range(len(parameter.values))]
 
 
 def structure_digest(program: Program, values: dict[str, Value]) -> str:
-    """Hex sha256 of what is visible of the discrete and binary parameters: equal for shapes that differ by visible
-    continuous values alone."""
-    settled, visible = program.schema.canonical(values)
-    seen = [
-        f"{name}={settled[name]}"
-        for name, each in program.schema.by_name.items()
-        if each.kind != "continuous" and name in visible
+    """Hex sha256 of the visible discrete and binary values: equal for shapes that differ in continuous values alone."""
+    canonical, visible = program.schema.canonical(values)
+    structure = [
+        f"{name}={canonical[name]}"
+        for name, parameter in program.schema.by_name.items()
+        if parameter.kind != "continuous" and name in visible
     ]
-    return hashlib.sha256("\n".join([program.name, *seen]).encode()).hexdigest()
+    return hashlib.sha256("\n".join([program.name, *structure]).encode()).hexdigest()
 
 
 class NoMoreShapes(ShardFailed):
-    """There is no other shape in a share, or none that enough tries would find."""
+    """A share has no further shape, or none is found with enough draws."""
 
 
 @dataclass
 class Sampler:
-    """Finds shapes within one share, no two alike.
+    """Finds shapes within one share, without duplicates.
 
-    off_grid: whether continuous parameters may have any value of their range; require: what shapes must be physically.
-    refused: how many draws were refused, by cell's parameter (or `any`) and reason; tried: how many were looked at;
-    failure: the last error of the program itself, where its `build` failed.
+    off_grid: whether continuous parameters may have any value of their range
+    require: physical requirements
+    refused: number of refused draws, by fixed parameter (or `any`) and reason
+    tried: number of draws examined
+    failure: the last error of the program's `build`
     """
 
     program: Program
@@ -67,15 +67,17 @@ class Sampler:
     failure: str = ""
     _known: set[str] = field(default_factory=set)
 
-    def find(self, cell: ValueIndex | None, rng: np.random.Generator) -> dict[str, Value]:
-        """Settled values of a new shape that keeps every constraint, whose parts stay apart where they should, and in
-        which the parameter of `cell` has its value, is visible and takes effect.
+    def find(self, value_index: ValueIndex | None, rng: np.random.Generator) -> dict[str, Value]:
+        """Find canonical values of a new valid shape.
 
-        Raises NoMoreShapes where none is found, with what the draws were refused for.
+        With a `value_index`, that parameter has that value, is visible and takes effect. Raises NoMoreShapes with the
+        reasons why draws were refused.
         """
         schema = self.program.schema
-        fixed = None if cell is None else (cell[0], float(schema.by_name[cell[0]].values[cell[1]]))
-        item = "any" if cell is None else cell[0]
+        item, fixed = "any", None
+        if value_index is not None:
+            item = value_index[0]
+            fixed = item, float(schema.by_name[item].values[value_index[1]])
         before, first = self.refused.copy(), self.tried
         count = int(np.clip(3 / self.share.size, MIN_DRAWS_PER_BATCH, MAX_DRAWS_PER_BATCH))
         for _ in range(1 + round(MAX_DRAWS_PER_SHAPE / self.share.size / count)):
@@ -86,17 +88,17 @@ class Sampler:
                     self.refused[item, "hidden"] += 1
                     continue
                 values = schema.from_vector(draws.columns[:, column])
-                if self._accepts(values, cell):
+                if self._accepts(values, value_index):
                     return values
         value = "" if fixed is None else f" with {item} = {fixed[1]:g}"
-        why = _reasons(self.refused - before, self.failure) or "none of this shard"
+        reasons = _reasons(self.refused - before, self.failure) or "none of this shard"
         raise NoMoreShapes(
-            f"{self.program.name}: no shape{value} in {self.tried - first} tries ({why}); "
-            "ask for fewer shapes or shards, or look at the program's constraints"
+            f"{self.program.name}: no shape{value} in {self.tried - first} tries ({reasons}); "
+            "ask for fewer shapes or shards, or relax the program's constraints"
         )
 
     def listed(self, shapes: FloatArray) -> Iterator[dict[str, Value]]:
-        """The settled values of those of `shapes` (parameters, n) that `find` could find."""
+        """Yield the canonical values of those `shapes` (parameters, n) that `find` would accept."""
         for column in shapes.T:
             self.tried += 1
             values = self.program.schema.from_vector(column)
@@ -104,40 +106,41 @@ class Sampler:
                 yield values
 
     def reasons(self) -> str:
-        """What was refused and why, in words."""
+        """The reasons for refused draws, in words."""
         return _reasons(self.refused, self.failure)
 
-    def _accepts(self, values: dict[str, Value], cell: ValueIndex | None) -> bool:
-        reason = self._refusal(values, cell)
+    def _accepts(self, values: dict[str, Value], value_index: ValueIndex | None) -> bool:
+        name = None if value_index is None else value_index[0]
+        reason = self._refusal(values, name)
         if reason is not None:
-            self.refused["any" if cell is None else cell[0], reason] += 1
+            self.refused[name or "any", reason] += 1
         return reason is None
 
-    def _refusal(self, values: dict[str, Value], cell: ValueIndex | None) -> str | None:
-        """Why `values` make no sample, or None; what is cheap to ask is asked first."""
-        broken = self.program.violated(values)
-        if broken:
-            return f"breaks {broken[0].name}"
+    def _refusal(self, values: dict[str, Value], fixed: str | None) -> str | None:
+        """Why `values` make no sample, or None; cheap tests first. fixed: a parameter that must take effect."""
+        violated = self.program.violated(values)
+        if violated:
+            return f"violates {violated[0].name}"
         text = self.program.schema.to_text(values)
         if text in self._known:
-            return "alike"
+            return "duplicate"
         try:
             parts = self.program.parts(values)
-            if cell is not None and not has_effect(self.program, values, cell[0], parts):
+            if fixed is not None and not has_effect(self.program, values, fixed, parts):
                 return "no effect"
         except BuildError as error:
             self.failure = str(error)
-            return "fails"
-        met = intersecting_labels(self.program, parts)
-        if met is not None:
-            return f"{met[0]} meets {met[1]}"
-        weak = unmet_requirement(self.require, shape_from_parts(self.program, parts))
-        if weak is not None:
-            return weak
+            return "build fails"
+        labels = intersecting_labels(self.program, parts)
+        if labels is not None:
+            return f"{labels[0]} intersects {labels[1]}"
+        requirement = unmet_requirement(self.require, shape_from_parts(self.program, parts))
+        if requirement is not None:
+            return requirement
         self._known.add(text)
         return None
 
 
 def _reasons(refused: Counter[tuple[str, str]], failure: str) -> str:
-    told = ", ".join(f"{count} {reason}" for (_, reason), count in sorted(refused.items()))
-    return f"{told}; {failure}" if failure else told
+    counts = ", ".join(f"{count} {reason}" for (_, reason), count in sorted(refused.items()))
+    return f"{counts}; {failure}" if failure else counts

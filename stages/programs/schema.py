@@ -1,4 +1,4 @@
-"""The parameters of a program together: what is visible, and values as vectors, classes and JSON."""
+"""The schema of a program: which parameters are visible, and values as vectors, classes and JSON."""
 
 from __future__ import annotations
 
@@ -17,13 +17,15 @@ from stages.programs.parameters import Parameter, ParameterError, Value
 from stages.shape.arrays import BoolArray, FloatArray
 
 Values = Mapping[str, Any]
-"""A value for each parameter, by name, in the parameters' order: float, int or bool as its kind says."""
+"""The value of each parameter by name, in the parameters' order: float, int or bool by its kind."""
 
 
 @dataclass(frozen=True)
 class Schema:
-    """Parameters in a fixed order. Raises ValueError for two of one name, and for visibility rules that speak of
-    parameters which are not there or that go round in a circle."""
+    """Parameters in a fixed order.
+
+    Raises ValueError for two of one name, and for conditions of visibility that are cyclic or use an unknown parameter.
+    """
 
     parameters: tuple[Parameter, ...]
 
@@ -33,7 +35,7 @@ class Schema:
         for parameter in self.parameters:
             for name in parameter.visible_if.names if parameter.visible_if else ():
                 if name not in self.by_name:
-                    raise ValueError(f"parameter {parameter.name} is visible by {name}, which is not there")
+                    raise ValueError(f"parameter {parameter.name} is visible by {name}, which is no parameter")
         _ = self._by_dependence
 
     @cached_property
@@ -53,103 +55,111 @@ class Schema:
 
     @cached_property
     def _by_dependence(self) -> tuple[Parameter, ...]:
-        """Each parameter after those that its visibility depends on."""
-        needs = {each.name: each.visible_if.names if each.visible_if else () for each in self.parameters}
+        """The parameters, each after those that its visibility depends on."""
+        needs = {
+            parameter.name: parameter.visible_if.names if parameter.visible_if else () for parameter in self.parameters
+        }
         try:
             return tuple(self.by_name[name] for name in TopologicalSorter(needs).static_order())
         except CycleError as error:
-            raise ValueError(f"visibility goes round in a circle: {', '.join(error.args[1])}") from error
+            raise ValueError(f"visibility is cyclic: {', '.join(error.args[1])}") from error
 
     def canonical(self, values: Values) -> tuple[dict[str, Value], frozenset[str]]:
-        """`values` with hidden parameters at their base, and the names of the visible parameters.
+        """The canonical values, with hidden parameters at their base, and the names of the visible parameters.
 
-        Visibility is asked of settled values, so that what hides behind a hidden parameter is decided by the base,
-        and settled values are settled.
+        Conditions of visibility see canonical values, so a hidden parameter counts as its base.
         """
-        settled: dict[str, Value] = {}
+        canonical: dict[str, Value] = {}
         visible = set()
         for parameter in self._by_dependence:
-            if parameter.visible_if is None or parameter.visible_if.holds(settled):
+            if parameter.visible_if is None or parameter.visible_if.holds(canonical):
                 visible.add(parameter.name)
-                settled[parameter.name] = values[parameter.name]
+                canonical[parameter.name] = values[parameter.name]
             else:
-                settled[parameter.name] = parameter.base
-        return {name: settled[name] for name in self.by_name}, frozenset(visible)
+                canonical[parameter.name] = parameter.base
+        return {name: canonical[name] for name in self.by_name}, frozenset(visible)
 
     def canonical_columns(self, columns: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """The settled values of many shapes at once, float64 (parameters, n), and what is visible, bool (parameters,
-        n), for `columns` (parameters, n) in the parameters' order."""
-        settled, visible = columns.copy(), np.ones(columns.shape, dtype=np.bool_)
-        rows = dict(zip(self.by_name, settled, strict=True))
-        places = {name: place for place, name in enumerate(self.by_name)}
+        """`canonical` for many shapes at once.
+
+        columns: float64 (parameters, n), in the parameters' order
+        returns: canonical values, float64 (parameters, n), and visibility, bool (parameters, n)
+        """
+        canonical, visible = columns.copy(), np.ones(columns.shape, dtype=np.bool_)
+        values = dict(zip(self.by_name, canonical, strict=True))
+        visible_rows = dict(zip(self.by_name, visible, strict=True))
         for parameter in self._by_dependence:
             if parameter.visible_if is not None:
-                shown = visible[places[parameter.name]]
-                shown[:] = parameter.visible_if.holds(rows)
-                rows[parameter.name][~shown] = float(parameter.base)
-        return settled, visible
+                row = visible_rows[parameter.name]
+                row[:] = parameter.visible_if.holds(values)
+                values[parameter.name][~row] = float(parameter.base)
+        return canonical, visible
 
-    def complete(self, chosen: Mapping[str, Any]) -> dict[str, Value]:
-        """`chosen` with the base of every other parameter. Raises ParameterError for a parameter that is not there
-        or a value out of range."""
-        for name in chosen:
+    def complete(self, partial: Mapping[str, Any]) -> dict[str, Value]:
+        """`partial` with the base of every other parameter. Raises ParameterError for an unknown parameter and for a
+        value out of range."""
+        for name in partial:
             if name not in self.by_name:
                 close = nearest_word(name, self.by_name)
                 hint = f"did you mean {close} ({self.by_name[close].range})?" if close else "see the table of them"
                 raise ParameterError(f"there is no parameter {name!r}; {hint}")
         return {
-            name: each.checked(chosen[name]) if name in chosen else each.base for name, each in self.by_name.items()
+            name: parameter.checked(partial[name]) if name in partial else parameter.base
+            for name, parameter in self.by_name.items()
         }
 
     def to_text(self, values: Values) -> str:
-        """The visible values as canonical JSON on one line: equal exactly for values that look the same."""
-        settled, visible = self.canonical(values)
-        shown = {name: value for name, value in settled.items() if name in visible}
+        """The visible values as canonical JSON on one line: equal exactly for values with equal shapes."""
+        canonical, visible = self.canonical(values)
+        shown = {name: value for name, value in canonical.items() if name in visible}
         return json.dumps(shown, ensure_ascii=False, separators=(",", ":"))
 
     def from_text(self, text: str) -> dict[str, Value]:
-        """The settled values that `text` of this schema says. Raises ParameterError for anything that is no JSON
-        object of parameters, for a parameter not there, out of range, or visible and not said."""
+        """Parse canonical values from a JSON object.
+
+        Raises ParameterError for another text, for an unknown parameter, and for one out of range or visible and
+        missing.
+        """
         try:
-            said = json.loads(text)
+            given = json.loads(text)
         except json.JSONDecodeError as error:
             raise ParameterError(f"parameters must be a JSON object: {error}") from error
-        if not isinstance(said, dict):
+        if not isinstance(given, dict):
             raise ParameterError(f"parameters must be a JSON object, not {text[:40]!r}")
-        settled, visible = self.canonical(self.complete(said))
+        canonical, visible = self.canonical(self.complete(given))
         for name in self.by_name:
-            if name in visible and name not in said:
+            if name in visible and name not in given:
                 raise ParameterError(f"parameter {name} is missing; it may be {self.by_name[name].range}")
-        return settled
+        return canonical
 
     def to_vector(self, values: Values) -> FloatArray:
-        """The settled values as numbers, float64 (parameters,)."""
-        settled, _ = self.canonical(values)
-        return np.array([float(value) for value in settled.values()])
+        """The canonical values as numbers, float64 (parameters,)."""
+        canonical, _ = self.canonical(values)
+        return np.array([float(value) for value in canonical.values()])
 
     def from_vector(self, vector: Sequence[float] | FloatArray) -> dict[str, Value]:
-        """The values in a vector (parameters,). Raises ParameterError for one of another length or out of range."""
+        """The values of a vector (parameters,). Raises ParameterError for another length and values out of range."""
         if len(vector) != len(self.parameters):
             raise ParameterError(f"a vector of {len(vector)} numbers for {len(self.parameters)} parameters")
         return self.complete(dict(zip(self.by_name, vector, strict=True)))
 
     def to_classes(self, values: Values) -> npt.NDArray[np.int64]:
-        """The class of each parameter, int64 (parameters,): the index of the nearest of its values, or its hidden
-        class (geocode §3.3 and App. C)."""
-        settled, visible = self.canonical(values)
+        """The class of each parameter, int64 (parameters,): the index of its nearest value, or the hidden class
+        (geocode §3.3 and App. C)."""
+        canonical, visible = self.canonical(values)
         return np.array(
             [
-                parameter.class_of(settled[name]) if name in visible else len(parameter.values)
+                parameter.class_of(canonical[name]) if name in visible else len(parameter.values)
                 for name, parameter in self.by_name.items()
             ],
             dtype=np.int64,
         )
 
     def from_classes(self, classes: Sequence[int] | npt.NDArray[np.int64]) -> dict[str, Value]:
-        """The settled values of given classes (parameters,).
+        """The canonical values of classes (parameters,).
 
-        Classes need not agree about what is hidden, as a network's need not: a parameter that is visible beside the
-        others and has the hidden class gets its base. Raises ParameterError for a class that is not there.
+        Classes may disagree about what is hidden, as those of a network do: a visible parameter with the hidden class
+        gets its base. Raises ParameterError for an unknown class.
         """
         if len(classes) != len(self.parameters):
             raise ParameterError(f"{len(classes)} classes for {len(self.parameters)} parameters")

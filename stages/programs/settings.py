@@ -12,7 +12,7 @@ from stages.shape.physics.settings import Requirements
 
 
 class EachValueConfig(StrictModel):
-    """How many shapes have each value of each parameter fixed, all others being random (geocode §4)."""
+    """Shapes with each value of each parameter fixed and all others random (geocode §4)."""
 
     train: int = Field(30, ge=1, le=1_000_000, description="Shapes of each value in the training split.")
     val: int = Field(3, ge=1, le=1_000_000, description="Shapes of each value in the validation split.")
@@ -20,7 +20,7 @@ class EachValueConfig(StrictModel):
 
 
 class RandomSamplingConfig(StrictModel):
-    """A plain random sweep: how many shapes, and how they are shared out."""
+    """Random shapes: how many, and how they are divided."""
 
     samples: int = Field(10_000, ge=3, le=1_000_000_000, description="Shapes in all.")
     val: float = Field(0.1, gt=0, lt=0.5, description="Share of shapes, and of structures, in the validation split.")
@@ -33,25 +33,24 @@ class ProgramsConfig(StrictModel):
     program: str = Field(
         "",
         max_length=200,
-        description="Name of the program, such as chair, or the module that holds one of your own, with dots, such as "
-        "furniture.bench; empty for a dataset that is made of exemplars.",
+        description="Name of the program, such as chair, or the dotted module of your own, such as furniture.bench; "
+        "empty for a dataset made from exemplars.",
     )
     mode: Literal["each_value", "random"] = Field(
         "each_value",
-        description="What is sampled: every value of every parameter a number of times, that parameter being visible "
-        "and effective; or random shapes, with values of continuous parameters anywhere in their range.",
+        description="What is sampled. each_value: every value of every parameter a number of times, where it "
+        "is visible and takes effect. random: random shapes, with continuous values anywhere in their range.",
     )
     each_value: EachValueConfig = Field(
         default_factory=EachValueConfig,
-        description="Shapes of each value, for mode each_value. No two shapes are alike; structures recur in splits.",
+        description="Shapes of each value, for mode each_value. There are no duplicates; structures recur in splits.",
     )
     random: RandomSamplingConfig = Field(
         default_factory=RandomSamplingConfig,
-        description="Shapes of a sweep, for mode sweep. Shapes that are alike up to their continuous parameters stand "
-        "in one split; a program with fewer structures than splits is split by values alone, and one with fewer shapes "
-        "than asked gives all it has.",
+        description="Random shapes, for mode random. Shapes that differ in continuous parameters alone are in one "
+        "split. A program with fewer structures than splits is split by values, and one with too few shapes gives all.",
     )
     require: Requirements = Field(
-        default_factory=Requirements, description="What every shape must be physically; others are refused and counted."
+        default_factory=Requirements, description="Physical requirements; other shapes are rejected and counted."
     )
-    splits: ShardConfig = Field(default_factory=ShardConfig, description="How the samples are shared out.")
+    splits: ShardConfig = Field(default_factory=ShardConfig, description="How the samples are divided into shards.")

@@ -1,4 +1,4 @@
-"""Contact sheets of a program: shapes side by side, and one row a parameter with its values across."""
+"""Contact sheets of a program: shapes side by side, and one row per parameter with its values across."""
 
 from __future__ import annotations
 
@@ -22,22 +22,23 @@ SHAPES_PER_ROW, VALUES_PER_ROW = 8, 15
 
 
 def shape_picture(program: Program, values: Values, camera: Camera | None = None) -> ByteArray:
-    """A portrait of the shape at `values`, uint8 (CELL, CELL, 3), the same bytes on every machine; from half its side
-    unless a camera says otherwise."""
-    seen = camera or Camera(azimuth=VIEW_AZIMUTH, elevation=program.view_elevation)
-    return portrait(scene_of(build_shape(program, values)), seen, (CELL_SIDE_PIXELS, CELL_SIDE_PIXELS))
+    """Draw the shape at `values`, uint8 (side, side, 3), with equal bytes on every machine; obliquely by default."""
+    camera = camera or Camera(azimuth=VIEW_AZIMUTH, elevation=program.view_elevation)
+    return portrait(scene_of(build_shape(program, values)), camera, (CELL_SIDE_PIXELS, CELL_SIDE_PIXELS))
 
 
 def shape_sheet(program: Program, shapes: Sequence[Values], captions: Sequence[str], title: str) -> ByteArray:
-    """Shapes in rows of eight with a line under each."""
+    """Draw shapes in rows, with a caption under each."""
     cells = [Cell(shape_picture(program, values), caption) for values, caption in zip(shapes, captions, strict=True)]
     rows = [cells[first : first + SHAPES_PER_ROW] for first in range(0, len(cells), SHAPES_PER_ROW)]
     return contact_sheet([Section("", rows)], title, CELL_SIDE_PIXELS)
 
 
 def parameter_sheet(program: Program) -> ByteArray:
-    """One row a parameter: the program's base shape at each of its values, and else changed no more than it takes to
-    see the parameter and to keep the constraints."""
+    """Draw one row per parameter: the base shape with each of its values.
+
+    Other parameters change only as needed for visibility and the constraints.
+    """
     sections = []
     for parameter in program.parameters:
         shown = values_showing(program, parameter)
@@ -47,21 +48,21 @@ def parameter_sheet(program: Program) -> ByteArray:
             if values is not None:
                 cells.append(Cell(shape_picture(program, values), value_text(value)))
         rows = [cells[first : first + VALUES_PER_ROW] for first in range(0, len(cells), VALUES_PER_ROW)]
-        visible = f", seen where {parameter.visible_if.text}" if parameter.visible_if else ""
+        visible = f", visible where {parameter.visible_if.text}" if parameter.visible_if else ""
         note = f"{parameter.description} {parameter_range(parameter)}{visible}"
         sections.append(Section(parameter.name, rows, note))
     return contact_sheet(sections, f"{program.name}: {len(program.parameters)} parameters", CELL_SIDE_PIXELS)
 
 
 def values_showing(program: Program, parameter: Parameter) -> dict[str, Value]:
-    """The base values with the fewest changes by which `parameter` is visible, repaired to the constraints.
+    """The base values with the fewest changes that make `parameter` visible, repaired to satisfy the constraints.
 
-    Raises ValueError where it never is.
+    Raises ValueError where nothing makes it visible.
     """
     schema = program.schema
-    asked = _asked(program, parameter)
-    for count in range(len(asked) + 1):
-        for names in itertools.combinations(asked, count):
+    deciding = _deciding_parameters(program, parameter)
+    for count in range(len(deciding) + 1):
+        for names in itertools.combinations(deciding, count):
             for values in itertools.product(*(schema.by_name[name].values for name in names)):
                 changed = repair(program, {**schema.base, **dict(zip(names, values, strict=True))})
                 if changed is not None and parameter.name in schema.canonical(changed)[1]:
@@ -69,14 +70,14 @@ def values_showing(program: Program, parameter: Parameter) -> dict[str, Value]:
     raise ValueError(f"{program.name}: nothing makes {parameter.name} visible")
 
 
-def _asked(program: Program, parameter: Parameter) -> list[str]:
-    """The parameters that decide whether `parameter` is visible, directly or not."""
-    asked: dict[str, None] = {}
+def _deciding_parameters(program: Program, parameter: Parameter) -> list[str]:
+    """The parameters that the visibility of `parameter` depends on, directly or indirectly."""
+    deciding: dict[str, None] = {}
     waiting = [parameter]
     while waiting:
-        rule = waiting.pop().visible_if
-        for name in rule.names if rule else ():
-            if name not in asked:
-                asked[name] = None
+        condition = waiting.pop().visible_if
+        for name in condition.names if condition else ():
+            if name not in deciding:
+                deciding[name] = None
                 waiting.append(program.schema.by_name[name])
-    return list(asked)
+    return list(deciding)

@@ -1,6 +1,7 @@
 """Stage `programs`: the parameters of a program in; sampled shapes out, as the shards `<dataset>-<split>-<index>.tar`.
 
-A sample carries no meshes: its text is its parameters, and `stages.programs.program.shape_of_text` makes the shape.
+A sample has no meshes: its text is its parameters, from which `stages.programs.program.shape_from_text` builds the
+shape.
 """
 
 from __future__ import annotations
@@ -26,16 +27,15 @@ from stages.shape.sample import Sample, write_sample
 
 BYTES_PER_SAMPLE = 8192
 TRIAL_SHARD_SAMPLES = 8
-"""Samples of a shard of a trial."""
 MIN_TRIAL_SAMPLES = 96
-"""Samples of a trial's sweep, where the config asks for so many."""
+"""Of a trial of random sampling, where the config requests as many."""
 
 SampledValues = tuple[dict[str, Value], dict[str, Any]]
 """The values of a shape, and its lineage."""
 
 
 def planned_shards(plan: Plan) -> list[Shard]:
-    """The shards of every split. Each owns a share of all shapes that no other shard has a part in."""
+    """The shards of every split. Each owns a share of all shapes, disjoint from the others."""
     return _shards(plan.config)
 
 
@@ -44,32 +44,25 @@ def _shards(dataset: Config) -> list[Shard]:
     if not config.program:
         return []
     code = (program_module(config.program),)
-    sweep = plan_splits(config.program, config.random) if config.mode == "random" else None
-    sizes = sweep.sizes if sweep else _each_value_sizes(config)
+    split_plan = plan_splits(config.program, config.random) if config.mode == "random" else None
+    sizes = split_plan.sizes if split_plan else _each_value_sizes(config)
     shards: list[Shard] = []
     first = 0
     for split, size in sizes.items():
         count = min(max(config.splits.shards, -(-size // config.splits.samples_per_shard)), size)
         for number in range(count):
             start, end = number * size // count, (number + 1) * size // count
-            params = {
-                "split": split,
-                "start": start,
-                "samples": end - start,
-                "first_key": first + start,
-                **(
-                    sweep.owned(split, start, end) if sweep is not None else _each_value_share(sizes, first, start, end)
-                ),
-            }
+            owned = split_plan.owned(split, start, end) if split_plan else _each_value_share(sizes, first, start, end)
+            params = {"split": split, "start": start, "samples": end - start, "first_key": first + start, **owned}
             shards.append(Shard(f"{dataset.name}-{split}-{number:06d}", params, code=code))
         first += size
     return shards
 
 
 def run_shard(task: Task) -> Outcome:
-    """The samples of one shard, in random order; its summary says how many draws it looked at for how many samples.
+    """Make the samples of one shard, in random order; its summary has the number of samples and of draws examined.
 
-    A shard of a sweep has fewer samples than planned where its share holds no more. Raises ShardFailed where a value
+    In mode random, a shard has fewer samples than planned where its share has no more. Raises ShardFailed where a value
     has no shape, and where the whole program has none.
     """
     config, params = task.config.section(ProgramsConfig), task.shard.params
@@ -77,9 +70,9 @@ def run_shard(task: Task) -> Outcome:
     structures, shapes = params.get("share", ((0.0, 1.0), (0.0, 1.0)))
     share = Share((structures[0], structures[1]), (shapes[0], shapes[1]), params.get("weight", 1.0))
     sampler = Sampler(program, share, off_grid=config.mode == "random", require=config.require)
-    found = _swept(task, sampler) if config.mode == "random" else _each_value(task, sampler)
+    shapes_found = _random(task, sampler) if config.mode == "random" else _each_value(task, sampler)
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
-        for values, lineage in found:
+        for values, lineage in shapes_found:
             key = f"{program.name}-{params['first_key'] + writer.samples:06d}"
             write_sample(writer, _sample(program, key, params["split"], config.program, values, lineage))
             task.progress(writer.samples, params["samples"])
@@ -90,32 +83,31 @@ def run_shard(task: Task) -> Outcome:
 
 
 def _each_value(task: Task, sampler: Sampler) -> Iterator[SampledValues]:
-    """Shapes with every value of every parameter in turn, in random order."""
-    params, every = task.shard.params, all_value_indices(sampler.program)
+    """Yield shapes with every value of every parameter in turn, in random order."""
+    params, indices = task.shard.params, all_value_indices(sampler.program)
     for number in task.rng("order").permutation(params["samples"]).tolist():
-        cell = every[(params["start"] + number) % len(every)]
-        values = sampler.find(cell, task.rng("shape", number))
-        yield values, {"method": "each_value", "parameter": cell[0], "class": cell[1]}
+        name, index = indices[(params["start"] + number) % len(indices)]
+        values = sampler.find((name, index), task.rng("shape", number))
+        yield values, {"method": "each_value", "parameter": name, "class": index}
 
 
-def _swept(task: Task, sampler: Sampler) -> Iterator[SampledValues]:
-    """Random shapes of the shard's share: as many as planned, or all that there are."""
+def _random(task: Task, sampler: Sampler) -> Iterator[SampledValues]:
+    """Yield random shapes of the shard's share: the planned number, or all that exist."""
     params = task.shard.params
-    listed = (
-        listed_shapes(task.config.section(ProgramsConfig).program, task.config.seed) if "listed" in params else None
-    )
+    name = task.config.section(ProgramsConfig).program
+    listed = listed_shapes(name, task.config.seed) if "listed" in params else None
     shapes = _drawn(task, sampler) if listed is None else sampler.listed(listed[:, slice(*params["listed"])])
-    found = 0
+    count = 0
     for values in islice(shapes, params["samples"]):
-        found += 1
-        yield values, {"method": "random", "apart": params["apart"]}
-    if not found:
-        # An empty share is no mistake. A program without any shape is one, and here it says why.
+        count += 1
+        yield values, {"method": "random", "split_by": params["split_by"]}
+    if not count:
+        # An empty share is no mistake, but a program without any shape is.
         whole = replace(sampler, share=Share(), refused=Counter(), tried=0)
         if listed is None:
             whole.find(None, task.rng("any"))
         elif next(whole.listed(listed), None) is None:
-            raise ShardFailed(f"{whole.program.name}: none of its {whole.tried} shapes is kept ({whole.reasons()})")
+            raise ShardFailed(f"{whole.program.name}: none of its {whole.tried} shapes is valid ({whole.reasons()})")
 
 
 def _drawn(task: Task, sampler: Sampler) -> Iterator[dict[str, Value]]:
@@ -141,7 +133,7 @@ def _sample(
 
 
 def _each_value_sizes(config: ProgramsConfig) -> dict[str, int]:
-    """The samples of each split. Raises ConfigError for a program without parameters, which has no value to show."""
+    """The number of samples of each split. Raises ConfigError for a program without parameters."""
     count = len(all_value_indices(find_program(config.program)))
     if not count:
         raise ConfigError(f"programs.mode: {config.program} has no parameters, and so no values; set it to random")
@@ -149,15 +141,14 @@ def _each_value_sizes(config: ProgramsConfig) -> dict[str, int]:
 
 
 def _each_value_share(sizes: dict[str, int], first: int, start: int, end: int) -> dict[str, list[Interval]]:
-    """A share of the shapes as large as samples `start` to `end` are of all samples; structures recur."""
+    """The same share of all shapes as of all samples; structures recur."""
     total = sum(sizes.values())
     return {"share": [(0.0, 1.0), ((first + start) / total, (first + end) / total)]}
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """How many draws there were for each sample, why the others were refused, one case in which the program itself
-    failed, and where a sweep ended early."""
-    counts: Counter[str] = Counter()
+    """Report draws per sample, reasons for refused draws, one failure of the program itself, and missing shapes."""
+    refused: Counter[str] = Counter()
     made: Counter[str] = Counter()
     failures: list[str] = []
     tried = 0
@@ -168,33 +159,39 @@ def report(plan: Plan) -> Sequence[str]:
             tried += summary["tried"]
             made[summary["split"]] += summary["samples"]
             failures += [summary["failure"]] if "failure" in summary else []
-            counts.update(plan.rejects("programs", shard.name))
+            refused.update(plan.rejects("programs", shard.name))
     if not made:
         return []
-    why = ", ".join(f"{100 * count / tried:.1f} % {reason}" for reason, count in counts.most_common())
-    told = [f"{sum(made.values()):,} shapes of {tried:,} tries; refused: {why or 'none'}", *failures[:1]]
+    reasons = ", ".join(f"{100 * count / tried:.1f} % {reason}" for reason, count in refused.most_common())
+    lines = [f"{sum(made.values()):,} shapes of {tried:,} tries; refused: {reasons or 'none'}", *failures[:1]]
     config = plan.config.section(ProgramsConfig)
     if config.mode == "random" and all(plan.summary("programs", shard.name) for shard in shards):
-        told += plan_splits(config.program, config.random).notes(config.random, made)
-    return told
+        lines += plan_splits(config.program, config.random).notes(config.random, made)
+    return lines
 
 
-def asked(config: Config) -> Sequence[int]:
-    """The shapes of each shard."""
+def requested_samples(config: Config) -> Sequence[int]:
+    """The number of shapes of each shard."""
     return [int(shard.params["samples"]) for shard in _shards(config)]
 
 
-def trial(config: Config) -> ProgramsConfig:
-    """Few shapes a shard, in about as many shards as the config asks for: each looks through its share of all shapes,
-    and of a million shapes in shards of few the plan alone would take a minute."""
+def trial_config(config: Config) -> ProgramsConfig:
+    """A config with few shapes in each shard, and about as many shards.
+
+    Each shard searches its own share of all shapes. With a million shapes in small shards, the plan alone would take a
+    minute.
+    """
     section = config.section(ProgramsConfig)
-    less = min(TRIAL_SHARD_SAMPLES / section.splits.samples_per_shard, 1.0)
-    wanted, every = section.random.samples, section.each_value
-    sweep = section.random.model_copy(update={"samples": max(round(less * wanted), min(wanted, MIN_TRIAL_SAMPLES))})
-    each = {split: max(round(less * getattr(every, split)), 1) for split in SPLITS}
-    splits = section.splits.model_copy(update={"samples_per_shard": TRIAL_SHARD_SAMPLES})
+    scale = min(TRIAL_SHARD_SAMPLES / section.splits.samples_per_shard, 1.0)
+    requested, each_value = section.random.samples, section.each_value
+    samples = max(round(scale * requested), min(requested, MIN_TRIAL_SAMPLES))
+    fewer = {split: max(round(scale * getattr(each_value, split)), 1) for split in SPLITS}
     return section.model_copy(
-        update={"splits": splits, "random": sweep, "each_value": every.model_copy(update=each)},
+        update={
+            "splits": section.splits.model_copy(update={"samples_per_shard": TRIAL_SHARD_SAMPLES}),
+            "random": section.random.model_copy(update={"samples": samples}),
+            "each_value": each_value.model_copy(update=fewer),
+        }
     )
 
 
@@ -205,8 +202,8 @@ STAGE = Stage(
     inputs=(),
     plan=planned_shards,
     run_shard=run_shard,
-    estimate_bytes=lambda plan: sum(BYTES_PER_SAMPLE * int(each.params["samples"]) for each in planned_shards(plan)),
+    estimate_bytes=lambda plan: BYTES_PER_SAMPLE * sum(requested_samples(plan.config)),
     report=report,
-    requested_samples=asked,
-    trial_config=trial,
+    requested_samples=requested_samples,
+    trial_config=trial_config,
 )

@@ -18,7 +18,6 @@ from stages.training.recovery.trained import RecoveryModels
 
 PROGRAM_TRIAL_SHAPES = 40
 """Shapes built of each program to find the likeliest."""
-DEFAULT_BUDGET_SHAPES = 600
 
 
 def recover(
@@ -26,7 +25,7 @@ def recover(
     program: str = "",
     models: RecoveryModels | None = None,
     up: Up = "",
-    budget: int = DEFAULT_BUDGET_SHAPES,
+    budget: int = 600,
     seed: int = 0,
 ) -> RecoveryResult:
     """Find the shape of a program that is most like a cloud or a drawing. Equal arguments give equal results.

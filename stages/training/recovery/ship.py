@@ -5,9 +5,10 @@ For maintainers: models below `datasets/exemplars/models/` are committed, so tha
 
 from __future__ import annotations
 
-import argparse
-import sys
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from pipeline.paths import write_file
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes, load_checkpoint
@@ -38,22 +39,14 @@ def slim_bytes(path: Path) -> bytes:
     return content
 
 
-def main(arguments: list[str]) -> int:
-    """Put models where they are committed. Returns the exit code: 0, or 2 where one cannot be used."""
-    parser = argparse.ArgumentParser(prog="stages.training.recovery.ship", description=__doc__.splitlines()[0])
-    parser.add_argument("models", nargs="+", type=Path, metavar="MODEL", help="the folder of a published model")
-    options = parser.parse_args(arguments)
-    try:
-        for folder in options.models:
-            weights = slim_bytes(folder / "weights.safetensors")
-            card = (folder / "README.md").read_bytes()
-            for name, content in (("weights.safetensors", weights), ("README.md", card)):
-                print(write_file(PRETRAINED_FOLDER / folder.name.rpartition("-")[0] / name, content))
-    except (CheckpointError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
+def ship(models: Annotated[list[Path], typer.Argument(help="folders of published models")]) -> None:
+    """Put models where they are committed."""
+    for folder in models:
+        weights = slim_bytes(folder / "weights.safetensors")
+        card = (folder / "README.md").read_bytes()
+        for name, content in (("weights.safetensors", weights), ("README.md", card)):
+            print(write_file(PRETRAINED_FOLDER / folder.name.rpartition("-")[0] / name, content))
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    typer.run(ship)

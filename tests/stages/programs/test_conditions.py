@@ -1,3 +1,5 @@
+"""Conditions mean what they mean in Python, for numbers and for arrays."""
+
 from __future__ import annotations
 
 import itertools
@@ -19,28 +21,28 @@ TEXTS = [
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_a_rule_means_what_it_means_in_python(text: str) -> None:
-    rule = Condition(text)
+def test_condition_means_what_it_means_in_python(text: str) -> None:
+    condition = Condition(text)
     for a, b, c in itertools.product([0, 1, 2, 0.35], repeat=3):
         values = {"a": a, "b": b, "c": c}
-        assert rule.holds(values) == bool(eval(text, {}, values))
+        assert condition.holds(values) == bool(eval(text, {}, values))
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_a_rule_asked_of_arrays_answers_for_each_element(text: str) -> None:
+def test_condition_holds_elementwise_for_arrays(text: str) -> None:
     rows = np.array(list(itertools.product([0, 1, 2, 0.35], repeat=3)))
     columns = dict(zip("abc", rows.T, strict=True))
     expected = [bool(eval(text, {}, dict(zip("abc", row, strict=True)))) for row in rows.tolist()]
     np.testing.assert_array_equal(Condition(text).holds(columns), expected)
 
 
-def test_names_stand_in_the_order_of_their_first_mention() -> None:
+def test_names_are_in_order_of_first_mention() -> None:
     assert Condition("b > 1 and (a or b)").names == ("b", "a")
 
 
 @pytest.mark.parametrize(
     "text", ["__import__('os')", "a.b", "a < b < c", "a[0]", "'x' == a", "a ** 2", "(a and b) + 1", "a and", ""]
 )
-def test_what_is_no_rule_is_refused_with_its_text(text: str) -> None:
-    with pytest.raises(ValueError, match="rule"):
+def test_invalid_condition_is_refused_with_its_text(text: str) -> None:
+    with pytest.raises(ValueError, match="condition"):
         Condition(text)

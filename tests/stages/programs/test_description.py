@@ -7,14 +7,14 @@ from stages.programs.description import program_markdown
 from tests.stages.programs.stool import PROGRAM
 
 
-def test_recipe_tells_every_parameter_constraint_and_label() -> None:
+def test_description_has_every_parameter_constraint_and_label() -> None:
     assert (
         program_markdown(PROGRAM)
         == """\
 ### Program `stool`
 
-A stool of boxes, with or without a rail between its legs. 4 parameters with 24 values in all; 25 classes where a \
-hidden parameter counts as one more.
+A stool of boxes, with or without a rail between its legs. 4 parameters with 24 values in all; 25 classes, with \
+one more where a parameter can be hidden.
 
 #### Seat
 
@@ -34,7 +34,7 @@ A shape is valid when
 
 - `height >= rail_height`: A rail above the seat would hang in the air.
 
-Parts that never meet: `seat` and `rail`.
+Parts that never intersect: `seat` and `rail`.
 
 Part labels: `seat`, `leg`, `rail`.
 """
@@ -49,5 +49,5 @@ def test_a_bar_in_a_sentence_does_not_end_its_column() -> None:
 def test_a_program_without_constraints_says_nothing_of_them() -> None:
     free = program_markdown(replace(PROGRAM, constraints=(), non_intersecting=()))
     assert "valid when" not in free
-    assert "never meet" not in free
+    assert "never intersect" not in free
     assert Condition("has_rail").text in free

@@ -1,3 +1,5 @@
+"""Mixing and interpolation of shapes."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -16,7 +18,7 @@ from tests.stages.programs.stool import PROGRAM
 BASE = PROGRAM.schema.base
 
 valid_values = (
-    st.fixed_dictionaries({each.name: st.sampled_from(each.values) for each in PROGRAM.parameters})
+    st.fixed_dictionaries({parameter.name: st.sampled_from(parameter.values) for parameter in PROGRAM.parameters})
     .map(lambda values: PROGRAM.schema.canonical(values)[0])
     .filter(lambda values: not PROGRAM.violated(values))
 )
@@ -24,7 +26,7 @@ valid_values = (
 
 class TestMix:
     @given(valid_values, valid_values)
-    def test_a_copied_group_is_as_in_the_source_and_the_shape_is_valid(
+    def test_copied_group_is_as_in_the_source_and_valid(
         self, target: dict[str, Value], source: dict[str, Value]
     ) -> None:
         mixed = mix(PROGRAM, target, source, ["seat"])
@@ -33,26 +35,26 @@ class TestMix:
         assert mixed["has_rail"] == target["has_rail"]
 
     @given(valid_values)
-    def test_mixing_a_shape_with_itself_changes_nothing(self, values: dict[str, Value]) -> None:
+    def test_mixing_with_itself_changes_nothing(self, values: dict[str, Value]) -> None:
         assert mix(PROGRAM, values, values, ["rail"]) == values
 
-    def test_what_is_not_copied_makes_room(self) -> None:
+    def test_uncopied_parameters_are_repaired(self) -> None:
         source = {"height": 0.3, "scale x": 1.1, "has_rail": False, "rail_height": 0.3}
         mixed = mix(PROGRAM, {**BASE, "rail_height": 0.5}, source, ["seat"])
         assert mixed == {"height": 0.3, "scale x": 1.1, "has_rail": True, "rail_height": 0.3}
 
-    def test_what_is_copied_moves_only_where_nothing_else_can(self) -> None:
-        # The whole constraint lies inside the copied group, whose source came from elsewhere.
+    def test_copied_parameters_change_only_as_a_last_resort(self) -> None:
+        # All parameters of the constraint are in the copied group.
         tight = replace(PROGRAM, constraints=(Constraint("wide", Condition("height < 0.5"), "."),))
         assert mix(tight, {**BASE, "height": 0.4}, {**BASE, "height": 0.9}, ["seat"])["height"] == 0.4
 
-    def test_a_group_that_is_not_there_is_named_with_those_that_are(self) -> None:
+    def test_unknown_group_is_reported_with_the_known_ones(self) -> None:
         with pytest.raises(ParameterError, match="there is no group 'legs'; groups are seat, rail"):
             mix(PROGRAM, BASE, BASE, ["legs"])
 
-    def test_no_way_to_keep_the_constraints_is_said(self) -> None:
+    def test_unsatisfiable_constraints_are_reported(self) -> None:
         never = replace(PROGRAM, constraints=(Constraint("never", Condition("height < 0"), "."),))
-        with pytest.raises(ParameterError, match="stool: no values near these keep height < 0"):
+        with pytest.raises(ParameterError, match="stool: no values near these satisfy height < 0"):
             mix(never, BASE, BASE, ["seat"])
 
 
@@ -61,7 +63,7 @@ class TestInterpolate:
     def test_every_step_is_valid_and_the_ends_are_the_shapes(
         self, first: dict[str, Value], last: dict[str, Value], share: float
     ) -> None:
-        text = PROGRAM.schema.text
+        text = PROGRAM.schema.to_text
         assert text(interpolate(PROGRAM, first, last, 0.0)) == text(first)
         assert text(interpolate(PROGRAM, first, last, 1.0)) == text(last)
         assert not PROGRAM.violated(interpolate(PROGRAM, first, last, share))
@@ -77,22 +79,22 @@ class TestInterpolate:
         assert interpolate(RACK, first, last, 0.125)["boards"] == 3
         assert interpolate(RACK, last, first, 0.125)["boards"] == 5
 
-    def test_what_is_seen_in_one_shape_only_has_the_value_it_has_there(self) -> None:
+    def test_parameter_visible_in_one_shape_has_its_value_there(self) -> None:
         bare, railed = {**BASE, "has_rail": False}, {**BASE, "rail_height": 0.5}
         for share, expected in ((0.2, 0.3), (0.6, 0.5), (1.0, 0.5)):
             assert interpolate(PROGRAM, bare, railed, share)["rail_height"] == expected
             assert interpolate(PROGRAM, bare, railed, share)["has_rail"] == (share > 0.5)
 
     @given(valid_values, valid_values, st.floats(0, 1))
-    def test_a_group_moves_alone_and_ends_as_a_mix(
+    def test_group_changes_alone_and_ends_as_a_mix(
         self, first: dict[str, Value], last: dict[str, Value], share: float
     ) -> None:
-        text = PROGRAM.schema.text
+        text = PROGRAM.schema.to_text
         between = interpolate(PROGRAM, first, last, share, ["seat"])
         assert between["has_rail"] == first["has_rail"]
         assert between["height"] == interpolate(PROGRAM, first, last, share)["height"]
         assert text(interpolate(PROGRAM, first, last, 1.0, ["seat"])) == text(mix(PROGRAM, first, last, ["seat"]))
 
-    def test_a_group_that_is_not_there_is_named(self) -> None:
+    def test_unknown_group_is_reported(self) -> None:
         with pytest.raises(ParameterError, match="there is no group 'legs'"):
             interpolate(PROGRAM, BASE, BASE, 0.5, ["legs"])

@@ -1,4 +1,4 @@
-"""What every program promises: valid wherever its constraints hold, nothing floats, every value can be told."""
+"""Guarantees of every program: valid wherever its constraints hold, in one piece, with distinct values."""
 
 from __future__ import annotations
 
@@ -19,53 +19,54 @@ from stages.shape.geometry.mesh_pairs import build_tree, near_pairs
 TOYS = ("tests.stages.programs.stool", "tests.stages.programs.rack")
 NAMES = (*program_names(), *TOYS)
 
-JOINED = 0.01
-"""Parts nearer than this share of the shape's diagonal hang together."""
+MAX_JOINT_GAP_DIAGONALS = 0.01
+"""Parts at a smaller distance are connected."""
 
 FOLDED = "folded over themselves"
-"""Where a rail turns tighter than its profile is wide, quads fold: no beauty, but neither a hole nor inside out."""
+"""Quads fold where a rail turns tighter than its profile is wide. The mesh is still closed and oriented."""
 
-TOGETHER = 10
-"""Shapes whose meshes are looked at as one, which takes half the time."""
+SHAPES_PER_CHECK = 10
+"""Joined meshes take half the time."""
 
 
 def pieces(parts: Sequence[Part]) -> int:
-    """In how many pieces a shape falls."""
+    """The number of connected pieces of a shape."""
     corners = np.array([part.mesh.bounds for part in parts])
-    distance = JOINED * float(np.linalg.norm(corners[:, 1].max(axis=0) - corners[:, 0].min(axis=0)))
+    distance = MAX_JOINT_GAP_DIAGONALS * float(np.linalg.norm(corners[:, 1].max(axis=0) - corners[:, 0].min(axis=0)))
     piece = list(range(len(parts)))
     for i, first in enumerate(parts):
         for j in range(i):
             if piece[i] != piece[j] and meshes_intersect(first.mesh, parts[j].mesh, distance):
-                piece = [piece[i] if each == piece[j] else each for each in piece]
+                piece = [piece[i] if number == piece[j] else number for number in piece]
     return len(set(piece))
 
 
 def random_values(program: Program, count: int, off_grid: bool) -> list[Values]:
-    """Random values that keep the constraints and the parts apart."""
+    """Random values of valid shapes."""
     sampler = Sampler(program, Share(), off_grid)
     rng = np.random.default_rng(11)
     return [sampler.find(None, rng) for _ in range(count)]
 
 
 def holes(parts: Sequence[Part]) -> list[str]:
-    """What is wrong with the meshes of parts."""
-    faults = mesh_defects(QuadMesh.joined(part.mesh for part in parts))
-    return [fault for fault in faults if not fault.endswith(FOLDED)]
+    """Defects of the meshes of parts."""
+    defects = mesh_defects(QuadMesh.joined(part.mesh for part in parts))
+    return [defect for defect in defects if not defect.endswith(FOLDED)]
 
 
 def crossings(mesh: QuadMesh) -> int:
-    """How many pairs of triangles of a mesh meet without a corner in common."""
+    """The number of pairs of triangles of a mesh that intersect without a common corner."""
     tree = build_tree(mesh.vertices, mesh.triangles)
     pairs = near_pairs(tree, tree, np.eye(4), 0.0)
-    one, other = tree[0][pairs[:, 0]], tree[0][pairs[:, 1]]
-    neighbours = (one[:, :, None] == other[:, None]).all(axis=-1).any(axis=(1, 2))
+    first, other = tree[0][pairs[:, 0]], tree[0][pairs[:, 1]]
+    neighbours = (first[:, :, None] == other[:, None]).all(axis=-1).any(axis=(1, 2))
     return int((~neighbours).sum())
 
 
-def check(program: Program, every: Sequence[Values]) -> None:
-    for start in range(0, len(every), TOGETHER):
-        shapes = [(program.schema.to_text(each), program.parts(each)) for each in every[start : start + TOGETHER]]
+def check(program: Program, shape_values: Sequence[Values]) -> None:
+    for start in range(0, len(shape_values), SHAPES_PER_CHECK):
+        batch = shape_values[start : start + SHAPES_PER_CHECK]
+        shapes = [(program.schema.to_text(values), program.parts(values)) for values in batch]
         if holes([part for _, parts in shapes for part in parts]):
             pytest.fail(
                 f"not closed: {[(text, part.label) for text, parts in shapes for part in parts if holes([part])]}"
@@ -76,7 +77,7 @@ def check(program: Program, every: Sequence[Values]) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_program_is_called_as_its_file_and_its_base_is_a_shape(name: str) -> None:
+def test_program_has_the_name_of_its_file_and_a_valid_base(name: str) -> None:
     program = find_program(name)
     assert program.name == name.rpartition(".")[2]
     check(program, [program.schema.canonical(program.schema.base)[0]])
@@ -97,15 +98,15 @@ def test_many_random_shapes_are_closed_and_in_one_piece(name: str, off_grid: boo
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_value_of_every_parameter_can_be_told_from_its_neighbours(name: str) -> None:
+def test_every_value_differs_from_its_neighbours(name: str) -> None:
     program = find_program(name)
     sampler, rng = Sampler(program, Share(), off_grid=False), np.random.default_rng(12)
-    for cell in all_value_indices(program):
-        sampler.find(cell, rng)
+    for value_index in all_value_indices(program):
+        sampler.find(value_index, rng)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_shape_depends_on_its_values_alone(name: str) -> None:
+def test_shape_depends_on_its_values_alone(name: str) -> None:
     program = find_program(name)
     schema = program.schema
     shapes = random_values(program, 5, off_grid=True)
@@ -118,7 +119,7 @@ def test_a_shape_depends_on_its_values_alone(name: str) -> None:
             np.testing.assert_array_equal(part.mesh.quads, other.mesh.quads)
 
 
-def test_parts_further_apart_than_a_hundredth_are_pieces() -> None:
+def test_distant_parts_are_separate_pieces() -> None:
     stool = find_program(TOYS[0])
     seat, leg, other, rail = stool.parts(stool.schema.base)
     assert pieces([seat, leg, other, rail]) == 1
@@ -126,8 +127,8 @@ def test_parts_further_apart_than_a_hundredth_are_pieces() -> None:
     assert pieces([leg, other]) == 2
 
 
-def cut_themselves(program: Program, count: int) -> list[tuple[str, str]]:
-    """Parts of random shapes that cut themselves: their labels, and the text of their shapes."""
+def self_intersecting(program: Program, count: int) -> list[tuple[str, str]]:
+    """Parts of random shapes that intersect themselves: their labels, and the text of their shapes."""
     return [
         (part.label, program.schema.to_text(values))
         for values in random_values(program, count, off_grid=False)
@@ -137,19 +138,19 @@ def cut_themselves(program: Program, count: int) -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_part_cuts_itself(name: str) -> None:
-    assert not cut_themselves(find_program(name), 12)
+def test_parts_do_not_intersect_themselves(name: str) -> None:
+    assert not self_intersecting(find_program(name), 12)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", program_names())
-def test_next_to_no_part_of_many_shapes_cuts_itself(name: str) -> None:
-    # Arm supports that are thick and bend sharply do, two of 400 chairs, and necks that fold over, nine of 400 vases.
-    found = cut_themselves(find_program(name), 80)
-    assert len({text for _, text in found}) <= 4, found
+def test_few_parts_of_many_shapes_intersect_themselves(name: str) -> None:
+    # Thick arm supports with sharp bends do, in two of 400 chairs, and necks that fold over, in nine of 400 vases.
+    parts = self_intersecting(find_program(name), 80)
+    assert len({text for _, text in parts}) <= 4, parts
 
 
-def test_what_cuts_itself_is_found() -> None:
+def test_self_intersections_are_found() -> None:
     whole = box((1.0, 1.0, 1.0))
     assert crossings(whole) == 0
     assert crossings(QuadMesh.joined([whole, box((1.0, 1.0, 1.0), (3.0, 0.0, 0.0))])) == 0

@@ -1,3 +1,5 @@
+"""Programs: parts, shapes, constraints, and how they are found."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -16,7 +18,7 @@ from tests.stages.programs.stool import PROGRAM
 STOOL = "tests.stages.programs.stool"
 
 
-def test_shape_has_a_mesh_a_part_labelled_by_name() -> None:
+def test_shape_has_a_labelled_mesh_per_part() -> None:
     shape = build_shape(PROGRAM, PROGRAM.schema.base)
     assert [mesh.name for mesh in shape.meshes] == ["seat", "leg", "leg", "rail"]
     assert shape.label_of.tolist() == [0, 1, 1, 2]
@@ -24,7 +26,7 @@ def test_shape_has_a_mesh_a_part_labelled_by_name() -> None:
     assert shape.up == "y"
 
 
-def test_a_pose_says_where_the_middle_of_its_part_is() -> None:
+def test_pose_is_the_middle_of_its_part() -> None:
     shape = build_shape(PROGRAM, PROGRAM.schema.base)
     for part, mesh, pose in zip(PROGRAM.parts(PROGRAM.schema.base), shape.meshes, shape.assembly.poses, strict=True):
         np.testing.assert_allclose(mesh.bounds.sum(axis=0), 0.0, atol=1e-12)
@@ -32,14 +34,14 @@ def test_a_pose_says_where_the_middle_of_its_part_is() -> None:
         np.testing.assert_allclose(transform_points(pose, mesh.vertices), part.mesh.vertices, atol=1e-12)
 
 
-def test_hidden_parameters_have_no_say() -> None:
+def test_hidden_parameters_have_no_effect() -> None:
     bare = {**PROGRAM.schema.base, "has_rail": False}
     for height in (0.1, 0.6):
         for part, other in zip(PROGRAM.parts(bare), PROGRAM.parts({**bare, "rail_height": height}), strict=True):
             np.testing.assert_array_equal(part.mesh.vertices, other.mesh.vertices)
 
 
-def test_shape_comes_back_from_its_text() -> None:
+def test_shape_is_built_from_its_text() -> None:
     values = PROGRAM.schema.complete({"height": 0.77, "rail_height": 0.2})
     there, back = build_shape(PROGRAM, values), shape_from_text(STOOL, PROGRAM.schema.to_text(values))
     for mesh, other in zip(there.meshes, back.meshes, strict=True):
@@ -48,33 +50,33 @@ def test_shape_comes_back_from_its_text() -> None:
         shape_from_text(STOOL, '{"height":5}')
 
 
-def test_a_constraint_binds_only_while_all_it_speaks_of_is_visible() -> None:
+def test_constraint_applies_only_while_its_parameters_are_visible() -> None:
     low = {**PROGRAM.schema.base, "height": 0.3, "rail_height": 0.6}
-    assert [each.name for each in PROGRAM.violated(low)] == ["rail_above_seat"]
+    assert [constraint.name for constraint in PROGRAM.violated(low)] == ["rail_above_seat"]
     assert not PROGRAM.violated({**low, "has_rail": False})
     assert not PROGRAM.violated({**low, "rail_height": 0.3})
 
 
-def test_values_at_which_a_program_fails_are_named() -> None:
+def test_failing_build_reports_its_values() -> None:
     flat = replace(PROGRAM, build=lambda values: [Part("seat", box((values["height"] - 0.3, 1, 1)), (9, 9, 9))])
     with pytest.raises(ValueError, match=r'program stool fails at {"height":0\.3,.*: three sizes'):
         flat.parts({**PROGRAM.schema.base, "height": 0.3})
 
 
-def test_whatever_a_program_raises_is_said_with_the_values() -> None:
+def test_any_exception_is_reported_with_the_values() -> None:
     hollow = replace(PROGRAM, build=lambda values: [[][int(values["height"])]])
     with pytest.raises(BuildError, match=r'stool fails at {"height":0\.3,.*: IndexError: list index out of range'):
         hollow.parts({**PROGRAM.schema.base, "height": 0.3})
 
 
-def test_a_program_that_speaks_of_what_is_not_there_is_refused() -> None:
-    with pytest.raises(ValueError, match="constraint wide speaks of width"):
+def test_unknown_parameters_and_labels_are_refused() -> None:
+    with pytest.raises(ValueError, match="constraint wide uses width, which is no parameter"):
         replace(PROGRAM, constraints=(Constraint("wide", Condition("width > 1"), "."),))
-    with pytest.raises(ValueError, match="'lid' shall stay apart; labels are seat, leg, rail"):
+    with pytest.raises(ValueError, match="non_intersecting has 'lid', which is no label; labels are seat, leg, rail"):
         replace(PROGRAM, non_intersecting=(("seat", "lid"),))
 
 
-def test_a_program_is_found_by_its_module_and_a_missing_one_is_named() -> None:
+def test_program_is_found_by_its_module_and_a_missing_one_reported() -> None:
     assert find_program(STOOL).name == "stool"
     with pytest.raises(ConfigError, match="there is no program 'stoool'"):
         find_program("stoool")

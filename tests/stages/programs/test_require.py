@@ -1,4 +1,4 @@
-"""What a config requires of every shape is refused in the sampler, and counted."""
+"""The sampler refuses and counts shapes without the required properties."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ OVERHANG = find_program("tests.stages.programs.overhang")
 
 
 @pytest.mark.parametrize("physics", [PhysicsConfig(push=0.0), PhysicsConfig(push=0.02)])
-def test_only_shapes_that_stand_are_kept_and_the_others_are_counted(physics: PhysicsConfig) -> None:
+def test_only_stable_shapes_are_kept_and_others_counted(physics: PhysicsConfig) -> None:
     sampler = Sampler(OVERHANG, Share(), off_grid=False, require=Requirements(stable=True, physics=physics))
     rng = np.random.default_rng(7)
     kept = [sampler.find(None, rng) for _ in range(20)]
     assert all(judge_shape(build_shape(OVERHANG, values), physics).stable for values in kept)
-    # the plate weighs as much as the post: together they fall once their middle leaves the post's foot
+    # the plate weighs as much as the post; they fall once their common middle is beyond the foot of the post
     assert max(values["reach"] for values in kept) <= 0.4
     assert sampler.refused["any", "not stable"] > 0
 
 
-def test_what_is_not_required_is_not_asked() -> None:
+def test_properties_that_are_not_required_are_not_checked() -> None:
     sampler = Sampler(OVERHANG, Share(), off_grid=False, require=Requirements(rooted=True))
     rng = np.random.default_rng(7)
     kept = [sampler.find(None, rng) for _ in range(20)]

@@ -1,3 +1,5 @@
+"""The schema: canonical values, and values as text, vectors and classes."""
+
 from __future__ import annotations
 
 import json
@@ -13,53 +15,55 @@ from tests.stages.programs.stool import PROGRAM
 
 SCHEMA = PROGRAM.schema
 
-grid_values = st.fixed_dictionaries({each.name: st.sampled_from(each.values) for each in PROGRAM.parameters})
+grid_values = st.fixed_dictionaries(
+    {parameter.name: st.sampled_from(parameter.values) for parameter in PROGRAM.parameters}
+)
 any_values = st.fixed_dictionaries(
     {
-        each.name: st.floats(float(each.values[0]), float(each.values[-1]))
-        if each.kind == "continuous"
-        else st.sampled_from(each.values)
-        for each in PROGRAM.parameters
+        parameter.name: st.floats(float(parameter.values[0]), float(parameter.values[-1]))
+        if parameter.kind == "continuous"
+        else st.sampled_from(parameter.values)
+        for parameter in PROGRAM.parameters
     }
 )
 
 
 @given(any_values)
-def test_json_gives_the_settled_values_back(values: dict[str, float]) -> None:
-    settled, _ = SCHEMA.canonical(values)
-    assert SCHEMA.from_text(SCHEMA.to_text(values)) == settled
+def test_text_round_trip_gives_canonical_values(values: dict[str, float]) -> None:
+    canonical, _ = SCHEMA.canonical(values)
+    assert SCHEMA.from_text(SCHEMA.to_text(values)) == canonical
 
 
 @given(any_values)
-def test_vector_gives_the_settled_values_back(values: dict[str, float]) -> None:
-    settled, _ = SCHEMA.canonical(values)
+def test_vector_round_trip_gives_canonical_values(values: dict[str, float]) -> None:
+    canonical, _ = SCHEMA.canonical(values)
     back = SCHEMA.from_vector(SCHEMA.to_vector(values))
-    assert back == settled
-    assert [type(each) for each in back.values()] == [float, float, bool, float]
+    assert back == canonical
+    assert [type(value) for value in back.values()] == [float, float, bool, float]
 
 
 @given(grid_values)
-def test_classes_give_the_settled_values_of_the_grid_back(values: dict[str, float]) -> None:
-    settled, _ = SCHEMA.canonical(values)
+def test_classes_round_trip_gives_canonical_values(values: dict[str, float]) -> None:
+    canonical, _ = SCHEMA.canonical(values)
     classes = SCHEMA.to_classes(values)
-    assert SCHEMA.from_classes(classes) == settled
+    assert SCHEMA.from_classes(classes) == canonical
     np.testing.assert_array_equal(SCHEMA.to_classes(SCHEMA.from_classes(classes)), classes)
 
 
-@given(st.tuples(*(st.integers(0, each.classes - 1) for each in PROGRAM.parameters)))
-def test_any_classes_make_values_whose_classes_make_the_same_values(classes: tuple[int, ...]) -> None:
+@given(st.tuples(*(st.integers(0, parameter.classes - 1) for parameter in PROGRAM.parameters)))
+def test_values_of_any_classes_are_stable(classes: tuple[int, ...]) -> None:
     values = SCHEMA.from_classes(classes)
     assert SCHEMA.from_classes(SCHEMA.to_classes(values)) == values
 
 
-def test_a_hidden_parameter_has_the_last_class_its_base_and_no_place_in_the_text() -> None:
+def test_hidden_parameter_has_the_last_class_its_base_and_no_text() -> None:
     values = {"height": 0.3, "scale x": 0.4, "has_rail": False, "rail_height": 0.6}
     assert SCHEMA.to_classes(values).tolist() == [0, 0, 0, 6]
     assert SCHEMA.canonical(values)[0]["rail_height"] == 0.3
     assert SCHEMA.to_text(values) == '{"height":0.3,"scale x":0.4,"has_rail":false}'
 
 
-def test_what_hides_behind_a_hidden_parameter_is_decided_by_its_base() -> None:
+def test_hidden_parameter_counts_as_its_base() -> None:
     schema = Schema(
         (
             binary("inner", True, "g", ".", visible_if="middle"),
@@ -74,16 +78,17 @@ def test_what_hides_behind_a_hidden_parameter_is_decided_by_its_base() -> None:
 
 
 @given(st.lists(any_values, min_size=1, max_size=5))
-def test_many_shapes_settle_as_each_does_alone(shapes: list[dict[str, float]]) -> None:
+def test_canonical_columns_are_the_canonical_values(shapes: list[dict[str, float]]) -> None:
     columns = np.array([[float(values[name]) for values in shapes] for name in SCHEMA.by_name])
-    settled, visible = SCHEMA.canonical_columns(columns)
-    for place, values in enumerate(shapes):
-        alone, shown = SCHEMA.canonical(values)
-        assert SCHEMA.from_vector(settled[:, place]) == alone
-        assert {name for name, each in zip(SCHEMA.by_name, visible[:, place], strict=True) if each} == shown
+    canonical, visible = SCHEMA.canonical_columns(columns)
+    for column, values in enumerate(shapes):
+        expected, shown = SCHEMA.canonical(values)
+        assert SCHEMA.from_vector(canonical[:, column]) == expected
+        rows = zip(SCHEMA.by_name, visible[:, column], strict=True)
+        assert {name for name, is_visible in rows if is_visible} == shown
 
 
-def test_a_value_between_two_has_the_class_of_the_nearer() -> None:
+def test_value_has_the_nearest_class() -> None:
     assert SCHEMA.to_classes({**SCHEMA.base, "height": 0.44})[0] == 1
     assert SCHEMA.to_classes({**SCHEMA.base, "height": 0.46})[0] == 2
 
@@ -102,7 +107,7 @@ def test_a_value_between_two_has_the_class_of_the_nearer() -> None:
         ("{", "JSON object"),
     ],
 )
-def test_a_wrong_text_is_refused_with_the_parameter_and_its_range(text: str, message: str) -> None:
+def test_wrong_text_is_refused_with_parameter_and_range(text: str, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         SCHEMA.from_text(text)
 
@@ -123,7 +128,7 @@ def test_wrong_classes_and_vectors_are_refused() -> None:
         SCHEMA.from_vector([0.5, 3.0, 0, 0.3])
 
 
-def test_discrete_values_are_whole_and_binary_values_are_truths() -> None:
+def test_values_have_the_type_of_their_kind() -> None:
     count = discrete("count", 3, 8, 5, "g", ".")
     assert count.checked(4.0) == 4
     assert type(count.checked(np.float64(4.0))) is int
@@ -132,13 +137,13 @@ def test_discrete_values_are_whole_and_binary_values_are_truths() -> None:
         count.checked(4.5)
 
 
-def test_a_schema_that_cannot_be_is_refused() -> None:
+def test_invalid_schema_is_refused() -> None:
     height: Parameter = continuous("height", 0, 1, 3, 0, "g", ".")
     with pytest.raises(ValueError, match="one name"):
         Schema((height, height))
-    with pytest.raises(ValueError, match="visible by wdith, which is not there"):
+    with pytest.raises(ValueError, match="visible by wdith, which is no parameter"):
         Schema((continuous("height", 0, 1, 3, 0, "g", ".", visible_if="wdith > 0"),))
-    with pytest.raises(ValueError, match="circle"):
+    with pytest.raises(ValueError, match="cyclic"):
         Schema((binary("a", True, "g", ".", visible_if="b"), binary("b", True, "g", ".", visible_if="a")))
     with pytest.raises(ParameterError, match="height: 2 is out of range"):
         continuous("height", 0, 1, 3, 2, "g", ".")

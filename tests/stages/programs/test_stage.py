@@ -1,4 +1,4 @@
-"""The stage in the real mill: counts, splits, no two alike, the same bytes with any number of workers."""
+"""The stage in the real pipeline: counts, splits, no duplicates, equal bytes with any number of workers."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import yaml
 
 from stages.programs.effect import has_effect
 from stages.programs.program import find_program, shape_from_text
-from stages.programs.sampling import structure_digest
+from stages.programs.sampling import all_value_indices, structure_digest
 from stages.shape.sample import Sample, read_samples
 from tests.command import shapemill
 from tests.stages.programs.stool import PROGRAM as STOOL_PROGRAM
 
 STOOL, RACK = "tests.stages.programs.stool", "tests.stages.programs.rack"
 EACH_VALUE = {"program": STOOL, "each_value": {"train": 2, "val": 1, "test": 1}, "splits": {"shards": 2}}
-SWEEP = {
+RANDOM = {
     "program": RACK,
     "mode": "random",
     "random": {"samples": 200, "val": 0.2, "test": 0.15},
@@ -54,25 +54,25 @@ def stools(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, Path]:
 
 @pytest.fixture(scope="module")
 def racks(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    code, printed, made = make(tmp_path_factory.mktemp("racks"), SWEEP)
+    code, printed, made = make(tmp_path_factory.mktemp("racks"), RANDOM)
     assert code == 0, printed
     return made
 
 
-def test_every_value_is_fixed_in_as_many_shapes_of_each_split_as_asked(stools: tuple[Path, str, Path]) -> None:
+def test_every_value_is_fixed_in_the_requested_number_of_shapes(stools: tuple[Path, str, Path]) -> None:
     counts: Counter[tuple[str, str, int]] = Counter()
     for shard, samples in shards_of(stools[2]).items():
         for sample in samples:
             assert sample.split == shard.split("-")[1]
             counts[sample.split, sample.lineage["parameter"], sample.lineage["class"]] += 1
-    cells = [(each.name, index) for each in STOOL_PROGRAM.parameters for index in range(len(each.values))]
-    wanted = {("train", *cell): 2 for cell in cells} | {
-        (split, *cell): 1 for cell in cells for split in ("val", "test")
+    indices = all_value_indices(STOOL_PROGRAM)
+    expected = {("train", *value): 2 for value in indices} | {
+        (split, *value): 1 for value in indices for split in ("val", "test")
     }
-    assert counts == wanted
+    assert counts == expected
 
 
-def test_the_fixed_value_is_visible_and_takes_effect(stools: tuple[Path, str, Path]) -> None:
+def test_fixed_value_is_visible_and_takes_effect(stools: tuple[Path, str, Path]) -> None:
     schema = STOOL_PROGRAM.schema
     for samples in shards_of(stools[2]).values():
         for sample in samples:
@@ -84,14 +84,15 @@ def test_the_fixed_value_is_visible_and_takes_effect(stools: tuple[Path, str, Pa
 
 
 @pytest.mark.parametrize("made", ["stools", "racks"])
-def test_no_two_shapes_are_alike_and_keys_differ(made: str, request: pytest.FixtureRequest) -> None:
+def test_there_are_no_duplicates_and_keys_differ(made: str, request: pytest.FixtureRequest) -> None:
     fixture = request.getfixturevalue(made)
-    samples = [each for shard in shards_of(fixture[2] if made == "stools" else fixture).values() for each in shard]
-    assert len({each.text for each in samples}) == len(samples)
-    assert sorted(each.key for each in samples) == [f"{made[:-1]}-{number:06d}" for number in range(len(samples))]
+    shards = shards_of(fixture[2] if made == "stools" else fixture)
+    samples = [sample for shard in shards.values() for sample in shard]
+    assert len({sample.text for sample in samples}) == len(samples)
+    assert sorted(sample.key for sample in samples) == [f"{made[:-1]}-{number:06d}" for number in range(len(samples))]
 
 
-def test_a_sample_is_its_parameters(stools: tuple[Path, str, Path]) -> None:
+def test_sample_is_its_parameters(stools: tuple[Path, str, Path]) -> None:
     sample = shards_of(stools[2])["toy-train-000000"][0]
     assert (sample.producer, sample.kit) == ("programs", STOOL)
     assert len(sample.assembly) == 0
@@ -100,38 +101,38 @@ def test_a_sample_is_its_parameters(stools: tuple[Path, str, Path]) -> None:
     assert len(shape_from_text(sample.kit, sample.text)) == len(STOOL_PROGRAM.parts(values))
 
 
-def test_any_number_of_workers_makes_the_same_bytes(stools: tuple[Path, str, Path]) -> None:
+def test_bytes_do_not_depend_on_the_number_of_workers(stools: tuple[Path, str, Path]) -> None:
     code, printed, made = make(stools[0], EACH_VALUE, workers=2)
     assert code == 0, printed
     assert digests(made) == digests(stools[2])
     assert len(digests(made)) == 6
 
 
-def test_refusals_are_counted_by_reason_and_told(stools: tuple[Path, str, Path]) -> None:
+def test_refused_draws_are_counted_by_reason_and_reported(stools: tuple[Path, str, Path]) -> None:
     assert "96 shapes of" in stools[1]
     assert "% hidden" in stools[1]
-    assert "% seat meets rail" in stools[1]
+    assert "% seat intersects rail" in stools[1]
     written = [path.read_text() for path in sorted((stools[2] / "rejects").glob("*.jsonl"))]
     rejects = [json.loads(line) for line in "".join(written).splitlines()]
     assert rejects
-    assert {each["item"] for each in rejects} <= set(STOOL_PROGRAM.schema.by_name)
+    assert {reject["item"] for reject in rejects} <= set(STOOL_PROGRAM.schema.by_name)
 
 
-def test_a_sweep_has_as_many_shapes_as_asked_in_splits_by_structure(racks: Path) -> None:
+def test_random_sampling_has_the_requested_shapes_split_by_structure(racks: Path) -> None:
     shards = shards_of(racks)
     splits: dict[str, list[Sample]] = {}
     for name, samples in shards.items():
         assert len(samples) <= 60
         splits.setdefault(name.split("-")[1], []).extend(samples)
     assert {split: len(samples) for split, samples in splits.items()} == {"train": 130, "val": 40, "test": 30}
-    structures = {split: {each.graph for each in samples} for split, samples in splits.items()}
+    structures = {split: {sample.graph for sample in samples} for split, samples in splits.items()}
     assert len(set().union(*structures.values())) == sum(map(len, structures.values()))
     listed = set(find_program(RACK).schema.by_name["width"].values)
-    widths = {json.loads(each.text)["width"] for each in splits["train"]}
+    widths = {json.loads(sample.text)["width"] for sample in splits["train"]}
     assert len(widths - listed) > 100
 
 
-def test_a_program_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_unknown_program_is_reported(tmp_path: Path) -> None:
     code, printed, _ = make(tmp_path, {"program": "chiar"})
     assert code == 2
     assert "there is no program 'chiar'" in printed

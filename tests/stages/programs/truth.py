@@ -1,7 +1,7 @@
-"""What the programs of the library make, written down in `tests/data/programs`: what they declare, each part at the
-base and at three random shapes, and the whole at every value of every parameter.
+"""The shapes of the library's programs, recorded in `tests/data/programs`: declarations, each part of the base shape
+and of three random shapes, and the whole at every value of every parameter.
 
-`python -m tests.stages.programs.truth` writes it anew, where a change of shapes is meant.
+`python -m tests.stages.programs.truth` records them again after an intended change of shapes.
 """
 
 from __future__ import annotations
@@ -23,56 +23,63 @@ from stages.programs.schema import Values
 FOLDER = Path(__file__).resolve().parents[2] / "data" / "programs"
 
 SEEDS = (1, 10, 13)
-"""With these and the base there is no parameter without effect; a test holds it."""
+"""With these and the base, every parameter takes effect; a test checks it."""
 
-ASIDE = (0.1, 0.2, 0.3)
-"""A point that no symmetry of a shape leaves where it is, near enough to feel small changes."""
+REFERENCE_POINT = (0.1, 0.2, 0.3)
+"""On no plane or axis of symmetry, and near enough that small changes show."""
 
 
 def declared(program: Program) -> dict[str, Any]:
-    """What a program says of itself: of each parameter its group, when it is visible, its base and its values."""
+    """The declaration of a program: of each parameter its group, condition of visibility, base and values."""
     return {
         "labels": list(program.labels),
-        "constraints": {each.name: each.condition.text for each in program.constraints},
-        "apart": [list(pair) for pair in program.apart],
-        "elevation": program.view_elevation,
+        "constraints": {constraint.name: constraint.condition.text for constraint in program.constraints},
+        "non_intersecting": [list(pair) for pair in program.non_intersecting],
+        "view_elevation": program.view_elevation,
         "parameters": {
-            each.name: [each.group, each.visible_if.text if each.visible_if else "", each.base, *each.values]
-            for each in program.parameters
+            parameter.name: [
+                parameter.group,
+                parameter.visible_if.text if parameter.visible_if else "",
+                parameter.base,
+                *parameter.values,
+            ]
+            for parameter in program.parameters
         },
     }
 
 
 def measured(parts: Sequence[Part]) -> list[list[Any]]:
-    """Of each part its label, colour, volume, lowest and highest corner."""
+    """Label, colour, volume, lowest and highest corner of each part."""
     return [[part.label, *part.color, part.mesh.volume, *part.mesh.bounds.ravel().tolist()] for part in parts]
 
 
-def swept(program: Program, values: Values, name: str) -> list[list[float]]:
-    """At each value of the parameter `name`, the others as near to `values` as constraints let them: the volume of the
-    whole and the mean distance of its vertices from a point aside; nothing where no others would do."""
-    found = []
+def by_value(program: Program, values: Values, name: str) -> list[list[float]]:
+    """Volume and mean distance of the vertices from a point, at each value of the parameter `name`.
+
+    The other parameters are as near to `values` as constraints admit; empty where there are none.
+    """
+    rows = []
     for value in program.schema.by_name[name].values:
         changed = repair(program, {**values, name: value}, {name})
         meshes = [part.mesh for part in program.parts(changed)] if changed is not None else []
-        away = [np.linalg.norm(mesh.vertices - ASIDE, axis=1) for mesh in meshes]
-        found.append([sum(mesh.volume for mesh in meshes), float(np.concatenate(away).mean())] if meshes else [])
-    return found
+        distances = [np.linalg.norm(mesh.vertices - REFERENCE_POINT, axis=1) for mesh in meshes]
+        rows.append([sum(mesh.volume for mesh in meshes), float(np.concatenate(distances).mean())] if meshes else [])
+    return rows
 
 
 def described(program: Program) -> dict[str, Any]:
-    """What stands in the program's file."""
+    """The content of the program's file."""
     schema = program.schema
-    drawn = [Sampler(program, Share(), off_grid=True).find(None, np.random.default_rng(seed)) for seed in SEEDS]
+    random = [Sampler(program, Share(), off_grid=True).find(None, np.random.default_rng(seed)) for seed in SEEDS]
     return {
         "declared": declared(program),
         "shapes": [
             {
                 "values": schema.to_text(values),
                 "parts": measured(program.parts(values)),
-                "swept": {name: swept(program, values, name) for name in schema.by_name},
+                "by_value": {name: by_value(program, values, name) for name in schema.by_name},
             }
-            for values in [schema.canonical(schema.base)[0], *drawn]
+            for values in [schema.canonical(schema.base)[0], *random]
         ],
     }
 
@@ -80,13 +87,15 @@ def described(program: Program) -> dict[str, Any]:
 def lines(value: Any, depth: int = 4) -> str:
     """JSON with a line for each entry down to `depth`, and eight significant digits."""
     if depth and isinstance(value, dict):
-        return "{\n" + ",\n".join(f"{json.dumps(key)}: {lines(each, depth - 1)}" for key, each in value.items()) + "\n}"
+        return (
+            "{\n" + ",\n".join(f"{json.dumps(key)}: {lines(entry, depth - 1)}" for key, entry in value.items()) + "\n}"
+        )
     if depth and isinstance(value, list):
-        return "[\n" + ",\n".join(lines(each, depth - 1) for each in value) + "\n]"
+        return "[\n" + ",\n".join(lines(entry, depth - 1) for entry in value) + "\n]"
     return json.dumps(json.loads(json.dumps(value), parse_float=lambda text: float(f"{float(text):.8g}") + 0.0))
 
 
 if __name__ == "__main__":
     FOLDER.mkdir(parents=True, exist_ok=True)
-    for each in program_names():
-        (FOLDER / f"{each}.json").write_text(lines(described(find_program(each))) + "\n")
+    for program_name in program_names():
+        (FOLDER / f"{program_name}.json").write_text(lines(described(find_program(program_name))) + "\n")

@@ -17,7 +17,6 @@ from stages.points.area_sampling import sample_surface
 from stages.programs.curves.part import joined
 from stages.programs.program import find_program
 from stages.programs.schema import Values
-from stages.recovery.__main__ import main
 from stages.recovery.cloud_target import cloud_target
 from stages.recovery.inputs import InputError, RecoveryInput
 from stages.recovery.reading import read_inputs
@@ -34,6 +33,7 @@ from stages.training.recovery.ship import slim_bytes
 from stages.training.recovery.surface import shape_points
 from stages.training.recovery.trained import PRETRAINED_FOLDER, find_models, load_recovery
 from stages.training.recovery.training import new_network, parameter_descriptions
+from tests.command import shapemill
 from tests.stages.training.recovery.toy import PROGRAM, SMALL, config, train
 
 STOOL = find_program(PROGRAM)
@@ -138,7 +138,7 @@ def test_program_is_found_by_fit() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["points", "sketch"])
-def test_command_uses_the_trained_model(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_uses_the_trained_model(kind: str, tmp_path: Path) -> None:
     train(config(input=kind, rounds=1), tmp_path)
     models, wrong = find_models(tmp_path)
     assert list(models) == [(PROGRAM, kind)]
@@ -154,7 +154,8 @@ def test_command_uses_the_trained_model(kind: str, tmp_path: Path, capsys: pytes
         ink = draw_fitted(STOOL, tuple(STOOL.parts(TALL)), model.sketches.views[0], model.sketches, rng)
         given = tmp_path / "mine.png"
         Image.fromarray(np.where(ink, 0, 255).astype(np.uint8)).save(given)
-    assert main([str(given), "--program", PROGRAM, "--out", str(tmp_path), "--budget", "40"]) == 0
+    code, printed = shapemill("recover", given, "--program", PROGRAM, "--out", tmp_path, "--budget", 40)
+    assert code == 0, printed
     said = json.loads((tmp_path / "recovered/mine.json").read_text())
     assert set(said["confidence"]) == set(said["parameters"])
     assert all(0.0 <= each <= 1.0 for each in said["confidence"].values())
@@ -162,7 +163,7 @@ def test_command_uses_the_trained_model(kind: str, tmp_path: Path, capsys: pytes
     assert said["chamfer"] < said["chamfer_of_base"]
     assert trimesh.load_scene(tmp_path / "recovered/mine.glb").geometry
     assert (tmp_path / "recovered/mine.png").read_bytes().startswith(b"\x89PNG")
-    assert "distance" in capsys.readouterr().out
+    assert "distance" in printed
 
 
 def test_models_that_cannot_be_used_are_told_and_stop_nothing(tmp_path: Path) -> None:
@@ -276,14 +277,16 @@ def test_models_that_ship_see_more_than_the_base_shape(program: str, kind: str) 
     assert nearer < 0.5 * base
 
 
-def test_command_says_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([str(tmp_path / "none.ply"), "--out", str(tmp_path)]) == 2
-    assert "there is no file" in capsys.readouterr().err
-    assert main([str(tmp_path), "--program", "chari", "--out", str(tmp_path)]) == 2
-    assert "did you mean chair" in capsys.readouterr().err
+def test_command_reports_mistakes_and_refused_inputs(tmp_path: Path) -> None:
     np.save(tmp_path / "one.npy", np.zeros((1, 3)))
-    assert main([str(tmp_path), "--program", PROGRAM, "--out", str(tmp_path)]) == 1
-    assert "has 1 point" in capsys.readouterr().err
+    for arguments, code, message in (
+        ([tmp_path / "none.ply"], 2, "there is no file"),
+        ([tmp_path, "--program", "chari"], 2, "did you mean chair"),
+        ([tmp_path, "--program", PROGRAM], 1, "has 1 point"),
+    ):
+        exit_code, printed = shapemill("recover", *arguments, "--out", tmp_path)
+        assert exit_code == code
+        assert message in printed
 
 
 def test_what_readers_cannot_read_keeps_no_other_file_back(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The command line: what it writes, and what it says of mistakes."""
+"""`shapemill programs`: the files it writes, and its messages for mistakes."""
 
 from __future__ import annotations
 
@@ -10,32 +10,37 @@ import pytest
 import trimesh
 from PIL import Image
 
-from stages.programs.__main__ import main
 from stages.programs.program import build_shape
 from stages.programs.sheets import CELL_SIDE_PIXELS, values_showing
 from stages.recovery.result import RecoveryResult
 from stages.shape.views.portrait import PAPER
+from tests.command import shapemill
 from tests.stages.programs.stool import PROGRAM
 
 BLOCK, STOOL = "tests.stages.programs.block", "tests.stages.programs.stool"
 
 
-def written(folder: Path) -> set[str]:
-    return {path.name for path in folder.iterdir()}
+def programs(*arguments: object) -> str:
+    """What `shapemill programs` prints with these arguments; it must succeed."""
+    code, printed = shapemill("programs", *arguments)
+    assert code == 0, printed
+    return printed
 
 
-def test_a_mix_is_written_with_its_sources_and_a_sheet(tmp_path: Path) -> None:
-    assert main(["mix", STOOL, "1", "base", "--group", "rail", "--out", str(tmp_path)]) == 0
+def test_mix_writes_the_mixed_shape_its_sources_and_a_sheet(tmp_path: Path) -> None:
+    programs("mix", STOOL, "1", "base", "--group", "rail", "--out", tmp_path)
     names = ("target", "source", "mixed")
-    assert written(tmp_path) == {f"{name}.{kind}" for name in names for kind in ("glb", "json")} | {"sheet.png"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        f"{name}.{kind}" for name in names for kind in ("glb", "json")
+    } | {"sheet.png"}
     target, source, mixed = (PROGRAM.schema.from_text((tmp_path / f"{name}.json").read_text()) for name in names)
     assert source == PROGRAM.schema.base
     assert mixed["rail_height"] == source["rail_height"]
     assert mixed["scale x"] == target["scale x"]
 
 
-def test_a_glb_has_the_parts_of_the_shape_by_name_in_their_places(tmp_path: Path) -> None:
-    assert main(["make", STOOL, "base", "--out", str(tmp_path)]) == 0
+def test_glb_has_named_parts_at_their_poses(tmp_path: Path) -> None:
+    programs("make", STOOL, "base", "--out", tmp_path)
     scene = trimesh.load_scene(tmp_path / "base.glb")
     shape = build_shape(PROGRAM, PROGRAM.schema.base)
     assert set(scene.graph.nodes_geometry) == {"seat.000", "leg.000", "leg.001", "rail.000"}
@@ -47,48 +52,45 @@ def test_a_glb_has_the_parts_of_the_shape_by_name_in_their_places(tmp_path: Path
         assert len(scene.geometry[name].faces) == len(mesh.faces)
 
 
-def test_steps_lead_from_one_shape_to_the_other(tmp_path: Path) -> None:
+def test_interpolation_writes_even_steps(tmp_path: Path) -> None:
     ends = [tmp_path / "a.json", tmp_path / "b.json"]
     for path, height in zip(ends, (0.4, 0.8), strict=True):
         path.write_text(PROGRAM.schema.to_text({**PROGRAM.schema.base, "height": height}))
     out = tmp_path / "steps"
-    assert main(["interpolate", STOOL, *map(str, ends), "--steps", "3", "--out", str(out)]) == 0
+    programs("interpolate", STOOL, *ends, "--steps", "3", "--out", out)
     heights = [json.loads((out / f"step-{number:02d}.json").read_text())["height"] for number in range(3)]
     assert heights == pytest.approx([0.4, 0.6, 0.8])
 
 
-def test_what_recovery_has_written_is_edited_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_files_of_recovery_can_be_edited(tmp_path: Path) -> None:
     low, high = ({**PROGRAM.schema.base, "height": height} for height in (0.4, 0.8))
     for name, values in (("low", low), ("high", high)):
-        found = RecoveryResult(PROGRAM, values, 0.001, 0.1, 0.0, None, None, None, "y", 1, ())
-        (tmp_path / f"{name}.json").write_text(json.dumps({"input": name, **found.as_json()}))
+        result = RecoveryResult(PROGRAM, values, 0.001, 0.1, 0.0, None, None, None, "y", 1, ())
+        (tmp_path / f"{name}.json").write_text(json.dumps({"input": name, **result.as_json()}))
     ends = [str(tmp_path / f"{name}.json") for name in ("low", "high")]
-    assert main(["interpolate", STOOL, *ends, "--steps", "3", "--group", "seat", "--out", str(tmp_path / "way")]) == 0
-    assert PROGRAM.schema.from_text((tmp_path / "way/step-01.json").read_text())["height"] == pytest.approx(0.6)
-    assert main(["mix", STOOL, *ends, "--group", "seat", "--out", str(tmp_path / "mix")]) == 0
+    programs("interpolate", STOOL, *ends, "--steps", "3", "--group", "seat", "--out", tmp_path / "steps")
+    assert PROGRAM.schema.from_text((tmp_path / "steps/step-01.json").read_text())["height"] == pytest.approx(0.6)
+    programs("mix", STOOL, *ends, "--group", "seat", "--out", tmp_path / "mix")
     assert PROGRAM.schema.from_text((tmp_path / "mix/mixed.json").read_text())["height"] == 0.8
-    capsys.readouterr()
-    assert main(["make", "chair", ends[0], "--out", str(tmp_path)]) == 2
-    assert "low.json: these are parameters of 'stool', not of chair" in capsys.readouterr().err
+    code, printed = shapemill("programs", "make", "chair", ends[0], "--out", tmp_path)
+    assert code == 2
+    assert "low.json: these are parameters of 'stool', not of chair" in printed
 
 
-def test_inspect_prints_the_table_and_draws_a_row_a_parameter(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["inspect", BLOCK, "--out", str(tmp_path)]) == 0
-    printed = capsys.readouterr().out
+def test_inspect_prints_the_table_and_draws_a_row_per_parameter(tmp_path: Path) -> None:
+    printed = programs("inspect", BLOCK, "--out", tmp_path)
     assert "| `height` | continuous | 1 to 2 (3 values) |" in printed
     sheet = np.asarray(Image.open(tmp_path / "block.png")).astype(int)
-    # The third and last picture of the second row: the highest block fills the frame, and nothing stands beside it.
+    # The third and last picture of the second row: the highest block fills the frame, with nothing to its right.
     assert sheet.shape[1] > 3 * CELL_SIDE_PIXELS
     inked = np.abs(sheet - PAPER).sum(axis=2) > 150
     assert inked[-CELL_SIDE_PIXELS:, 2 * CELL_SIDE_PIXELS : 3 * CELL_SIDE_PIXELS].any()
     assert not inked[-CELL_SIDE_PIXELS:, 3 * CELL_SIDE_PIXELS + 100 :].any()
 
 
-def test_random_shapes_of_one_seed_are_the_same_sheet(tmp_path: Path) -> None:
+def test_sheets_of_one_seed_are_equal(tmp_path: Path) -> None:
     for name in ("a.png", "b.png"):
-        assert main(["sheet", BLOCK, "--count", "2", "--seed", "4", "--picture", str(tmp_path / name)]) == 0
+        programs("sheet", BLOCK, "--count", "2", "--seed", "4", "--picture", tmp_path / name)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
@@ -102,18 +104,17 @@ def test_random_shapes_of_one_seed_are_the_same_sheet(tmp_path: Path) -> None:
         (["mix", STOOL, "base", "base", "--group", "legs"], "there is no group 'legs'; groups are seat, rail"),
     ],
 )
-def test_mistakes_are_named_with_the_mend(
-    arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_mistakes_are_reported_with_a_remedy(arguments: list[str], message: str, tmp_path: Path) -> None:
     (tmp_path / "high.json").write_text('{"height": 9}')
     hung = '{"height": 0.3, "scale x": 0.5, "has_rail": true, "rail_height": 0.6}'
     (tmp_path / "hung.json").write_text(hung)
-    asked = [each.replace("{folder}", str(tmp_path)) for each in arguments]
-    assert main([*asked, "--out", str(tmp_path / "out")]) == 2
-    assert message in capsys.readouterr().err
+    given = [argument.replace("{folder}", str(tmp_path)) for argument in arguments]
+    code, printed = shapemill("programs", *given, "--out", tmp_path / "out")
+    assert code == 2
+    assert message in printed
     assert not (tmp_path / "out").exists()
 
 
-def test_a_hidden_parameter_is_revealed_by_the_fewest_changes() -> None:
+def test_hidden_parameter_is_shown_by_the_fewest_changes() -> None:
     assert values_showing(PROGRAM, PROGRAM.parameters[0]) == PROGRAM.schema.base
     assert values_showing(PROGRAM, PROGRAM.parameters[3]) == PROGRAM.schema.base
