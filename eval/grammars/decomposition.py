@@ -16,8 +16,7 @@ from eval.engine.table import Cell, Table
 from pipeline.errors import ConfigError
 from stages.exemplars.build import observe_models
 from stages.exemplars.read import read_model
-from stages.exemplars.segmentation import Segmentation
-from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
+from stages.exemplars.settings import STRICTEST, KitConfig, Segmentation, ShapeFile
 from stages.points.area_sampling import SurfacePoints, sample_shape
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.pose import transform_points

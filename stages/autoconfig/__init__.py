@@ -1,1 +1,1 @@
-"""What a config leaves open, decided: up axis, contacts, grammar and hubs, by geometry and a short search."""
+"""Settings that a config leaves at `auto`, resolved from geometry and short trial searches."""

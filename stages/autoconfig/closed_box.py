@@ -1,4 +1,4 @@
-"""Is a shape a closed box? Then its other proportions are closed boxes, too, and all that one sees of them is alike."""
+"""Test whether a shape is a closed box: resizing it only yields more closed boxes, which look alike."""
 
 from __future__ import annotations
 
@@ -12,22 +12,21 @@ from stages.shape.views.camera import Camera
 from stages.shape.views.scene import mesh_scene
 
 SIDES = ((0, 0), (90, 0), (180, 0), (270, 0), (0, 90), (0, -90))
-"""Azimuth and elevation, in degrees, from which each side of a box is seen."""
-PIXELS = 64
-DEPTH = 0.02
-"""What lies no deeper than this, as a share of the box, is of its side."""
-PLAIN = 0.85
-"""A side is plain if it has nothing else in so much of its picture."""
+"""Azimuth and elevation, in degrees, of the views onto each side of a box."""
+IMAGE_PIXELS = 64
+MAX_SIDE_DEPTH = 0.02
+"""Depth up to which a surface belongs to a side of the box, as a share of the box."""
+MIN_SIDE_SHARE = 0.85
+"""Share of the picture of a side that its own surface fills, from which the side is closed."""
 
 
 def is_closed_box(shape: Shape) -> bool:
-    """Whether all sides of a shape but one, at least, are plain: a cabinet is one, with all its drawers and doors in
-    front; a shelf is open on one side or two, with boards to be seen behind."""
-    return bool(np.sort(side_shares(shape))[1] >= PLAIN)
+    """Return whether at least five sides of the box around a shape are closed, as those of a cabinet are."""
+    return bool(np.sort(side_shares(shape))[1] >= MIN_SIDE_SHARE)
 
 
 def side_shares(shape: Shape) -> FloatArray:
-    """For each of SIDES, float64 (6,), how much of the side of the box around a shape is its own surface."""
+    """Return the share of each side of the box around a shape that its own surface fills, float64 (6,), by SIDES."""
     placed = zip(shape.assembly.types.tolist(), shape.placements, strict=True)
     parts = [(transform_points(pose, shape.meshes[kind].vertices), shape.meshes[kind].faces) for kind, pose in placed]
     shifts = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
@@ -38,10 +37,10 @@ def side_shares(shape: Shape) -> FloatArray:
     shares = []
     for azimuth, elevation in SIDES:
         camera = Camera(azimuth, elevation, "orthographic", margin=0.0)
-        seen = visible_triangles(scene, camera, (PIXELS, PIXELS), "raster")
-        axis = int(np.abs(seen.view.eye[2, :3]).argmax())
-        places = cube[faces][:, :, axis]
-        depths = (1.0 - places if seen.view.eye[2, axis] > 0 else places).max(axis=1)
-        shown = seen.triangles[seen.triangles >= 0]
-        shares.append(float((depths[shown] <= DEPTH).sum()) / seen.triangles.size)
+        visible = visible_triangles(scene, camera, (IMAGE_PIXELS, IMAGE_PIXELS), "raster")
+        axis = int(np.abs(visible.view.eye[2, :3]).argmax())
+        coordinates = cube[faces][:, :, axis]
+        depths = (1.0 - coordinates if visible.view.eye[2, axis] > 0 else coordinates).max(axis=1)
+        shown = visible.triangles[visible.triangles >= 0]
+        shares.append(float((depths[shown] <= MAX_SIDE_DEPTH).sum()) / visible.triangles.size)
     return np.array(shares)

@@ -1,4 +1,4 @@
-"""The geometry of some models, seen once: parts, contacts and dockings at one tolerance, for every setting to come."""
+"""Contact analysis: parts, contacts and dockings of some models at one tolerance, computed once for every setting."""
 
 from __future__ import annotations
 
@@ -23,52 +23,69 @@ from stages.exemplars.observed_grammar import (
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Assembly, ContactKind, Docking, Exemplar, Grammar, Kit, Strictness, labels_of
 
-MORE_CONTACTS = 1.1
-"""A tolerance is good if the next looser one finds at most so many times the contacts."""
-AS_LARGE = 0.98
-"""A piece of this share of the largest to be had is as good."""
+MAX_CONTACT_GROWTH = 1.1
+"""A tolerance is accepted if the next looser one finds at most this multiple of its contacts."""
+MIN_LARGEST_SHARE = 0.98
+"""Share of the largest possible piece from which a tolerance joins enough."""
 ALL_KINDS: tuple[ContactKind, ...] = ("point", "line", "face")
 
 
-def resolve_contact_tolerance(identified: IdentifiedParts, strictest: float) -> tuple[float, str]:
-    """The tolerance to type, as a share of the median part's diagonal, and the reason.
+@dataclass(frozen=True)
+class _Joined:
+    """What a tolerance joins: its factor, the number of contacts, and the parts in the largest piece of each model."""
 
-    `strictest` where it makes one piece of every exemplar; else the least of some multiples that does and of which the
-    next finds few contacts more; else the least that does; else the least whose pieces are as large as can be had.
+    factor: float
+    contacts: int
+    largest: int
+
+
+def resolve_contact_tolerance(identified: IdentifiedParts, strictest: float) -> tuple[float, str]:
+    """Return the contact tolerance, as a share of the median part's diagonal, and the reason.
+
+    `strictest` is taken if it makes one piece of every exemplar. Otherwise multiples of it are tried, in this order of
+    preference: the smallest that makes one piece and whose next multiple finds few more contacts; the smallest that
+    makes one piece; the smallest whose pieces are as large as possible.
     """
-    found: list[tuple[float, int, int, bool]] = []
-    total = sum(len(each) for each in identified.assemblies)
+    tried: list[_Joined] = []
+    total = sum(len(assembly) for assembly in identified.assemblies)
     for factor in (1.0, *TOLERANCE_FACTORS):
         test = ContactTest(identified.types, factor * strictest * identified.median_diagonal)
-        joined = [replace(each, edges=test.contacts(each.types, each.poses)) for each in identified.assemblies]
-        largest = sum(int((connected_pieces(each) == 0).sum()) for each in joined)
-        count = sum(len(each.edges) for each in joined)
+        joined = [
+            replace(assembly, edges=test.contacts(assembly.types, assembly.poses)) for assembly in identified.assemblies
+        ]
+        largest = sum(int((connected_pieces(assembly) == 0).sum()) for assembly in joined)
+        tried.append(_Joined(factor, sum(len(assembly.edges) for assembly in joined), largest))
         if largest == total and factor == 1.0:
             return strictest, "every exemplar is in one piece"
-        found.append((factor, count, largest, largest == total))
-        whole = [each for each in found if each[3]]
-        if len(whole) > 1 and count <= MORE_CONTACTS * whole[-2][1]:
-            return _typed(whole[-2][0] * strictest), f"{_one_piece(whole[-2][0])}; the next looser one finds no more"
-    whole = [each for each in found if each[3]]
+        whole = [result for result in tried if result.largest == total]
+        if len(whole) > 1 and tried[-1].contacts <= MAX_CONTACT_GROWTH * whole[-2].contacts:
+            factor = whole[-2].factor
+            return _rounded(factor * strictest), f"{_one_piece(factor)}; the next looser one finds no more"
     if whole:
-        return _typed(whole[0][0] * strictest), _one_piece(whole[0][0])
-    best = max(largest for _, _, largest, _ in found)
-    factor, _, largest, _ = next(each for each in found if each[2] >= AS_LARGE * best)
-    return _typed(factor * strictest), f"no tolerance makes one piece; this joins {largest} of {total} parts"
+        return _rounded(whole[0].factor * strictest), _one_piece(whole[0].factor)
+    best = max(result.largest for result in tried)
+    enough = next(result for result in tried if result.largest >= MIN_LARGEST_SHARE * best)
+    reason = f"no tolerance makes one piece; this joins {enough.largest} of {total} parts"
+    return _rounded(enough.factor * strictest), reason
 
 
 def _one_piece(factor: float) -> str:
     return f"in pieces with less than {factor:g} times the default, in one piece with it"
 
 
-def _typed(tolerance: float) -> float:
-    """A number as a person would type it."""
+def _rounded(tolerance: float) -> float:
+    """Round a tolerance to the six digits that a person would type."""
     return float(f"{tolerance:.6g}")
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What of the geometry counts. hubs: indices of the types that are left out, ascending."""
+    """A candidate for the shape graphs and the grammar of a kit.
+
+    kinds: the kinds of contact that count.
+    grammar: the strictness.
+    hubs: indices of the types that are left out, ascending.
+    """
 
     kinds: tuple[ContactKind, ...]
     grammar: Strictness
@@ -86,16 +103,20 @@ class ContactAnalysis:
         up: Literal["y", "z"],
         fit_tolerance: float | None = None,
     ) -> None:
-        """Tolerances are shares of the median part's diagonal; `fit_tolerance`: of parts of one meaning, else None."""
+        """Find the contacts of `identified` parts.
+
+        tolerance, pose_tolerance: shares of the median part's diagonal.
+        fit_tolerance: the same for parts of one meaning; None if types do not go by meaning.
+        """
         self.types = identified.types
         self.up = up
         self.pose_tolerance = pose_tolerance * identified.median_diagonal
         self._fit_tolerance = None if fit_tolerance is None else fit_tolerance * identified.median_diagonal
         self._dockings_by_meaning: dict[tuple[ContactKind, ...], tuple[Docking, ...]] = {}
-        self._names = identified.part_names
         self._contact = ContactTest(self.types, tolerance * identified.median_diagonal)
         self._touching = [
-            replace(each, edges=self._contact.contacts(each.types, each.poses)) for each in identified.assemblies
+            replace(assembly, edges=self._contact.contacts(assembly.types, assembly.poses))
+            for assembly in identified.assemblies
         ]
 
     @cached_property
@@ -109,18 +130,18 @@ class ContactAnalysis:
 
     @cached_property
     def kinds(self) -> tuple[ContactKind, ...]:
-        """The kinds of contact that there are."""
-        found = {kind for kinds in self.contacts.kinds for kind in kinds}
-        return tuple(kind for kind in ALL_KINDS if kind in found)
+        """The kinds of contact that occur."""
+        observed = {kind for kinds in self.contacts.kinds for kind in kinds}
+        return tuple(kind for kind in ALL_KINDS if kind in observed)
 
     @property
-    def parts(self) -> int:
+    def part_count(self) -> int:
         """Number of parts of all models."""
-        return sum(len(each) for each in self._touching)
+        return sum(len(assembly) for assembly in self._touching)
 
-    def widest(self, hubs: Sequence[int]) -> int | None:
-        """The type of the part that touches most others when those of the types `hubs` are gone; None where parts of
-        one type alone are left."""
+    def most_connected_type(self, hubs: Sequence[int]) -> int | None:
+        """Return the type of the part with most contacts once the types `hubs` are removed; None if one type is
+        left."""
         degrees = np.zeros(len(self.types), dtype=np.int64)
         for assembly in self._touching:
             bare = assembly.select(np.flatnonzero(~np.isin(assembly.types, hubs)))
@@ -128,46 +149,50 @@ class ContactAnalysis:
         return int(degrees.argmax()) if (degrees > 0).sum() > 1 else None
 
     def counted(self, setting: Setting) -> list[Assembly]:
-        """The assemblies with the contacts that count under a setting, hubs among them."""
-        found = []
+        """Return the assemblies with the contacts that count under a setting, hubs included."""
+        assemblies = []
         for assembly, kinds in zip(self._touching, self.contacts.kinds, strict=True):
-            chosen = np.array([kind in setting.kinds for kind in kinds], dtype=bool)
-            found.append(replace(assembly, edges=assembly.edges[chosen]))
-        return found
+            counts = np.array([kind in setting.kinds for kind in kinds], dtype=bool)
+            assemblies.append(replace(assembly, edges=assembly.edges[counts]))
+        return assemblies
 
-    def staying(self, setting: Setting) -> list[np.ndarray]:
-        """The parts of each assembly that a setting leaves in its shape graph: those of the largest piece without hubs,
-        int (k,), ascending."""
-        found = []
+    def kept_parts(self, setting: Setting) -> list[np.ndarray]:
+        """Return the parts that a setting keeps of each assembly: the largest piece without hubs, int (k,),
+        ascending."""
+        kept = []
         for assembly in self.counted(setting):
             bare = np.flatnonzero(~np.isin(assembly.types, setting.hubs))
-            found.append(bare[connected_pieces(assembly.select(bare)) == 0] if len(bare) else bare)
-        return found
+            kept.append(bare[connected_pieces(assembly.select(bare)) == 0] if len(bare) else bare)
+        return kept
 
     def kit(self, setting: Setting) -> Kit:
-        """The kit under a setting: like the one that a run builds, but for types that it lets go of and depths of
-        dockings. Raises ValueError where nothing stays of a model."""
-        counted, staying = self.counted(setting), self.staying(setting)
-        if not all(map(len, staying)):
-            raise ValueError("nothing stays of a model")
-        seen = [with_touching_types(each, keep, setting.hubs) for each, keep in zip(counted, staying, strict=True)]
-        everything = [each.select(parts) for each, parts in zip(counted, seen, strict=True)]
-        dockings = self._dockings(setting)
+        """Return the kit under a setting, with every type and without depths of dockings.
+
+        A run would build the same kit without unused types and with depths. Raises ValueError if no part of a model is
+        kept.
+        """
+        counted, kept = self.counted(setting), self.kept_parts(setting)
+        if not all(map(len, kept)):
+            raise ValueError("no part of a model is kept")
+        visible = [
+            with_touching_types(assembly, parts, setting.hubs) for assembly, parts in zip(counted, kept, strict=True)
+        ]
+        everything = [assembly.select(parts) for assembly, parts in zip(counted, visible, strict=True)]
         labels = labels_of(self.types)[1]
-        labelled = [replace(each, types=labels[each.types]) for each in everything]
-        grammar = Grammar(observe_neighbourhoods(labelled), dockings, self._nested, setting.grammar)
-        edges = [each.edges for each in everything]
-        face: ContactKind = "face"  # no kinds are asked for
-        kinds = [(face,) * len(each) for each in edges]
-        bare, backdrops, rules, _ = remove_hubs(self._used(setting, everything), everything, grammar, kinds, edges)
+        labelled = [replace(assembly, types=labels[assembly.types]) for assembly in everything]
+        grammar = Grammar(observe_neighbourhoods(labelled), self._dockings(setting), self._nested, setting.grammar)
+        edges = [assembly.edges for assembly in everything]
+        face: ContactKind = "face"  # the kinds are not read
+        kinds = [(face,) * len(assembly) for assembly in edges]
+        bare, hub_parts, grammar, _ = remove_hubs(self._used(setting, everything), everything, grammar, kinds, edges)
         return Kit(
             name="seen",
             types=self.types,
             exemplars=tuple(
-                Exemplar(f"exemplar-{number}", each, tuple(f"part-{part}" for part in range(len(each))), behind)
-                for number, (each, behind) in enumerate(zip(bare, backdrops, strict=True))
+                Exemplar(f"exemplar-{number}", assembly, tuple(f"part-{part}" for part in range(len(assembly))), hubs)
+                for number, (assembly, hubs) in enumerate(zip(bare, hub_parts, strict=True))
             ),
-            grammar=rules,
+            grammar=grammar,
             contact_tolerance=self._contact.tolerance,
             pose_tolerance=self.pose_tolerance,
             contact_kinds=setting.kinds,
@@ -175,18 +200,18 @@ class ContactAnalysis:
         )
 
     def _dockings(self, setting: Setting) -> tuple[Docking, ...]:
-        """Those seen, and by meaning those that follow from them."""
-        seen = tuple(each for each in self.contacts.dockings if each.kind in setting.kinds)
+        """Return the observed dockings, and by meaning those inferred from them."""
+        observed = tuple(docking for docking in self.contacts.dockings if docking.kind in setting.kinds)
         if self._fit_tolerance is None:
-            return seen
+            return observed
         if setting.kinds not in self._dockings_by_meaning:
-            assemblies, deep = self.counted(setting), measure_depths(self.types, seen)
+            assemblies, deep = self.counted(setting), measure_depths(self.types, observed)
             tolerances = (self._fit_tolerance, self.pose_tolerance)
-            fits = infer_dockings(self.types, assemblies, deep, self._contact, *tolerances)
-            self._dockings_by_meaning[setting.kinds] = (*deep, *fits)
+            inferred = infer_dockings(self.types, assemblies, deep, self._contact, *tolerances)
+            self._dockings_by_meaning[setting.kinds] = (*deep, *inferred)
         return self._dockings_by_meaning[setting.kinds]
 
     def _used(self, setting: Setting, assemblies: Sequence[Assembly]) -> list[int]:
-        """The hubs of a setting that touch something which stays."""
-        there = {int(index) for each in assemblies for index in each.types}
-        return [index for index in setting.hubs if index in there]
+        """Return the hub types of a setting that occur in `assemblies`."""
+        used = {int(index) for assembly in assemblies for index in assembly.types}
+        return [index for index in setting.hubs if index in used]

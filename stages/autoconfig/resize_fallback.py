@@ -1,4 +1,4 @@
-"""Where a search of layouts gives too little: can the models be made in other proportions?"""
+"""Resize fallback: where a search finds too few layouts, can the exemplars be resized instead?"""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from pipeline.randomness import decision_rng
 from stages.autoconfig.closed_box import is_closed_box
 from stages.autoconfig.resolve import REQUIREMENT_KEYS, Resolution
 from stages.autoconfig.resolved_kit import ResolvedKit
-from stages.autoconfig.yield_estimate import LOOK_FIRST, YieldEstimate, rounded_text
+from stages.autoconfig.yield_estimate import LOOK_FIRST, MAX_SAMPLES_REQUESTED, YieldEstimate, rounded_text
 from stages.exemplars.build import Observation
-from stages.inspection.config_text import MAX_SAMPLES_REQUESTED
 from stages.proportions.distinct_warps import DistinctWarps
 from stages.proportions.settings import ProportionsConfig
 from stages.proportions.stage import CANDIDATES_PER_SAMPLE
@@ -23,111 +22,115 @@ from stages.shape.physics.settings import Requirements
 from stages.shape.resolved_settings import FALLBACK_KEY, FALLBACK_STABLE_KEY
 from stages.shape.shape import Shape, kit_shape
 
-TRIES = 36
-"""Draws of a probe, of all exemplars together."""
-LEAST = 0.2
-"""Share of them that must hold together; with less a run ends before it has what it wants."""
+TRIAL_DRAWS = 36
+"""Draws of a trial, of all exemplars together."""
+MIN_SUCCESS_RATE = 0.2
+"""Share of the draws that must hold together; with less a run ends before it has the samples requested."""
 
 
 @dataclass(frozen=True)
 class ResizeEstimate:
-    """What other proportions of a kit's exemplars promise.
+    """What resizing a kit's exemplars promises.
 
-    holds: share of the draws that hold together; different: how many that differ a dataset finds, of MOST at most;
-    shapes: the most different of the draws, at most as many as asked for; stable: whether a dataset should ask that
-    shapes stand, for all exemplars do; plain: whether all exemplars are closed boxes; enough: whether it is worth one.
+    success_rate: share of the draws that hold together.
+    different: number of different shapes that a dataset finds, at most MAX_SAMPLES_REQUESTED.
+    shapes: the most different of the draws, at most the number asked for.
+    stable: whether a dataset should require stable shapes, since all exemplars are.
+    is_closed_box: whether all exemplars are closed boxes.
     """
 
-    holds: float
+    success_rate: float
     different: int
     shapes: Sequence[Shape]
     stable: bool
-    plain: bool
-
-    @property
-    def enough(self) -> bool:
-        return self.holds >= LEAST
+    is_closed_box: bool
 
     @property
     def sentence(self) -> str:
-        """How many there are, and whether they differ to the eye."""
-        many = "hundreds" if self.different >= MAX_SAMPLES_REQUESTED else f"about {rounded_text(self.different)}"
-        said = f"{many} of the same layout in other proportions"
-        if not self.plain:
-            return said
-        return f"{said} that look alike, for it is a closed box with plain sides, whatever is in it; {LOOK_FIRST}"
+        """How many shapes there are, and whether they differ visibly."""
+        count = "hundreds" if self.different >= MAX_SAMPLES_REQUESTED else f"about {rounded_text(self.different)}"
+        sentence = f"{count} of the same layout in other proportions"
+        if not self.is_closed_box:
+            return sentence
+        return f"{sentence} that look alike, since the exemplar is a closed box with plain sides; {LOOK_FIRST}"
 
 
 @dataclass(frozen=True)
 class ResizeFallback:
-    """What is chosen where exemplars come in other proportions instead of other layouts, and what a run builds then."""
+    """What is resolved where exemplars are resized, and what a run builds then."""
 
-    choices: Resolution
+    resolution: Resolution
     built: Observation
-    proportioned: ResizeEstimate
+    estimate: ResizeEstimate
 
 
-def resize_fallback(reading: ResolvedKit, expected: YieldEstimate, shown: int) -> ResizeFallback | None:
-    """Other proportions with at most `shown` shapes, where `expected` promises next to no other layouts, or all alike,
-    and the exemplars hold together in other proportions."""
-    if reading.choices.enough or not expected.is_poor:
+def resize_fallback(resolved: ResolvedKit, layouts: YieldEstimate, max_shapes: int) -> ResizeFallback | None:
+    """Return the fallback with at most `max_shapes` shapes; None if it is not needed or not possible.
+
+    It is needed if `layouts` promises next to no layouts or only similar ones, and possible if enough resized
+    exemplars hold together.
+    """
+    if resolved.resolution.is_sufficient or not layouts.is_poor:
         return None
-    unvaried = _unvaried(reading)
-    built = reading.observe(unvaried.values)
-    found = estimate_resizing(built.kit, shown) if not built.refusals else None
-    if found is None or not found.enough:
+    unvaried = _unvaried(resolved)
+    built = resolved.observe(unvaried.values)
+    estimate = estimate_resizing(built.kit, max_shapes) if not built.refusals else None
+    if estimate is None or estimate.success_rate < MIN_SUCCESS_RATE:
         return None
-    why = f"{found.holds:.0%} of what is drawn holds together; of other layouts {expected.sentence}"
-    stands = "the exemplars stand" if found.stable else "not even the exemplars stand"
-    values = {**unvaried.values, FALLBACK_KEY: "proportions", FALLBACK_STABLE_KEY: found.stable}
-    reasons = {**unvaried.reasons, FALLBACK_KEY: why, FALLBACK_STABLE_KEY: stands}
-    return ResizeFallback(replace(unvaried, values=values, reasons=reasons), built, found)
+    reason = f"{estimate.success_rate:.0%} of what is drawn holds together; of other layouts {layouts.sentence}"
+    stable_reason = "the exemplars are stable" if estimate.stable else "not even the exemplars are stable"
+    values = {**unvaried.values, FALLBACK_KEY: "proportions", FALLBACK_STABLE_KEY: estimate.stable}
+    reasons = {**unvaried.reasons, FALLBACK_KEY: reason, FALLBACK_STABLE_KEY: stable_reason}
+    return ResizeFallback(replace(unvaried, values=values, reasons=reasons), built, estimate)
 
 
-def _unvaried(reading: ResolvedKit) -> Resolution:
-    """What is chosen where layouts stay as they are: no hub is left out, of what stands apart the largest piece stays,
-    and nothing is required of layouts."""
-    choices = reading.choices
-    others = {
+def _unvaried(resolved: ResolvedKit) -> Resolution:
+    """Return the settings for unchanged layouts: hubs stay, pieces stay if a run accepts them, and nothing is required
+    of layouts."""
+    resolution = resolved.resolution
+    unvaried = {
         "hubs.types": ("none", "all parts stay, only sizes change"),
-        "disconnected": ("error", "nothing stands apart"),
+        "disconnected": ("error", "no part is apart"),
     }
-    open_keys = others.keys() & choices.values.keys()
-    kept = [key for key in choices.values if key not in REQUIREMENT_KEYS]
-    values = {key: others[key][0] if key in open_keys else choices.values[key] for key in kept}
-    reasons = {key: others[key][1] if key in open_keys else choices.reasons[key] for key in kept}
-    if reading.observe(values).refusals:
-        values["disconnected"], reasons["disconnected"] = "largest", "parts stand apart from the largest piece"
-    return replace(choices, values=values, reasons=reasons)
+    pairs = {
+        key: unvaried.get(key, (value, resolution.reasons[key]))
+        for key, value in resolution.values.items()
+        if key not in REQUIREMENT_KEYS
+    }
+    values, reasons = {key: value for key, (value, _) in pairs.items()}, {key: why for key, (_, why) in pairs.items()}
+    if resolved.observe(values).refusals:
+        values["disconnected"], reasons["disconnected"] = "largest", "parts are apart from the largest piece"
+    return replace(resolution, values=values, reasons=reasons)
 
 
-def _different(lattice: Lattice, config: ProportionsConfig, exemplar: int, most: int) -> int:
-    """How many different shapes of an exemplar a run finds that wants `most`, if all of them hold together."""
+def _different(lattice: Lattice, config: ProportionsConfig, exemplar: int, wanted: int) -> int:
+    """Return how many different shapes of an exemplar a run finds that wants `wanted`, if all hold together."""
     rng = decision_rng(0, "choices", "different", exemplar)
     drawn = DistinctWarps(lattice, config.min_difference)
-    for _ in range(config.oversample * CANDIDATES_PER_SAMPLE * most):
+    for _ in range(config.oversample * CANDIDATES_PER_SAMPLE * wanted):
         warp = lattice.draw(rng, config.log_std, config.max_factor)
         if drawn.is_new(warp):
             drawn.add(warp)
-        if len(drawn) == CANDIDATES_PER_SAMPLE * most:
+        if len(drawn) == CANDIDATES_PER_SAMPLE * wanted:
             break
-    return len(drawn.farthest_first(most))
+    return len(drawn.farthest_first(wanted))
 
 
-def estimate_resizing(kit: Kit, shown: int) -> ResizeEstimate:
-    """A probe of the exemplars of a kit, with all of their parts; what is random depends on the kit alone."""
+def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
+    """Draw resized exemplars of a kit, with all of their parts; randomness depends on the kit only."""
     config = ProportionsConfig()
-    stands = Requirements(stable=True)
-    stable = all(unmet_requirement(stands, kit_shape(kit, each.whole)) is None for each in kit.exemplars)
-    require = stands if stable else Requirements()
+    required = Requirements(stable=True)
+    stable = all(unmet_requirement(required, kit_shape(kit, exemplar.whole)) is None for exemplar in kit.exemplars)
+    require = required if stable else Requirements()
+    count = len(kit.exemplars)
     tried = held = different = 0
-    found: list[Shape] = []
+    shapes: list[Shape] = []
     for number, exemplar in enumerate(kit.exemplars):
         lattice = lattice_of(kit, exemplar.whole)
         kept: list[Shape] = []
         drawn = DistinctWarps(lattice, config.min_difference)
-        for place in range(-(-TRIES // len(kit.exemplars))):
-            rng = decision_rng(0, "choices", "proportions", number, place)
+        for draw in range(-(-TRIAL_DRAWS // count)):
+            rng = decision_rng(0, "choices", "proportions", number, draw)
             warp = lattice.draw(rng, config.log_std, config.max_factor)
             shape = warped(kit, exemplar.whole, lattice, warp)
             tried += 1
@@ -135,7 +138,7 @@ def estimate_resizing(kit: Kit, shown: int) -> ResizeEstimate:
                 kept.append(shape)
                 drawn.add(warp)
         held += len(kept)
-        found += [kept[place] for place in drawn.farthest_first(len(range(number, shown, len(kit.exemplars))))]
-        different += _different(lattice, config, number, len(range(number, MAX_SAMPLES_REQUESTED, len(kit.exemplars))))
-    plain = all(is_closed_box(kit_shape(kit, each.whole)) for each in kit.exemplars)
-    return ResizeEstimate(held / max(tried, 1), different, found, stable, plain)
+        shapes += [kept[index] for index in drawn.farthest_first(len(range(number, max_shapes, count)))]
+        different += _different(lattice, config, number, len(range(number, MAX_SAMPLES_REQUESTED, count)))
+    closed = all(is_closed_box(kit_shape(kit, exemplar.whole)) for exemplar in kit.exemplars)
+    return ResizeEstimate(held / max(tried, 1), different, shapes, stable, closed)

@@ -1,4 +1,4 @@
-"""What the keys of a kit that are left at `auto` come to, and why."""
+"""Resolve the keys of a kit that are left at `auto`, each with its reason."""
 
 from __future__ import annotations
 
@@ -38,33 +38,33 @@ from stages.variations.requirements.required_labels import spanning_labels
 
 @dataclass(frozen=True)
 class Resolution:
-    """What was chosen for a kit.
+    """The resolved settings of a kit.
 
-    values: of the keys that the config left open, by OPEN_KEYS and REQUIREMENTS; reasons: a sentence for each; finds:
-    of the probe under what was chosen, None where there was nothing to probe; kept: share of the parts that stay in
-    the shape graphs; enough: whether the probe promises a pool of some size that is not dull; settings: how many were
-    probed.
+    values: by AUTO_KEYS and REQUIREMENT_KEYS, of the keys that the config leaves at `auto`.
+    reasons: a sentence for each value.
+    trial: result of the trial search under the resolved settings; None if there was nothing to search.
+    kept_share: share of the parts that stay in the shape graphs.
+    is_sufficient: whether the trial promises a pool of some size and diversity.
+    settings_tried: number of settings that were tried.
     """
 
     values: Mapping[str, Any]
     reasons: Mapping[str, str]
-    finds: TrialResult | None
-    kept: float
-    enough: bool
-    settings: int
+    trial: TrialResult | None
+    kept_share: float
+    is_sufficient: bool
+    settings_tried: int
 
     def as_json(self) -> dict[str, Any]:
-        """For the record, and for the stage that builds the kit."""
-        probe = None
-        if self.finds is not None:
-            probe = {**self.finds.as_json(), "rejects": dict(self.finds.rejects)}
+        """Return it for the record, and for the stage that builds the kit."""
+        values = {key: list(value) if isinstance(value, tuple) else value for key, value in self.values.items()}
         return {
-            "resolved": {key: list(each) if isinstance(each, tuple) else each for key, each in self.values.items()},
+            "resolved": values,
             "reasons": dict(self.reasons),
-            "probe": probe,
-            "kept": round(self.kept, 4),
-            "enough": self.enough,
-            "settings": self.settings,
+            "trial": None if self.trial is None else {**self.trial.as_json(), "rejects": dict(self.trial.rejects)},
+            "kept_share": round(self.kept_share, 4),
+            "is_sufficient": self.is_sufficient,
+            "settings_tried": self.settings_tried,
         }
 
 
@@ -78,160 +78,154 @@ def resolve_settings(
     tries: int,
     require: Sequence[str] = REQUIREMENT_KEYS,
 ) -> Resolution:
-    """Decide what `config` leaves open for a kit of `models`, whose parts are `identified`; what it states is obeyed.
+    """Resolve what `config` leaves at `auto` for a kit of `models`, whose parts are `identified`.
 
-    In this order: the axis that points up, the contact tolerance, the first rung of a ladder over kinds of contact,
-    grammar and hubs under which a short search, of `tries` or some times as many, finds enough; and what variants must
-    be, those of REQUIREMENTS that are in `require`: no near copies, stable, with the carcass of the exemplars. All that
-    is random in it depends on the models and on what is stated alone, so every run and `make inspect` choose alike.
-    Raises ConfigError for stated hubs that are no types.
+    Resolved in this order: the up axis; the contact tolerance; kinds of contact, grammar and hubs by a setting search;
+    and those of REQUIREMENT_KEYS that are in `require`. A trial search has `tries`, or a multiple. Randomness depends
+    on the models and on the stated keys only, so every run and `make inspect` resolve alike. Raises ConfigError for
+    stated hubs that are no types.
     """
-    open_keys = config.auto_keys()
-    values: dict[str, Any] = {key: STRICTEST[key] for key in open_keys}
-    reasons = dict.fromkeys(open_keys, "the default")
-    if "up" in open_keys:
+    auto_keys = config.auto_keys()
+    values: dict[str, Any] = {key: STRICTEST[key] for key in auto_keys}
+    reasons = dict.fromkeys(auto_keys, "the default")
+    if "up" in auto_keys:
         values["up"], reasons["up"] = resolve_up_axis(models, identified)
-    if "contact.tolerance" in open_keys:
-        found = resolve_contact_tolerance(identified, STRICTEST["contact.tolerance"])
-        values["contact.tolerance"], reasons["contact.tolerance"] = found
+    if "contact.tolerance" in auto_keys:
+        tolerance = resolve_contact_tolerance(identified, STRICTEST["contact.tolerance"])
+        values["contact.tolerance"], reasons["contact.tolerance"] = tolerance
     stated = config.resolve(values)
-    fitting = config.fit_tolerance if config.types == "meaning" else None
-    sight = ContactAnalysis(
-        identified, stated.resolved().tolerance, config.pose_tolerance, stated.resolved().up, fitting
-    )
-    one_surface = any(each.is_cut for each in models)
-    rungs = search_settings(sight, _rails(stated, sight, open_keys, one_surface), tries)
-    for key, (value, why) in _required(sight, rungs).items():
+    fit_tolerance = config.fit_tolerance if config.types == "meaning" else None
+    settings = stated.resolved()
+    analysis = ContactAnalysis(identified, settings.tolerance, config.pose_tolerance, settings.up, fit_tolerance)
+    one_surface = any(model.is_cut for model in models)
+    candidates = search_settings(analysis, _search_space(stated, analysis, auto_keys, one_surface), tries)
+    for key, (value, reason) in _requirements(analysis, candidates).items():
         if key in require:
-            values[key], reasons[key] = value, why
-    if not rungs:
+            values[key], reasons[key] = value, reason
+    if not candidates:
         return Resolution(values, reasons, None, 1.0, False, 0)
-    chosen = rungs[-1]
+    chosen = candidates[-1]
     setting = chosen.setting
-    hubs = tuple(sight.types[index].name for index in setting.hubs)
-    bare = sum(int((~np.isin(each.types, setting.hubs)).sum()) for each in sight.counted(setting))
-    left = bare - sum(map(len, sight.staying(setting)))
-    ladder = {
+    hubs = tuple(analysis.types[index].name for index in setting.hubs)
+    bare = sum(int((~np.isin(assembly.types, setting.hubs)).sum()) for assembly in analysis.counted(setting))
+    dropped = bare - sum(map(len, analysis.kept_parts(setting)))
+    found = {
         "contact.kinds": setting.kinds,
         "grammar": setting.grammar,
         "hubs.types": hubs or "none",
-        "disconnected": "largest" if left else "error",
+        "disconnected": "largest" if dropped else "error",
     }
-    for key, value in ladder.items():
-        if key in open_keys:
-            values[key] = value
-            reasons[key] = _reason(key, chosen, rungs)
-    if "hubs.types" in open_keys and one_surface:
-        reasons["hubs.types"] = "the parts are pieces of one surface, which has a hole where one is left out"
-    elif "hubs.types" in open_keys and not chosen.gives_enough and not hubs:
-        reasons["hubs.types"] = _without_hub(sight) or reasons["hubs.types"]
-    if "disconnected" in open_keys:
-        stand = "1 part stands" if left == 1 else f"{left} parts stand"
-        reasons["disconnected"] = f"{stand} apart from the largest piece" if left else "nothing stands apart"
-    return Resolution(values, reasons, chosen.finds, chosen.kept, chosen.gives_enough, len(rungs))
+    for key, value in found.items():
+        if key in auto_keys:
+            values[key], reasons[key] = value, _reason(key, chosen, candidates)
+    if "hubs.types" in auto_keys and one_surface:
+        reasons["hubs.types"] = "the parts are pieces of one surface; leaving one out would leave a hole"
+    elif "hubs.types" in auto_keys and not chosen.is_sufficient and not hubs:
+        reasons["hubs.types"] = _kept_hub_reason(analysis) or reasons["hubs.types"]
+    if "disconnected" in auto_keys:
+        parts = "1 part is" if dropped == 1 else f"{dropped} parts are"
+        reasons["disconnected"] = f"{parts} apart from the largest piece" if dropped else "no part is apart"
+    return Resolution(values, reasons, chosen.trial, chosen.kept_share, chosen.is_sufficient, len(candidates))
 
 
-def resolve_max_copied(finds: TrialResult | None) -> tuple[float, str]:
-    """The greatest share of a variant that may be copied whole, and why: near copies are refused where a search that
-    found `finds` finds much more, and enough that is none."""
-    if finds is None or finds.graphs < SUFFICIENT_GRAPHS:
-        return 1.0, "a short search finds too little to refuse any of it"
-    if finds.by_meaning:
-        return 1.0, "a part that takes another's place leaves all others as they stood"
-    if finds.telling < MIN_NON_COPY_RATE:
-        return 1.0, f"only {finds.telling:.0%} of the finds of a short search are no near copies"
-    beside = f"{finds.telling:.0%} of the finds of a short search are none"
-    return NEAR_COPY_SHARE, f"refuses copies with little beside them; {beside}"
+def resolve_max_copied(trial: TrialResult | None) -> tuple[float, str]:
+    """Return the largest share of a variant that may be copied, and why: near copies are rejected if a trial search
+    finds enough other hits."""
+    if trial is None or trial.graphs < SUFFICIENT_GRAPHS:
+        return 1.0, "a short search finds too little to reject any of it"
+    if trial.by_meaning:
+        return 1.0, "a part that replaces another leaves all other parts in place"
+    if trial.non_copy_rate < MIN_NON_COPY_RATE:
+        return 1.0, f"only {trial.non_copy_rate:.0%} of the hits of a short search are no near copies"
+    return NEAR_COPY_SHARE, f"rejects near copies; a short search finds {trial.non_copy_rate:.0%} other hits"
 
 
-def _required(sight: ContactAnalysis, rungs: Sequence[CandidateSetting]) -> dict[str, tuple[Any, str]]:
-    """Value and reason of each of REQUIREMENTS, after the rung that was chosen, the last."""
-    if not rungs:
+def _requirements(analysis: ContactAnalysis, candidates: Sequence[CandidateSetting]) -> dict[str, tuple[Any, str]]:
+    """Return value and reason of each of REQUIREMENT_KEYS, under the chosen candidate, the last."""
+    if not candidates:
         nothing = "there is nothing to search"
         return {
             MAX_COPIED_SHARE_KEY: resolve_max_copied(None),
             STABLE_KEY: (False, nothing),
             REQUIRED_LABELS_KEY: ((), nothing),
         }
-    kit, finds = sight.kit(rungs[-1].setting), rungs[-1].finds
-    spanning = spanning_labels(kit)
-    why = (
-        "the exemplars have parts of these as large as themselves" if spanning else "no part is as large as an exemplar"
-    )
+    kit, chosen = analysis.kit(candidates[-1].setting), candidates[-1]
+    labels = spanning_labels(kit)
+    large, none = "the exemplars have parts of these as large as themselves", "no part is as large as an exemplar"
     return {
-        MAX_COPIED_SHARE_KEY: resolve_max_copied(finds),
-        STABLE_KEY: resolve_stable(kit, rungs[-1].different),
-        REQUIRED_LABELS_KEY: (spanning, why),
+        MAX_COPIED_SHARE_KEY: resolve_max_copied(chosen.trial),
+        STABLE_KEY: resolve_stable(kit, chosen.most_different),
+        REQUIRED_LABELS_KEY: (labels, large if labels else none),
     }
 
 
-def resolve_stable(kit: Kit, different: Sequence[Assembly]) -> tuple[bool, str]:
-    """Whether what falls over is refused, and why: where the exemplars of a kit stand, some of the most different finds
-    of a short search do not, and enough do."""
-    standing = Requirements(stable=True)
-    if any(unmet_requirement(standing, kit_shape(kit, each.whole)) for each in kit.exemplars):
-        return False, "not even the exemplars stand"
-    if not different:
+def resolve_stable(kit: Kit, most_different: Sequence[Assembly]) -> tuple[bool, str]:
+    """Return whether unstable shapes are rejected, and why: if the exemplars are stable, and some of the most different
+    hits of a trial search are not, but enough are."""
+    required = Requirements(stable=True)
+    if any(unmet_requirement(required, kit_shape(kit, exemplar.whole)) for exemplar in kit.exemplars):
+        return False, "not even the exemplars are stable"
+    if not most_different:
         return False, "a short search finds nothing that could fall"
-    falls = sum(unmet_requirement(standing, kit_shape(kit, each)) is not None for each in different)
-    told = f"of the {len(different)} most different finds of a short search"
-    if not falls:
-        return False, f"none {told} falls"
-    if len(different) - falls < MIN_NON_COPY_RATE * len(different):
-        return False, f"{falls} {told} fall, so that too few would be left"
-    return True, f"{falls} {told} fall, and the exemplars stand"
+    falling = sum(unmet_requirement(required, kit_shape(kit, assembly)) is not None for assembly in most_different)
+    hits = f"of the {len(most_different)} most different hits of a short search"
+    if not falling:
+        return False, f"none {hits} falls"
+    if len(most_different) - falling < MIN_NON_COPY_RATE * len(most_different):
+        return False, f"{falling} {hits} fall, so that too few would be left"
+    return True, f"{falling} {hits} fall, and the exemplars are stable"
 
 
-def trial_text(finds: TrialResult) -> str:
-    """What a probe found, in words."""
-    if not finds.graphs:
-        return f"nothing in {finds.tries:,} tries"
-    alike = ", much alike" if has_low_diversity(finds) else ""
-    return f"{finds.graphs:,} graphs and {finds.histograms:,} histograms in {finds.tries:,} tries{alike}"
+def trial_text(trial: TrialResult) -> str:
+    """Return what a trial search found, in words."""
+    return trial.text + (", much alike" if trial.graphs and has_low_diversity(trial) else "")
 
 
-def _rails(stated: KitConfig, sight: ContactAnalysis, open_keys: Sequence[str], one_surface: bool) -> SearchSpace:
-    """What the ladder may choose from: one value of each key that the config states.
+def _search_space(
+    stated: KitConfig, analysis: ContactAnalysis, auto_keys: Sequence[str], one_surface: bool
+) -> SearchSpace:
+    """Return the candidates of the search: a single value of each key that the config states.
 
-    Hubs are peeled off because shapes stand without them, and get back those that fit. Pieces of one surface are no
-    such parts: a piece that does not come back is a hole. By meaning labels alone say what may stand beside what, and
-    all of them must have been seen: with looser rules a chair has one leg.
+    Hubs are left out because shapes hold together without them; those that fit are restored. Pieces of one surface are
+    no such parts: a missing piece is a hole. By meaning, only labels restrict neighbours, so every neighbourhood must
+    have been observed: under looser rules a chair has one leg.
     """
-    made = stated.resolved()
-    peels = "hubs.types" in open_keys and stated.types != "meaning" and not one_surface
+    settings = stated.resolved()
+    searches_hubs = "hubs.types" in auto_keys and stated.types != "meaning" and not one_surface
+    searches_grammars = "grammar" in auto_keys and stated.types != "meaning"
     return SearchSpace(
-        kinds=CANDIDATE_KINDS if "contact.kinds" in open_keys else (made.kinds,),
-        grammars=CANDIDATE_GRAMMARS if "grammar" in open_keys and stated.types != "meaning" else (made.grammar,),
-        hubs=None if peels else hub_types(stated, sight.types),
-        largest="disconnected" in open_keys or made.disconnected == "largest",
+        kinds=CANDIDATE_KINDS if "contact.kinds" in auto_keys else (settings.kinds,),
+        grammars=CANDIDATE_GRAMMARS if searches_grammars else (settings.grammar,),
+        hubs=None if searches_hubs else hub_types(stated, analysis.types),
+        may_drop_pieces="disconnected" in auto_keys or settings.disconnected == "largest",
     )
 
 
-def _without_hub(sight: ContactAnalysis) -> str:
-    """Why not even the hub that touches most was left out, where too little would stay; else empty."""
-    hub = sight.widest(())
-    stay = sight.parts if hub is None else parts_without_hubs(sight, (hub,))
-    if hub is None or stay >= MIN_KEPT_SHARE * sight.parts:
+def _kept_hub_reason(analysis: ContactAnalysis) -> str:
+    """Say that the model falls apart without the most connected hub; empty if it does not."""
+    hub = analysis.most_connected_type(())
+    kept = analysis.part_count if hub is None else parts_without_hubs(analysis, (hub,))
+    if hub is None or kept >= MIN_KEPT_SHARE * analysis.part_count:
         return ""
-    return f"the model falls apart without {sight.types[hub].name}: {stay} of {sight.parts} parts stay in one piece"
+    name = analysis.types[hub].name
+    return f"the model falls apart without {name}: {kept} of {analysis.part_count} parts stay in one piece"
 
 
-def _reason(key: str, chosen: CandidateSetting, rungs: Sequence[CandidateSetting]) -> str:
-    """Why the ladder ended at this value of a key: what it found there, and one step stricter in this key alone."""
+def _reason(key: str, chosen: CandidateSetting, candidates: Sequence[CandidateSetting]) -> str:
+    """Say why the search ended at this value of a key: its hits, and those one step stricter in this key alone."""
     setting = chosen.setting
     stricter: list[Setting] = []
     if key == "contact.kinds":
         stricter = [replace(setting, kinds=kinds) for kinds in CANDIDATE_KINDS if len(kinds) > len(setting.kinds)]
     elif key == "grammar" and setting.grammar in CANDIDATE_GRAMMARS:
-        stricter = [
-            replace(setting, grammar=each) for each in CANDIDATE_GRAMMARS[: CANDIDATE_GRAMMARS.index(setting.grammar)]
-        ]
+        grammars = CANDIDATE_GRAMMARS[: CANDIDATE_GRAMMARS.index(setting.grammar)]
+        stricter = [replace(setting, grammar=grammar) for grammar in grammars]
     elif key == "hubs.types" and setting.hubs:
         stricter = [replace(setting, hubs=())]
     for other in reversed(stricter):
-        rung = next((each for each in rungs if each.setting == other), None)
-        if rung is not None:
-            return f"{trial_text(chosen.finds)}; the next stricter: {trial_text(rung.finds)}"
-    if chosen.gives_enough:
-        return "the strictest, and it gives enough"
-    return f"nothing else gives more than {trial_text(chosen.finds)}"
+        candidate = next((candidate for candidate in candidates if candidate.setting == other), None)
+        if candidate is not None:
+            return f"{trial_text(chosen.trial)}; the next stricter: {trial_text(candidate.trial)}"
+    if chosen.is_sufficient:
+        return "the strictest, and it finds enough"
+    return f"nothing else finds more than {trial_text(chosen.trial)}"

@@ -1,5 +1,4 @@
-"""Models read and decided upon: by the parts that the config or `auto` takes, or by sections where nothing comes of
-those."""
+"""Read the models of a kit and resolve its settings; cut meshes into sections if nothing else yields a result."""
 
 from __future__ import annotations
 
@@ -9,7 +8,7 @@ from typing import Any
 
 from pipeline.errors import ConfigError
 from stages.autoconfig.resolve import Resolution, resolve_settings
-from stages.autoconfig.yield_estimate import estimate_yield
+from stages.autoconfig.yield_estimate import YieldEstimate, estimate_yield
 from stages.exemplars.build import Observation, observe_parts
 from stages.exemplars.identify import IdentifiedParts, identify_parts
 from stages.exemplars.model import Model
@@ -17,78 +16,102 @@ from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig, ReadLimits
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY
+from stages.variations.requirements.hub_restoration import auto_min_hubs
 
 PARTS_KEY = "parts"
-"""What `parts` is called among the keys that are chosen for a kit."""
+"""The key of `parts` among the resolved settings of a kit."""
 MIN_PARTS_PER_TYPE = 2.0
-"""Cuts are tried where they make so many parts of each type: what repeats can be there once more, or gone."""
+"""Sections are tried if they make this many parts of each type on average: only repeats can be inserted or removed."""
 
 
 @dataclass(frozen=True)
 class ResolvedKit:
-    """Models with their identified parts, what was chosen for them, and the config that says which parts they have."""
+    """Models with their identified parts and resolved settings.
+
+    config: the kit's config, which says what makes a part, with its other `auto` keys left open.
+    """
 
     config: KitConfig
     models: Sequence[Model]
     identified: IdentifiedParts
-    choices: Resolution
+    resolution: Resolution
     _observed: dict[str, Observation] = field(default_factory=dict, compare=False, repr=False)
 
     def observe(self, values: Mapping[str, Any]) -> Observation:
-        """What a run builds of the models where the keys left open come to `values`; built once for the same."""
+        """Return what a run builds of the models with these `values` of the `auto` keys; cached by config."""
         config = self.config.resolve(values)
-        told = config.model_dump_json()
-        if told not in self._observed:
-            self._observed[told] = observe_parts(config, self.models, self.identified)
-        return self._observed[told]
+        key = config.model_dump_json()
+        if key not in self._observed:
+            self._observed[key] = observe_parts(config, self.models, self.identified)
+        return self._observed[key]
+
+    def estimate(self, stated: KitConfig, oracle: ContactOracle, tries: int) -> YieldEstimate:
+        """Estimate the layouts of the kit of `oracle`, which is built as `stated` with the resolved settings."""
+        kit = oracle.kit
+        known_graphs = self.resolution.trial.graphs if self.resolution.trial is not None else 0
+        max_copied_share = self.resolution.values.get(MAX_COPIED_SHARE_KEY, 1.0)
+        min_hubs = auto_min_hubs(stated, kit)
+        return estimate_yield(kit, oracle, tries, known_graphs, min_hubs, max_copied_share)
 
 
 def read_and_resolve(config: KitConfig, limits: ReadLimits, tries: int, require: Sequence[str]) -> ResolvedKit:
-    """Read the models of a kit and decide its auto keys, as `resolve_settings` and `use_sections_if_empty`."""
+    """Read the models of a kit and resolve its `auto` keys, as `resolve_settings` and `use_sections_if_empty` do."""
     models = [read_model(shape.path, config.parts, limits) for shape in config.shapes]
+    return resolve_models(config, models, limits, tries, require)
+
+
+def resolve_models(
+    config: KitConfig, models: Sequence[Model], limits: ReadLimits, tries: int, require: Sequence[str]
+) -> ResolvedKit:
+    """Resolve the `auto` keys of a kit of `models`; models that are cut into sections are read again."""
     identified = identify_parts(models, config)
-    first = ResolvedKit(config, models, identified, resolve_settings(config, models, identified, tries, require))
-    return use_sections_if_empty(first, limits, tries, require)
+    resolution = resolve_settings(config, models, identified, tries, require)
+    return use_sections_if_empty(ResolvedKit(config, models, identified, resolution), limits, tries, require)
 
 
 def use_sections_if_empty(first: ResolvedKit, limits: ReadLimits, tries: int, require: Sequence[str]) -> ResolvedKit:
-    """Models cut by sections where `auto` took pieces of meshes for parts and a search found nothing in them, if it
-    finds enough then under the strictest rules, or under others what a longer search makes a dataset of: the first find
-    of slabs is rare, for all that passes a section must fit at once. Else as they were read first."""
-    finds = first.choices.finds
-    by_author = any(each.segmentation in ("nodes", "objects") for each in first.models)
-    if first.config.parts != "auto" or by_author or finds is None or finds.graphs:
+    """Cut the models into sections if `auto` took pieces of meshes for parts and a trial search found nothing in them.
+
+    Sections are taken if they yield enough under the strictest rules, or under other rules what a longer search makes
+    a dataset of: the first hit of slabs is rare, since all that crosses a section must fit at the same time. Otherwise
+    the models stay as they were read first.
+    """
+    trial = first.resolution.trial
+    by_author = any(model.segmentation in ("nodes", "objects") for model in first.models)
+    if first.config.parts != "auto" or by_author or trial is None or trial.graphs:
         return first
     config = first.config.model_copy(update={"parts": "sections"})
     try:
-        models = [read_model(each.path, config.parts, limits) for each in first.models]
+        models = [read_model(model.path, config.parts, limits) for model in first.models]
         identified = identify_parts(models, config)
     except ConfigError:
         return first
-    if sum(len(each) for each in identified.assemblies) < MIN_PARTS_PER_TYPE * len(identified.types):
+    if sum(len(assembly) for assembly in identified.assemblies) < MIN_PARTS_PER_TYPE * len(identified.types):
         return first
     searched = ("contact.kinds", "grammar", "hubs.types")
     strictest = {key: STRICTEST[key] for key in config.auto_keys() if key in searched}
-    choices = resolve_settings(config.resolve(strictest), models, identified, tries, require)
-    values = {**strictest, **choices.values}
-    reasons = {**dict.fromkeys(strictest, "the strictest, and it gives enough"), **choices.reasons}
-    if not choices.enough:
-        choices = resolve_settings(config, models, identified, tries, require)
-        values, reasons = dict(choices.values), dict(choices.reasons)
-        if not _is_dataset(ResolvedKit(config, models, identified, choices), tries):
+    resolution = resolve_settings(config.resolve(strictest), models, identified, tries, require)
+    values = {**strictest, **resolution.values}
+    reasons = {**dict.fromkeys(strictest, "the strictest, and it finds enough"), **resolution.reasons}
+    if not resolution.is_sufficient:
+        resolution = resolve_settings(config, models, identified, tries, require)
+        values, reasons = dict(resolution.values), dict(resolution.reasons)
+        if not _is_dataset(ResolvedKit(config, models, identified, resolution), tries):
             return first
-    why = f"cut across: nothing comes of {len(first.models[0].parts)} {first.models[0].segmentation}"
-    values, reasons = {PARTS_KEY: config.parts, **values}, {PARTS_KEY: why, **reasons}
-    return ResolvedKit(config, models, identified, replace(choices, values=values, reasons=reasons))
+    reason = f"cut across: nothing comes of {len(first.models[0].parts)} {first.models[0].segmentation}"
+    values, reasons = {PARTS_KEY: config.parts, **values}, {PARTS_KEY: reason, **reasons}
+    return ResolvedKit(config, models, identified, replace(resolution, values=values, reasons=reasons))
 
 
-def _is_dataset(reading: ResolvedKit, tries: int) -> bool:
-    """Whether a longer search of what a short one found anything in promises enough that is neither dull nor broken."""
-    choices = reading.choices
-    if choices.finds is None or not choices.finds.graphs:
+def _is_dataset(resolved: ResolvedKit, tries: int) -> bool:
+    """Return whether a longer search promises enough that is neither alike nor broken; False if the trial is empty."""
+    resolution = resolved.resolution
+    if resolution.trial is None or not resolution.trial.graphs:
         return False
-    built = reading.observe(choices.values)
+    built = resolved.observe(resolution.values)
     if built.refusals:
         return False
-    copied = choices.values.get(MAX_COPIED_SHARE_KEY, 1.0)
-    return not estimate_yield(built.kit, ContactOracle(built.kit), tries, choices.finds.graphs, copied=copied).is_poor
+    max_copied_share = resolution.values.get(MAX_COPIED_SHARE_KEY, 1.0)
+    known_graphs = resolution.trial.graphs
+    oracle = ContactOracle(built.kit)
+    return not estimate_yield(built.kit, oracle, tries, known_graphs, max_copied_share=max_copied_share).is_poor

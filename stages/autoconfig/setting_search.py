@@ -1,4 +1,4 @@
-"""The ladder: settings from the strictest on, each probed, until one gives enough."""
+"""Setting search: candidate settings, the strictest first, each tried by a short search until one suffices."""
 
 from __future__ import annotations
 
@@ -19,194 +19,219 @@ from stages.variations.novelty.copied_pieces import CopyDetector
 from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
 
 SUFFICIENT_GRAPHS = 80
-"""So many distinct graphs in a probe promise hundreds in a search."""
+"""Distinct graphs of a trial search that promise hundreds in a long one."""
 SUFFICIENT_HISTOGRAMS = 16
-MIN_EXEMPLAR_DISTANCE = 0.05
-MIN_PAIR_DISTANCE = 0.03
-"""Of so many histograms, so far from the exemplars and from each other, is a pool that is not dull."""
+MIN_EXEMPLAR_DISTANCE, MIN_PAIR_DISTANCE = 0.05, 0.03
+"""Distances E to the nearest exemplar and between two hits, below which a pool has low diversity."""
 MIN_NON_COPY_RATE = 0.25
-"""Share of finds that are no near copies from which on a search that refuses the others still comes to an end."""
+"""Share of hits that are no near copies, from which a search that rejects near copies still finishes."""
 MIN_SEEN_FILLINGS_SHARE = 0.85
-"""Share of parts with fillings as seen below which a grammar of slots is too loose for a kit."""
+"""Share of parts with slot fillings of the exemplars, below which a grammar of slots is too loose for a kit."""
 MIN_USEFUL_GRAPHS = 20
-"""Fewer graphs than this are next to nothing."""
 PROMISING_HISTOGRAMS = 10
-"""A setting that gave so many histograms in the first tries gets more of them; by meaning, where finds build on each
-other, one that gave any."""
+"""Histograms in the first tries that earn a setting more tries; by meaning one is enough, since hits build on hits."""
 EXTENDED_TRIES_FACTOR = 4
-"""As many times the tries, for a setting that looks promising."""
 MIN_KEPT_SHARE = 0.6
-"""Share of the parts that must stay where some are left out."""
+"""Share of the parts that must be kept if some are left out."""
 MAX_PART_TRIES = 8_000_000
-"""Tries times parts after which no more are tried but slots: a try takes the longer the more parts there are."""
+"""Tries times parts after which only grammars of slots are tried, since tries take longer the more parts there are."""
 MAX_HUB_TYPES = 4
-"""Most types of hubs that are peeled off."""
+"""Most hub types that are left out."""
 CANDIDATE_GRAMMARS: tuple[Strictness, ...] = ("multiset", "count_and_pairs", *SLOT_LEVELS)
 CANDIDATE_KINDS: tuple[tuple[ContactKind, ...], ...] = (("point", "line", "face"), ("line", "face"), ("face",))
 
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """What the ladder may not leave: the kinds, grammars and hubs to choose from; hubs None where it may peel.
-    largest: whether exemplars may lose what falls apart from their largest piece."""
+    """The candidates of a setting search.
+
+    kinds: kinds of contact, the strictest first.
+    grammars: levels of strictness, the strictest first.
+    hubs: the hub types that are left out; None if the search decides.
+    may_drop_pieces: whether exemplars may lose what is apart from their largest piece.
+    """
 
     kinds: tuple[tuple[ContactKind, ...], ...] = CANDIDATE_KINDS
     grammars: tuple[Strictness, ...] = CANDIDATE_GRAMMARS
     hubs: tuple[int, ...] | None = None
-    largest: bool = True
+    may_drop_pieces: bool = True
 
 
 @dataclass(frozen=True)
 class CandidateSetting:
-    """A setting, what a probe found under it, and the share of all parts that stay; different: the most different
-    finds, with their hubs where they are left out; bared: the labels whose parts lose what stands close above or below
-    them in these."""
+    """A setting and the result of its trial search.
+
+    kept_share: share of all parts that the setting keeps.
+    most_different: the most different hits, with their hubs restored.
+    lost_support: labels whose parts lose what is close above or below them in these hits.
+    """
 
     setting: Setting
-    finds: TrialResult
-    kept: float
-    different: Sequence[Assembly] = ()
+    trial: TrialResult
+    kept_share: float
+    most_different: Sequence[Assembly] = ()
     lost_support: tuple[str, ...] = ()
 
     @property
     def score(self) -> tuple[float, ...]:
-        """By which rungs that give too little are compared: histograms at their distances, in what is left of the
-        exemplars; then graphs. For next to nothing no hubs are left out. What looks broken is hardly worth more than
-        nothing."""
-        finds, kept = self.finds, self.kept
-        if (self.setting.hubs and finds.graphs < MIN_USEFUL_GRAPHS) or finds.observed_share < MIN_SEEN_FILLINGS_SHARE:
+        """The order of candidates that do not suffice: diversity times kept parts, then graphs times kept parts.
+
+        Hubs are not left out for next to nothing, and shapes that look broken hardly count.
+        """
+        trial, kept = self.trial, self.kept_share
+        few = self.setting.hubs and trial.graphs < MIN_USEFUL_GRAPHS
+        if few or trial.seen_fillings_share < MIN_SEEN_FILLINGS_SHARE:
             return (0.0, 0.0)
         if self.lost_support:
-            return (0.0, finds.graphs * kept)
-        return (finds.histograms * min(finds.distance, 0.2) * min(finds.spread, 0.2) * kept, finds.graphs * kept)
+            return (0.0, trial.graphs * kept)
+        diversity = trial.histograms * min(trial.distance, 0.2) * min(trial.pair_distance, 0.2)
+        return (diversity * kept, trial.graphs * kept)
 
     @property
-    def gives_enough(self) -> bool:
-        """Whether it promises a pool of some size that is not dull, nor broken."""
-        finds = self.finds
+    def is_sufficient(self) -> bool:
+        """Whether it promises a pool of some size and diversity whose shapes do not look broken."""
         return (
-            finds.graphs >= SUFFICIENT_GRAPHS
-            and finds.histograms >= SUFFICIENT_HISTOGRAMS
-            and finds.observed_share >= MIN_SEEN_FILLINGS_SHARE
-            and not has_low_diversity(finds)
+            self.trial.graphs >= SUFFICIENT_GRAPHS
+            and self.trial.histograms >= SUFFICIENT_HISTOGRAMS
+            and self.trial.seen_fillings_share >= MIN_SEEN_FILLINGS_SHARE
+            and not has_low_diversity(self.trial)
             and not self.lost_support
         )
 
 
-def has_low_diversity(finds: TrialResult) -> bool:
-    """Whether finds look like an exemplar, or like each other; near copies do no harm where enough are none, for then
-    they are refused, nor by meaning."""
-    copies = finds.copied >= NEAR_COPY_SHARE and finds.telling < MIN_NON_COPY_RATE and not finds.by_meaning
-    return finds.distance < MIN_EXEMPLAR_DISTANCE or finds.spread < MIN_PAIR_DISTANCE or copies
+def has_low_diversity(trial: TrialResult) -> bool:
+    """Return whether hits look like an exemplar or like each other.
 
-
-def parts_without_hubs(sight: ContactAnalysis, hubs: tuple[int, ...]) -> int:
-    """How many parts of all models stay, each model's in one piece, without those of the types `hubs`."""
-    return sum(map(len, sight.staying(Setting(CANDIDATE_KINDS[0], CANDIDATE_GRAMMARS[0], hubs))))
-
-
-def search_settings(sight: ContactAnalysis, rails: SearchSpace, tries: int) -> list[CandidateSetting]:
-    """The rungs that were tried, the chosen one last.
-
-    Chosen is the first that gives enough; where none does, the one of the best score, the stricter one of equals.
-    Each has `tries` by each method, and more if it looks promising; after so much WORK none but slots are tried. A
-    level of slots admits nothing that the loosest of them does not: where that finds next to nothing it is the only
-    one that is tried.
+    Near copies do no harm by meaning, nor if there are enough other hits, because they are rejected then.
     """
-    tried: list[CandidateSetting] = []
-    known: dict[tuple[ContactKind, ...], ContactOracle] = {}
-    copies: dict[Setting, CopyDetector] = {}
-    looked: dict[Setting, CandidateSetting | None] = {}
+    copies = trial.copied_share >= NEAR_COPY_SHARE and trial.non_copy_rate < MIN_NON_COPY_RATE and not trial.by_meaning
+    return trial.distance < MIN_EXEMPLAR_DISTANCE or trial.pair_distance < MIN_PAIR_DISTANCE or copies
 
-    def look(setting: Setting) -> CandidateSetting | None:
-        """The rung of a setting; None where too little of the models stays."""
-        staying = sight.staying(setting)
-        kept = sum(map(len, staying)) / sight.parts
-        if min(map(len, staying)) < 2 or (kept < 1.0 and (not rails.largest or (tried and kept < MIN_KEPT_SHARE))):
-            return None
-        kit = sight.kit(setting)
-        if setting.kinds not in known:
-            known[setting.kinds] = ContactOracle(kit)
-        answers = known[setting.kinds].under(kit)
-        any_grammar = replace(setting, grammar=CANDIDATE_GRAMMARS[0])
-        if any_grammar not in copies:
-            copies[any_grammar] = CopyDetector(kit, answers.dockings)
-        return _rung(answers, setting, tries, kept, 1 if rails.hubs else RESOLVED_HUB_SHARE, copies[any_grammar])
 
-    for setting in _settings(sight, rails):
+def parts_without_hubs(analysis: ContactAnalysis, hubs: tuple[int, ...]) -> int:
+    """Return the number of parts of all models that are kept in one piece without the types `hubs`."""
+    return sum(map(len, analysis.kept_parts(Setting(CANDIDATE_KINDS[0], CANDIDATE_GRAMMARS[0], hubs))))
+
+
+def search_settings(analysis: ContactAnalysis, space: SearchSpace, tries: int) -> list[CandidateSetting]:
+    """Return the candidates that were tried, the chosen one last.
+
+    The first sufficient candidate is chosen, else the one of the best score, of equals the stricter one.
+    Each has `tries` by each method, and more if it looks promising; after MAX_PART_TRIES only slots are tried. The
+    loosest level of slots admits whatever the other levels admit: if it finds next to nothing, they are skipped.
+    """
+    return _SettingSearch(analysis, space, tries).run()
+
+
+class _SettingSearch:
+    """A setting search with what its candidates share: contacts, tests for copies and results by setting."""
+
+    def __init__(self, analysis: ContactAnalysis, space: SearchSpace, tries: int) -> None:
+        self._analysis, self._space, self._tries = analysis, space, tries
+        self._tried: list[CandidateSetting] = []
+        self._oracles: dict[tuple[ContactKind, ...], ContactOracle] = {}
+        self._copies: dict[Setting, CopyDetector] = {}
+        self._candidates: dict[Setting, CandidateSetting | None] = {}
+
+    def run(self) -> list[CandidateSetting]:
+        for setting in _settings(self._analysis, self._space):
+            if self._is_skipped(setting):
+                continue
+            candidate = self._candidate(setting)
+            if candidate is None:
+                continue
+            self._tried.append(candidate)
+            if candidate.is_sufficient:
+                return self._tried
+        if self._tried:
+            best = max(range(len(self._tried)), key=lambda index: (self._tried[index].score, -index))
+            self._tried.append(self._tried.pop(best))
+        return self._tried
+
+    def _is_skipped(self, setting: Setting) -> bool:
         if setting.grammar not in SLOT_LEVELS:
-            if sum(each.finds.tries for each in tried) * sight.parts > MAX_PART_TRIES:
-                continue
-        else:
-            loosest = replace(setting, grammar=rails.grammars[-1])
-            if loosest not in looked:
-                looked[loosest] = look(loosest)
-            found = looked[loosest]
-            if setting != loosest and (found is None or found.finds.histograms < PROMISING_HISTOGRAMS):
-                continue
-        rung = looked[setting] if setting in looked else look(setting)
-        if rung is None:
-            continue
-        tried.append(rung)
-        if rung.gives_enough:
-            return tried
-    if tried:
-        best = max(range(len(tried)), key=lambda place: (tried[place].score, -place))
-        tried.append(tried.pop(best))
-    return tried
+            spent = sum(candidate.trial.tries for candidate in self._tried)
+            return spent * self._analysis.part_count > MAX_PART_TRIES
+        loosest = replace(setting, grammar=self._space.grammars[-1])
+        candidate = self._candidate(loosest)
+        return setting != loosest and (candidate is None or candidate.trial.histograms < PROMISING_HISTOGRAMS)
+
+    def _candidate(self, setting: Setting) -> CandidateSetting | None:
+        """Return the candidate of a setting, tried once; None if it keeps too little of the models."""
+        if setting not in self._candidates:
+            self._candidates[setting] = self._try_if_kept(setting)
+        return self._candidates[setting]
+
+    def _try_if_kept(self, setting: Setting) -> CandidateSetting | None:
+        kept = self._analysis.kept_parts(setting)
+        share = sum(map(len, kept)) / self._analysis.part_count
+        drops_too_much = share < 1.0 and (not self._space.may_drop_pieces or (self._tried and share < MIN_KEPT_SHARE))
+        if min(map(len, kept)) < 2 or drops_too_much:
+            return None
+        kit = self._analysis.kit(setting)
+        if setting.kinds not in self._oracles:
+            self._oracles[setting.kinds] = ContactOracle(kit)
+        oracle = self._oracles[setting.kinds].under(kit)
+        any_grammar = replace(setting, grammar=CANDIDATE_GRAMMARS[0])
+        if any_grammar not in self._copies:
+            self._copies[any_grammar] = CopyDetector(kit, oracle.dockings)
+        min_hubs = 1 if self._space.hubs else RESOLVED_HUB_SHARE
+        return _try_setting(oracle, setting, self._tries, share, min_hubs, self._copies[any_grammar])
 
 
-def _rung(
-    answers: ContactOracle, setting: Setting, tries: int, kept: float, required: float, copies: CopyDetector
+def _try_setting(
+    oracle: ContactOracle, setting: Setting, tries: int, kept_share: float, min_hubs: float, copies: CopyDetector
 ) -> CandidateSetting:
-    """The first tries, and more where they found something that differs. Where hubs are left out, finds must get back
-    those that are `required` of a variant. `copies`: as for Search."""
-    names = [answers.kit.types[index].name for index in setting.hubs]
+    """Search with the first tries, and with more if they found something different.
+
+    min_hubs: hubs that a hit must get back, if the setting leaves hubs out. copies: as for Search.
+    """
+    names = [oracle.kit.types[index].name for index in setting.hubs]
     rng = decision_rng(0, "choices", setting.grammar, *setting.kinds, *names)
-    probe = TrialSearch(answers, rng, required if setting.hubs else 0, copies=copies)
-    rung = _looked_at(CandidateSetting(setting, probe.go_on(tries, SUFFICIENT_GRAPHS, evenly=True), kept), probe)
-    promising = rung.finds.histograms >= (1 if rung.finds.by_meaning else PROMISING_HISTOGRAMS)
-    if promising and not rung.gives_enough and not rung.lost_support:
-        more = probe.go_on((EXTENDED_TRIES_FACTOR - 1) * tries, EXTENDED_TRIES_FACTOR * SUFFICIENT_GRAPHS, evenly=True)
-        rung = _looked_at(CandidateSetting(setting, more, kept), probe)
-    return rung
+    search = TrialSearch(oracle, rng, min_hubs if setting.hubs else 0, copies=copies)
+    candidate = _candidate_of(setting, kept_share, search, search.run(tries, SUFFICIENT_GRAPHS, evenly=True))
+    promising = candidate.trial.histograms >= (1 if candidate.trial.by_meaning else PROMISING_HISTOGRAMS)
+    if promising and not candidate.is_sufficient and not candidate.lost_support:
+        wanted = EXTENDED_TRIES_FACTOR * SUFFICIENT_GRAPHS
+        more = search.run((EXTENDED_TRIES_FACTOR - 1) * tries, wanted, evenly=True)
+        candidate = _candidate_of(setting, kept_share, search, more)
+    return candidate
 
 
-def _looked_at(rung: CandidateSetting, probe: TrialSearch) -> CandidateSetting:
-    """A rung with the most different finds of its probe, and what is bared in them."""
-    different = [probe.whole(place) for place in rung.finds.most_different]
-    return replace(rung, different=different, lost_support=lost_support(probe.kit, different))
+def _candidate_of(setting: Setting, kept_share: float, search: TrialSearch, trial: TrialResult) -> CandidateSetting:
+    most_different = [search.with_hubs(index) for index in trial.most_different]
+    return CandidateSetting(setting, trial, kept_share, most_different, lost_support(search.kit, most_different))
 
 
-def _settings(sight: ContactAnalysis, rails: SearchSpace) -> Iterator[Setting]:
-    """Settings, the strictest first, slots last of all; those that differ in nothing that the models have are one."""
-    different: dict[tuple[ContactKind, ...], tuple[ContactKind, ...]] = {}
-    for kinds in rails.kinds:
-        there = tuple(kind for kind in kinds if kind in sight.kinds)
-        if there:
-            different.setdefault(there, kinds)
-    counted = [each for each in rails.grammars if each not in SLOT_LEVELS]
-    for hubs in _hubs(sight, rails):
-        yield from (Setting(kinds, each, hubs) for kinds in different.values() for each in counted)
-    hubs = rails.hubs or ()
-    edges = sight.counted(Setting(CANDIDATE_KINDS[0], CANDIDATE_GRAMMARS[0], hubs))
-    widest = max(int(np.bincount(each.edges.ravel(), minlength=1).max()) for each in edges)
-    slots = [each for each in rails.grammars if each in SLOT_LEVELS and widest <= MAX_GROWTH_DEGREE]
-    yield from (Setting(kinds, each, hubs) for kinds in different.values() for each in slots)
+def _settings(analysis: ContactAnalysis, space: SearchSpace) -> Iterator[Setting]:
+    """Yield settings, the strictest first and slots last; settings that the models cannot tell apart come once."""
+    distinct: dict[tuple[ContactKind, ...], tuple[ContactKind, ...]] = {}
+    for kinds in space.kinds:
+        occurring = tuple(kind for kind in kinds if kind in analysis.kinds)
+        if occurring:
+            distinct.setdefault(occurring, kinds)
+    counting = [grammar for grammar in space.grammars if grammar not in SLOT_LEVELS]
+    for hubs in _hub_candidates(analysis, space):
+        yield from (Setting(kinds, grammar, hubs) for kinds in distinct.values() for grammar in counting)
+    hubs = space.hubs or ()
+    assemblies = analysis.counted(Setting(CANDIDATE_KINDS[0], CANDIDATE_GRAMMARS[0], hubs))
+    degree = max(int(np.bincount(assembly.edges.ravel(), minlength=1).max()) for assembly in assemblies)
+    slots = [grammar for grammar in space.grammars if grammar in SLOT_LEVELS and degree <= MAX_GROWTH_DEGREE]
+    yield from (Setting(kinds, grammar, hubs) for kinds in distinct.values() for grammar in slots)
 
 
-def _hubs(sight: ContactAnalysis, rails: SearchSpace) -> Iterator[tuple[int, ...]]:
-    """None, then one type more at a time, of the part that touches most; as long as most parts stay."""
-    if rails.hubs is not None:
-        yield rails.hubs
+def _hub_candidates(analysis: ContactAnalysis, space: SearchSpace) -> Iterator[tuple[int, ...]]:
+    """Yield no hubs, then the most connected type added one at a time, while most parts are kept."""
+    if space.hubs is not None:
+        yield space.hubs
         return
     hubs: tuple[int, ...] = ()
     yield hubs
     for _ in range(MAX_HUB_TYPES):
-        widest = sight.widest(hubs)
-        if widest is None:
+        most_connected = analysis.most_connected_type(hubs)
+        if most_connected is None:
             return
-        hubs = tuple(sorted((*hubs, widest)))
-        if parts_without_hubs(sight, hubs) < MIN_KEPT_SHARE * sight.parts:
+        hubs = tuple(sorted((*hubs, most_connected)))
+        if parts_without_hubs(analysis, hubs) < MIN_KEPT_SHARE * analysis.part_count:
             return
         yield hubs

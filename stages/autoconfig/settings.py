@@ -1,4 +1,4 @@
-"""The `choices` section of a config."""
+"""The `autoconfig` section of a config."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pipeline.config import StrictModel
 
 
 class AutoconfigConfig(StrictModel):
-    """How keys of kits that are `auto` are chosen."""
+    """How the kit keys left at `auto` are resolved."""
 
     max_tries: int = Field(
         2500,
         ge=100,
         le=1_000_000,
-        description="Tries of a search after which a setting under which it finds next to nothing is given up; a "
-        "promising one gets four times as many.",
+        description="Tries of a trial search before a setting that finds next to nothing is dropped; a promising "
+        "setting gets four times this number.",
     )

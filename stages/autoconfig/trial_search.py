@@ -1,4 +1,4 @@
-"""A short search, and what it says of a long one: distinct graphs and histograms, and how far they are apart."""
+"""A trial search: a short search whose result predicts the number and the diversity of what a long one finds."""
 
 from __future__ import annotations
 
@@ -24,169 +24,191 @@ from stages.variations.selection.farthest_first import farthest_first
 from stages.variations.settings import SearchConfig
 
 MAX_MOST_DIFFERENT = 24
-"""So many of the finds, those most different, say how different finds can be."""
+"""Hits, the most different ones, that measure diversity."""
 
 TRIAL_METHODS: tuple[Literal["exchange", "growth"], ...] = ("exchange", "growth")
-"""Each has tries of its own, for a grown shape of a large kit costs as much as hundreds of exchanges."""
+"""Each method has its own tries: one grown shape of a large kit costs as much as hundreds of exchanges."""
 MAX_GROWTH_DEGREE = 40
-"""Where a part has more neighbours than this, nothing is grown: all around it is a copy, and dear."""
-FIRST = 5
-"""Growth that finds nothing in one of so many parts of its tries is given up."""
-VAIN = 4
-"""As many times sooner where the exchange found nothing either, by a grammar that has nothing but what was observed."""
+"""Growth is skipped if a part has more neighbours: all around it would be a copy, and slow."""
+GROWTH_FIRST_DIVISOR = 5
+"""Growth stops if it finds nothing in this fraction of its tries."""
+HOPELESS_GROWTH_DIVISOR = 4
+"""The fraction is smaller by this factor if the exchange found nothing and the grammar has no slots."""
 TRIAL_CONFIG = SearchConfig(duplicates="graph")
-"""A probe counts distinct graphs, whatever the config calls a duplicate. By meaning these do not tell a turned leg from
-a square one, and what counts are parts lists."""
+"""Distinct graphs are counted, whatever the config calls a duplicate. By meaning, parts lists are counted, since graphs
+do not tell a turned leg from a square one."""
 
 
 @dataclass(frozen=True)
 class TrialResult:
-    """What a probe found.
+    """What a trial search found; its hits are the distinct variants that it accepts.
 
-    tries: how many; graphs, histograms: distinct ones, by meaning only those of different histograms; distance: mean
-    histogram metric E (strings §5.3) of the most different finds to their nearest exemplar; spread: median of E between
-    two of them; copied: median of the largest share of a find that stands just so in an exemplar; telling: share of the
-    finds that are no near copies; familiar: with a grammar of slots the share of their parts of which it was seen just
-    so which slots are filled, else 1; by_meaning: whether one part in another's place is a find, though all others
-    stand as they stood; most_different: their places among the variants, most different first; rejects: tries that came
-    to nothing, by reason.
+    tries: number of tries.
+    graphs: number of distinct graphs; by meaning, of graphs with distinct histograms.
+    histograms: number of distinct histograms of part types.
+    distance: mean histogram metric E (strings §5.3) from the most different hits to their nearest exemplar.
+    pair_distance: median of E between two of the most different hits.
+    copied_share: median share of a hit in its largest verbatim piece of an exemplar.
+    non_copy_rate: share of the hits that are no near copies.
+    seen_fillings_share: share of the parts of the most different hits whose slot fillings occur in an exemplar; 1
+        without slots.
+    by_meaning: whether exchanging one part for another of its meaning counts as a hit.
+    most_different: indices into the variants, most different first.
+    rejects: rejected tries by reason.
     """
 
     tries: int
     graphs: int
     histograms: int
     distance: float
-    spread: float
-    copied: float = 1.0
-    telling: float = 0.0
-    observed_share: float = 1.0
+    pair_distance: float
+    copied_share: float = 1.0
+    non_copy_rate: float = 0.0
+    seen_fillings_share: float = 1.0
     by_meaning: bool = False
     most_different: tuple[int, ...] = ()
     rejects: Mapping[str, int] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
-        """What it says of a long search, for records and programs."""
-        return {
-            "tries": self.tries,
-            "graphs": self.graphs,
-            "histograms": self.histograms,
-            "distance": self.distance,
-            "spread": self.spread,
-            "copied": self.copied,
-            "telling": self.telling,
-        }
+        """Return what predicts a long search, for records and programs."""
+        keys = ("tries", "graphs", "histograms", "distance", "pair_distance", "copied_share", "non_copy_rate")
+        return {key: getattr(self, key) for key in keys}
+
+    @property
+    def text(self) -> str:
+        """What was found, in words, without the diversity."""
+        if not self.graphs:
+            return f"nothing in {self.tries:,} tries"
+        return f"{self.graphs:,} graphs and {self.histograms:,} histograms in {self.tries:,} tries"
 
 
 class TrialSearch:
-    """A search of one kit that can be continued. Everything in it depends on `rng` and the kit alone. What lacks the
-    kit's carcass is no find, nor is that which does not get back the `hubs` that are required, as `Backdrop.has_hubs`
-    says, or of which a greater share than `copied` is copied whole. `copies`: as for Search."""
+    """A search of one kit that can be continued; its result depends on the kit and the random stream only.
+
+    Hits have the kit's required labels, get back the hubs that are required and respect the limit on copies.
+    """
 
     def __init__(
         self,
-        answers: ContactOracle,
+        oracle: ContactOracle,
         rng: np.random.Generator,
-        hubs: float = 0,
-        copied: float = 1.0,
+        min_hubs: float = 0,
+        max_copied_share: float = 1.0,
         copies: CopyDetector | None = None,
     ) -> None:
-        self.kit = answers.kit
+        """Prepare a search of the kit of `oracle`.
+
+        min_hubs: hubs that a hit must get back, as for `HubRestorer.has_hubs`.
+        max_copied_share: largest share of a hit that may be one verbatim piece of an exemplar.
+        copies: as for Search.
+        """
+        self.kit = oracle.kit
         self.variants: list[Variant] = []
         self._rng = rng
-        self._known: set[int] = set()
-        self._copied, self._hubs = copied, hubs
-        self._refused = Counter[str]()
-        self._has_carcass = labels_test(self.kit, spanning_labels(self.kit))
-        self._backdrop = HubRestorer(answers, upright=True)
+        self._known_keys: set[int] = set()
+        self._max_copied_share, self._min_hubs = max_copied_share, min_hubs
+        self._rejects = Counter[str]()
+        self._has_labels = labels_test(self.kit, spanning_labels(self.kit))
+        self._hubs = HubRestorer(oracle, upright=True)
         self._tries = 0
-        widest = max(int(np.bincount(each.assembly.edges.ravel(), minlength=1).max()) for each in self.kit.exemplars)
-        methods = TRIAL_METHODS if widest <= MAX_GROWTH_DEGREE else TRIAL_METHODS[:1]
-        slotted = self.kit.grammar.strictness in SLOT_LEVELS
-        self._slots = SlotGrammar(self.kit, answers.dockings, TRIAL_CONFIG.upright) if slotted else None
-        same = {"duplicates": "histogram"} if self.kit.by_meaning else {}
-        copies = copies or CopyDetector(self.kit, answers.dockings)
+        exemplars = [exemplar.assembly for exemplar in self.kit.exemplars]
+        degree = max(int(np.bincount(assembly.edges.ravel(), minlength=1).max()) for assembly in exemplars)
+        methods = TRIAL_METHODS if degree <= MAX_GROWTH_DEGREE else TRIAL_METHODS[:1]
+        has_slots = self.kit.grammar.strictness in SLOT_LEVELS
+        self._slots = SlotGrammar(self.kit, oracle.dockings, TRIAL_CONFIG.upright) if has_slots else None
+        duplicates = {"duplicates": "histogram"} if self.kit.by_meaning else {}
+        copies = copies or CopyDetector(self.kit, oracle.dockings)
         self._searches = [
-            Search(answers, TRIAL_CONFIG.model_copy(update={"method": method, **same}), self._slots, copies)
+            Search(oracle, TRIAL_CONFIG.model_copy(update={"method": method, **duplicates}), self._slots, copies)
             for method in methods
         ]
 
-    def go_on(self, tries: int, wanted: int, evenly: bool = False) -> TrialResult:
-        """Search on by each method until there are `wanted` variants, or it has had so many more `tries`; `evenly`:
-        no method finds more than its share of them while another can. Growth, whose shapes are all complete, gives up
-        as soon as the first of them show nothing new."""
+    def run(self, tries: int, wanted: int, evenly: bool = False) -> TrialResult:
+        """Search on by each method until there are `wanted` variants, or `tries` more tries were spent.
+
+        evenly: no method finds more than its share while another still can. Growth completes every shape, so it stops
+        as soon as its first shapes show nothing new.
+        """
         left = [tries] * len(self._searches)
         if evenly:
             for number in range(len(self._searches)):
-                self._go_on(number, wanted * (number + 1) // len(self._searches), tries, left)
+                self._run_method(number, wanted * (number + 1) // len(self._searches), tries, left)
         for number in range(len(self._searches)):
-            self._go_on(number, wanted, tries, left)
-        return self.finds()
+            self._run_method(number, wanted, tries, left)
+        return self.result()
 
-    def _go_on(self, number: int, wanted: int, tries: int, left: list[int]) -> None:
-        """Search on by one method, which has so many of its `tries` left; none, once it finds nothing."""
+    def _run_method(self, number: int, wanted: int, tries: int, left: list[int]) -> None:
+        """Search on by one method, with what is left of its `tries`; nothing is left once a search finds nothing."""
         search = self._searches[number]
         while left[number] > 0 and len(self.variants) < wanted:
-            is_first = search.config.method == "growth" and left[number] == tries
-            is_vain = not self.variants and self._slots is None and len(self._searches) > 1
-            first = tries // (FIRST * VAIN if is_vain else FIRST)
-            asked = max(first, 1) if is_first else left[number]
+            is_first_growth = search.config.method == "growth" and left[number] == tries
+            is_hopeless = not self.variants and self._slots is None and len(self._searches) > 1
+            divisor = GROWTH_FIRST_DIVISOR * (HOPELESS_GROWTH_DIVISOR if is_hopeless else 1)
+            budget = max(tries // divisor, 1) if is_first_growth else left[number]
             missing = wanted - len(self.variants)
-            found, used = search.run(self._rng, asked, missing, f"probe-{self._tries}", lambda _: None)
+            variants, used = search.run(self._rng, budget, missing, f"probe-{self._tries}", lambda _: None)
             self._tries += used
-            left[number] = left[number] - used if found else 0
-            whole = [each for each in found if self._is_whole(each.assembly)]
-            telling = [each for each in whole if each.lineage["copied"]["share"] <= self._copied]
-            keys = [search.key(each.assembly.types, each.graph, each.graph) for each in telling]
-            self.variants.extend(each for each, key in zip(telling, keys, strict=True) if key not in self._known)
-            self._known.update(keys)
+            left[number] = left[number] - used if variants else 0
+            complete = [variant for variant in variants if self._is_complete(variant.assembly)]
+            hits = [variant for variant in complete if _copied_share(variant) <= self._max_copied_share]
+            keys = [search.key(variant.assembly.types, variant.graph, variant.graph) for variant in hits]
+            self.variants.extend(hit for hit, key in zip(hits, keys, strict=True) if key not in self._known_keys)
+            self._known_keys.update(keys)
 
-    def _is_whole(self, assembly: Assembly) -> bool:
-        """Whether a find has what makes it one; what it lacks is counted."""
-        if not self._has_carcass(assembly):
-            self._refused[LABELS_MISSING] += 1
+    def _is_complete(self, assembly: Assembly) -> bool:
+        """Return whether a variant has its required labels and hubs; count what it lacks."""
+        if not self._has_labels(assembly):
+            self._rejects[LABELS_MISSING] += 1
             return False
-        if self._hubs and not self._backdrop.has_hubs(self._hubs, self._backdrop.fit(assembly)):
-            self._refused[HUBS_NOT_RESTORED] += 1
+        if self._min_hubs and not self._hubs.has_hubs(self._min_hubs, self._hubs.fit(assembly)):
+            self._rejects[HUBS_NOT_RESTORED] += 1
             return False
         return True
 
-    def whole(self, place: int) -> Assembly:
-        """The find at this place among the variants, with its backdrop."""
-        return self._backdrop.fit(self.variants[place].assembly)
+    def with_hubs(self, index: int) -> Assembly:
+        """Return the variant at an index with its hubs restored."""
+        return self._hubs.fit(self.variants[index].assembly)
 
-    def finds(self) -> TrialResult:
-        """What was found so far."""
-        rejects = sum((each.rejects for each in self._searches), self._refused)
-        counts = type_counts(self.kit, [each.assembly.types for each in self.variants])
-        exemplars = type_counts(self.kit, [each.assembly.types for each in self.kit.exemplars])
+    def result(self) -> TrialResult:
+        """Return what was found so far."""
+        rejects = dict(sum((search.rejects for search in self._searches), self._rejects).most_common())
+        counts = type_counts(self.kit, [variant.assembly.types for variant in self.variants])
+        exemplars = type_counts(self.kit, [exemplar.assembly.types for exemplar in self.kit.exemplars])
         if not self.variants:
-            return TrialResult(self._tries, 0, 0, 0.0, 0.0, rejects=dict(rejects.most_common()))
-        whole = np.array([each.lineage["copied"]["share"] for each in self.variants])
-        taken = farthest_first(counts, exemplars, min(MAX_MOST_DIFFERENT, len(counts)))
-        chosen = counts[taken]
-        near = histogram_metric(chosen[:, None], exemplars[None]).min(axis=1)
-        apart = histogram_metric(chosen[:, None], chosen[None])[np.triu_indices(len(chosen), 1)]
+            return TrialResult(self._tries, 0, 0, 0.0, 0.0, rejects=rejects)
+        copied = np.array([_copied_share(variant) for variant in self.variants])
+        most_different = farthest_first(counts, exemplars, min(MAX_MOST_DIFFERENT, len(counts)))
+        chosen = counts[most_different]
+        nearest = histogram_metric(chosen[:, None], exemplars[None]).min(axis=1)
+        pairs = histogram_metric(chosen[:, None], chosen[None])[np.triu_indices(len(chosen), 1)]
         return TrialResult(
             tries=self._tries,
             graphs=len(self.variants),
             histograms=len(np.unique(counts, axis=0)),
-            distance=round(float(near.mean()), 4),
-            spread=round(float(np.median(apart)), 4) if len(apart) else 0.0,
-            copied=round(float(np.median(whole)), 4),
-            telling=round(float(np.mean(whole <= NEAR_COPY_SHARE)), 4),
-            observed_share=self._familiar([self.variants[place].assembly for place in taken.tolist()]),
+            distance=round(float(nearest.mean()), 4),
+            pair_distance=round(float(np.median(pairs)), 4) if len(pairs) else 0.0,
+            copied_share=round(float(np.median(copied)), 4),
+            non_copy_rate=round(float(np.mean(copied <= NEAR_COPY_SHARE)), 4),
+            seen_fillings_share=self._seen_fillings_share(most_different.tolist()),
             by_meaning=self.kit.by_meaning,
-            most_different=tuple(taken.tolist()),
-            rejects=dict(rejects.most_common()),
+            most_different=tuple(most_different.tolist()),
+            rejects=rejects,
         )
 
-    def _familiar(self, assemblies: Sequence[Assembly]) -> float:
+    def _seen_fillings_share(self, indices: Sequence[int]) -> float:
         if self._slots is None:
             return 1.0
-        return round(float(np.mean([self._slots.observed_share(each) for each in assemblies])), 4)
+        return round(
+            float(np.mean([self._slots.observed_share(self.variants[index].assembly) for index in indices])), 4
+        )
+
+
+def _copied_share(variant: Variant) -> float:
+    share: float = variant.lineage["copied"]["share"]
+    return share
 
 
 def type_counts(kit: Kit, shapes: Sequence[np.ndarray]) -> FloatArray:
-    """Parts by type, float64 (k, types)."""
-    counts = [np.bincount(each, minlength=len(kit.types)) for each in shapes]
+    """Return the number of parts of each type, float64 (k, types), of `shapes`, each the types of its parts."""
+    counts = [np.bincount(types, minlength=len(kit.types)) for types in shapes]
     return np.array(counts, dtype=np.float64).reshape(-1, len(kit.types))

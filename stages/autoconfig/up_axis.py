@@ -1,4 +1,4 @@
-"""Which axis points up in some models: the files' own word, else what their shapes and the format's custom say."""
+"""Find which axis points up in some models: stated by the files, or told by their shapes and the format."""
 
 from __future__ import annotations
 
@@ -16,90 +16,91 @@ from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import rotation_angle, transform_points
 from stages.shape.geometry.triangles import triangle_areas
 
-FOOT = 0.01
-"""What lies below this share of the height is the foot."""
-STANDS, FOOT_COUNTS, MIRROR_COUNTS = 0.8, 0.27, 0.19
-"""What it counts that a model would fall over along the other axis, that its foot is e times as large as the other, and
-that turning it upside down moves its surface e times as far: log odds by which 286 public models tell their axis."""
-CUSTOM = 1.0
-"""What the custom of a format counts: it says more about household things than their shapes do, of which 73 % tell."""
-CUSTOMS: Mapping[str, Literal["y", "z"]] = {".obj": "y", ".stl": "z"}
-MOST = 3.0
-"""No ratio counts more than this power of e."""
-FLOOR_FOOT, FLOOR_MIRROR = 3e-3, 2e-3
-"""Feet and distances below these shares of a model's size (squared, of feet) are noise."""
-SURE = 0.1
-"""From which sum of the counts on they say which axis is up."""
-LOOKED_AT = 1500
+MAX_FOOT_HEIGHT = 0.01
+"""Share of the height below which a surface belongs to the foot."""
+STANDING_WEIGHT, FOOT_WEIGHT, MIRROR_WEIGHT = 0.8, 0.27, 0.19
+"""Log odds fitted to 286 public models: that a model would fall over along the other axis, that its foot is e times as
+large, and that an upside-down flip moves its surface e times as far."""
+FORMAT_WEIGHT = 1.0
+"""Log odds of the format's convention. It tells more of household objects than their shapes do, which decide 73 %."""
+FORMAT_AXES: Mapping[str, Literal["y", "z"]] = {".obj": "y", ".stl": "z"}
+MAX_LOG_RATIO = 3.0
+MIN_FOOT_AREA, MIN_MIRROR_DISTANCE = 3e-3, 2e-3
+"""Noise levels of feet and of distances, as shares of a model's size (squared, for feet)."""
+MIN_EVIDENCE = 0.1
+"""Sum of log odds from which the evidence decides."""
+MIRROR_SAMPLES = 1500
 """Points of a model that are compared with its mirror image."""
-TURNED = 0.05
-"""Radians from which on equal parts count as turned against each other."""
-ALONG = 0.99
-"""Cosine from which on an axis of rotation is one of the axes."""
-MAJORITY = 0.75
-"""So many of the rotations about y or z must agree."""
+MIN_TURN_RADIANS = 0.05
+"""Angle from which equal parts count as rotated against each other."""
+MIN_AXIS_COSINE = 0.99
+"""Cosine from which an axis of rotation counts as a coordinate axis."""
+MIN_TURN_MAJORITY = 0.75
+"""Share of the rotations about y or z that must agree."""
 
 _AXES: dict[Literal["y", "z"], int] = {"y": 1, "z": 2}
 REASONS = {
-    "stands": "along the other axis the middle of a model is not above its foot",
+    "stands": "along the other axis the centre of a model is not above its foot",
     "foot": "the lowest points span more area than along the other axis",
     "mirror": "along the other axis a model is more like its own mirror image",
-    "custom": "it is the custom of the format, and the shape says little else",
+    "custom": "it is the convention of the format, and the shape says little else",
 }
-"""What the axis is told from, each with its sentence."""
+"""The kinds of evidence for an axis, each with its sentence."""
 
 
 def resolve_up_axis(models: Sequence[Model], identified: IdentifiedParts) -> tuple[Literal["y", "z"], str]:
-    """The axis that points up in `models`, whose parts are `identified`, and the reason, a sentence.
+    """Return the axis that points up in `models`, whose parts are `identified`, and the reason as a sentence.
 
-    A format that lets files choose is believed (COLLADA). glTF calls y up whatever stands in it, and other formats
-    say nothing: there four things are weighed. Along which axis would the models not fall over, their middle being
-    above their foot, the hull of their lowest points? Along which is the foot larger? Along which are they less
-    like their own mirror image, for things have an upper and a lower side more often than a front and a back? What is
-    the custom of the format? Where these say nothing it is the axis about which equal parts are turned; else y.
+    A format in which a file states its axis is believed (COLLADA). glTF fixes y whatever the content, and other formats
+    say nothing. For these, four kinds of evidence are weighed. Would the models fall over, their centre not being above
+    the hull of their lowest points? Along which axis is the foot larger? Along which axis do the models differ more
+    from their mirror image, since objects have a top and a bottom more often than a front and a back? What is the
+    convention of the format? If the evidence is too weak, the axis about which equal parts are rotated is taken, else
+    y.
     """
-    said = {model.up for model in models}
-    if len(said) == 1 and None not in said:
-        (word,) = said
-        if word is not None:
-            return word, "the file says so"
-    counts = {reason: float(np.mean([each[reason] for each in map(_evidence, models)])) for reason in REASONS}
-    total = sum(counts.values())
-    if abs(total) >= SURE:
+    stated = {model.up for model in models}
+    if len(stated) == 1 and None not in stated:
+        (axis_in_file,) = stated
+        if axis_in_file is not None:
+            return axis_in_file, "the file states it"
+    evidence = list(map(_evidence, models))
+    odds = {reason: float(np.mean([of_model[reason] for of_model in evidence])) for reason in REASONS}
+    total = sum(odds.values())
+    if abs(total) >= MIN_EVIDENCE:
         sign = 1.0 if total > 0 else -1.0
-        strongest = max(REASONS, key=lambda reason: sign * counts[reason])
+        strongest = max(REASONS, key=lambda reason: sign * odds[reason])
         return ("y" if sign > 0 else "z"), REASONS[strongest]
     turns = _turns(identified)
-    for axis, place in _AXES.items():
-        if turns[place] > MAJORITY * (turns[1] + turns[2]):
-            return axis, f"equal parts are turned about {axis}, {turns[place]} of {turns[1] + turns[2]} times"
-    return "y", "neither the foot nor the turns of equal parts tell, and y is the custom"
+    for axis, index in _AXES.items():
+        if turns[index] > MIN_TURN_MAJORITY * (turns[1] + turns[2]):
+            return axis, f"equal parts are turned about {axis}, {turns[index]} of {turns[1] + turns[2]} times"
+    return "y", "neither the foot nor the turns of equal parts tell, and y is the convention"
 
 
 def _evidence(model: Model) -> dict[str, float]:
-    """What each reason counts for y, and if negative for z."""
+    """Return the log odds of each reason, positive for y and negative for z."""
     corners = np.concatenate([transform_points(part.pose, part.vertices)[part.faces] for part in model.parts])
     (y_foot, y_stands), (z_foot, z_stands) = _foot(corners, 1), _foot(corners, 2)
     y_moved, z_moved = _upside_down(corners)
-    custom = CUSTOMS.get(model.path.suffix.lower())
-    found = (
-        STANDS * (float(y_stands) - float(z_stands)),
-        FOOT_COUNTS * _log_ratio(y_foot, z_foot, FLOOR_FOOT),
-        MIRROR_COUNTS * _log_ratio(y_moved, z_moved, FLOOR_MIRROR),
-        0.0 if custom is None else CUSTOM if custom == "y" else -CUSTOM,
+    convention = FORMAT_AXES.get(model.path.suffix.lower())
+    odds = (
+        STANDING_WEIGHT * (float(y_stands) - float(z_stands)),
+        FOOT_WEIGHT * _log_ratio(y_foot, z_foot, MIN_FOOT_AREA),
+        MIRROR_WEIGHT * _log_ratio(y_moved, z_moved, MIN_MIRROR_DISTANCE),
+        0.0 if convention is None else FORMAT_WEIGHT if convention == "y" else -FORMAT_WEIGHT,
     )
-    return dict(zip(REASONS, found, strict=True))
+    return dict(zip(REASONS, odds, strict=True))
 
 
 def _log_ratio(first: float, second: float, floor: float) -> float:
-    return float(np.clip(np.log((first + floor) / (second + floor)), -MOST, MOST))
+    return float(np.clip(np.log((first + floor) / (second + floor)), -MAX_LOG_RATIO, MAX_LOG_RATIO))
 
 
 def _upside_down(corners: FloatArray) -> tuple[float, float]:
-    """How far a surface is from its mirror image along y and along z, on average, as shares of the longest side."""
+    """Return the mean distance of a surface from its mirror images along y and z, as shares of the longest side."""
     triangles = corners.reshape(-1, 3)
     faces = np.arange(len(triangles), dtype=np.int32).reshape(-1, 3)
-    points, _, _ = sample_surface(triangles, faces, LOOKED_AT, decision_rng(0, "choices", "up"))
+    points, _, _ = sample_surface(triangles, faces, MIRROR_SAMPLES, decision_rng(0, "choices", "up"))
     low, high = triangles.min(axis=0), triangles.max(axis=0)
     tree, moved = cKDTree(points), []
     for axis in _AXES.values():
@@ -110,25 +111,28 @@ def _upside_down(corners: FloatArray) -> tuple[float, float]:
 
 
 def _foot(corners: FloatArray, axis: int) -> tuple[float, bool]:
-    """Area of the hull of the lowest points along an axis, as a share of the box's largest side, and whether the middle
-    of the surface of the triangles `corners` (t, 3, 3) is above it."""
+    """Return the area of the foot along an axis, and whether the centre of the surface is above it.
+
+    corners: the triangles of the surface, float64 (t, 3, 3). The area is that of the hull of the lowest points, as a
+    share of the squared longest side of the box.
+    """
     from scipy.spatial import ConvexHull, QhullError
 
     points = corners.reshape(-1, 3)
     height = points[:, axis]
-    low = np.delete(points[height <= height.min() + FOOT * np.ptp(height)], axis, axis=1)
+    low = np.delete(points[height <= height.min() + MAX_FOOT_HEIGHT * np.ptp(height)], axis, axis=1)
     areas = triangle_areas(corners)
-    middle = np.delete(areas @ corners.mean(axis=1) / max(areas.sum(), 1e-300), axis)
+    centre = np.delete(areas @ corners.mean(axis=1) / max(areas.sum(), 1e-300), axis)
     try:
         hull = ConvexHull(low)
     except (QhullError, ValueError):
         return 0.0, False
-    above = (hull.equations[:, :2] @ middle + hull.equations[:, 2] < 0).all()
+    above = (hull.equations[:, :2] @ centre + hull.equations[:, 2] < 0).all()
     return float(hull.volume / np.ptp(points, axis=0).max() ** 2), bool(above)
 
 
 def _turns(identified: IdentifiedParts) -> list[int]:
-    """How many parts are turned against the first of their type about x, y and z, by the least of such turns."""
+    """Count the parts that are turned against the first of their type about x, y and z, by the least such turn."""
     counts = np.zeros(3, dtype=np.int64)
     for assembly in identified.assemblies:
         for index, part_type in enumerate(identified.types):
@@ -137,14 +141,14 @@ def _turns(identified: IdentifiedParts) -> list[int]:
                 images = pose @ part_type.symmetries
                 images[:, :3, :3] = images[:, :3, :3] @ own[0, :3, :3].T
                 angles = rotation_angle(images)
-                if angles.min() >= TURNED:
-                    counts += np.abs(_axis(images[angles.argmin(), :3, :3])) > ALONG
-    found: list[int] = counts.tolist()
-    return found
+                if angles.min() >= MIN_TURN_RADIANS:
+                    counts += np.abs(_axis(images[angles.argmin(), :3, :3])) > MIN_AXIS_COSINE
+    turns: list[int] = counts.tolist()
+    return turns
 
 
 def _axis(rotation: FloatArray) -> FloatArray:
-    """The axis of a rotation (3, 3): its eigenvector of eigenvalue 1."""
+    """Return the axis of a rotation (3, 3): its eigenvector of eigenvalue 1."""
     values, vectors = np.linalg.eigh((rotation + rotation.T) / 2)
     axis: FloatArray = vectors[:, int(np.argmax(values))]
     return axis

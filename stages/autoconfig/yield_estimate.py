@@ -1,4 +1,4 @@
-"""What a run will come to, from a short search of the kit that it will build: numbers, and a sentence for people."""
+"""Yield estimate: what a run will find, predicted by a trial search of the kit that it will build."""
 
 from __future__ import annotations
 
@@ -18,29 +18,33 @@ from stages.variations.report.advice import another_model, what_keeps
 from stages.variations.search.search import DUPLICATE, Variant
 
 MAX_ESTIMATE_GRAPHS = 300
-"""The search for a forecast ends at so many distinct graphs."""
+"""Distinct graphs at which the trial search of an estimate ends."""
+MAX_SAMPLES_REQUESTED = 200
+"""Samples that an inspection's config requests, if there are enough."""
 MIN_PARTS_LISTS = 50
-"""With fewer parts lists than this a dataset of MANY shapes has each of them many times."""
+"""Parts lists below which a dataset of MAX_ESTIMATE_GRAPHS shapes has each of them many times."""
 LOOK_FIRST = "look at the sheet before you make many"
 MAX_LABELS_SHOWN = 2
-"""So many labels are named in a sentence."""
 ESTIMATE_TRIES_FACTOR = 4
-"""It has so many times the tries of a probe, as long as it finds something in the first."""
+"""Tries of an estimate as a multiple of a trial search's, if the first of them find something."""
 
 
 @dataclass(frozen=True)
 class YieldEstimate:
-    """What a short search of a kit found, and what it says of a long one.
+    """What a trial search of a kit found, and what it predicts of a long search.
 
-    layouts: about how many distinct graphs there are, None where the end is not in sight; parts: fewest and most parts
-    of the finds; seen_once: share of parts whose pattern occurs once; sentence: what to expect, mend; variants: the
-    finds; chosen: those that differ most, most different first; bared: the labels whose parts lose what stands close
-    above or below them.
+    trial: the result of the trial search.
+    layouts: estimated number of distinct graphs; None if very many.
+    part_range: smallest and largest number of parts of the hits.
+    seen_once: share of parts whose pattern occurs once.
+    sentence: what to expect, and the mend.
+    variants: the hits.
+    lost_support: the labels whose parts lose what is close above or below them.
     """
 
-    finds: TrialResult
+    trial: TrialResult
     layouts: int | None
-    parts: tuple[int, int]
+    part_range: tuple[int, int]
     unique_pattern_share: float
     sentence: str
     variants: Sequence[Variant]
@@ -48,76 +52,89 @@ class YieldEstimate:
 
     @property
     def is_poor(self) -> bool:
-        """Whether it is no dataset: next to nothing, or all of it alike, or broken."""
-        few = not self.finds.graphs or (self.layouts is not None and self.layouts < MIN_USEFUL_GRAPHS)
-        return few or has_low_diversity(self.finds) or bool(self.lost_support)
+        """Whether the layouts make no dataset: next to none, all alike, or broken."""
+        few = not self.trial.graphs or (self.layouts is not None and self.layouts < MIN_USEFUL_GRAPHS)
+        return few or has_low_diversity(self.trial) or bool(self.lost_support)
 
     @property
-    def chosen(self) -> list[Variant]:
-        """The most different finds."""
-        return [self.variants[place] for place in self.finds.most_different]
+    def most_different(self) -> list[Variant]:
+        """The most different hits, most different first."""
+        return [self.variants[index] for index in self.trial.most_different]
 
 
 def estimate_yield(
-    kit: Kit, answers: ContactOracle, tries: int, known: int = 0, hubs: float = 0, copied: float = 1.0
+    kit: Kit,
+    oracle: ContactOracle,
+    tries: int,
+    known_graphs: int = 0,
+    min_hubs: float = 0,
+    max_copied_share: float = 1.0,
 ) -> YieldEstimate:
-    """Search a kit for a little while. `answers` are those of `kit`; what is random depends on the kit alone. `known`:
-    how many graphs a probe has found in it: where there are any, a first search in vain is no answer; `hubs`, `copied`:
-    as for Probe, for what will be refused does not count."""
-    probe = TrialSearch(answers, decision_rng(0, "choices", "forecast"), hubs, copied)
-    finds = probe.go_on(tries, MAX_ESTIMATE_GRAPHS, evenly=True)
-    if finds.graphs or known:
-        finds = probe.go_on((ESTIMATE_TRIES_FACTOR - 1) * tries, MAX_ESTIMATE_GRAPHS, evenly=True)
-    layouts = _layouts(finds)
-    sizes = [len(each.assembly) for each in probe.variants]
-    parts = (min(sizes, default=0), max(sizes, default=0))
-    once = unique_pattern_share(observed_patterns(kit, answers.dockings, upright=True))
-    broken = lost_support(kit, [probe.whole(place) for place in finds.most_different])
-    said = _sentence(kit, finds, layouts, parts, broken)
-    return YieldEstimate(finds, layouts, parts, once, said, probe.variants, broken)
+    """Search a kit for a short time; the random stream depends on the kit only.
+
+    oracle: that of `kit`.
+    known_graphs: graphs that an earlier trial search found; if there are any, a first search in vain is continued.
+    min_hubs, max_copied_share: as for TrialSearch, since rejected variants do not count.
+    """
+    search = TrialSearch(oracle, decision_rng(0, "choices", "forecast"), min_hubs, max_copied_share)
+    trial = search.run(tries, MAX_ESTIMATE_GRAPHS, evenly=True)
+    if trial.graphs or known_graphs:
+        trial = search.run((ESTIMATE_TRIES_FACTOR - 1) * tries, MAX_ESTIMATE_GRAPHS, evenly=True)
+    layouts = _layouts(trial)
+    sizes = [len(variant.assembly) for variant in search.variants]
+    part_range = (min(sizes, default=0), max(sizes, default=0))
+    once = unique_pattern_share(observed_patterns(kit, oracle.dockings, upright=True))
+    unsupported = lost_support(kit, [search.with_hubs(index) for index in trial.most_different])
+    sentence = _sentence(kit, trial, layouts, part_range, unsupported)
+    return YieldEstimate(trial, layouts, part_range, once, sentence, search.variants, unsupported)
 
 
-def _layouts(finds: TrialResult) -> int | None:
-    """About how many distinct graphs there are, from how often the search found what it had: n finds of which g differ
-    are to be expected of N equally likely ones where N (1 - exp(-n / N)) = g. None where few came twice."""
-    graphs, again = finds.graphs, finds.rejects.get(DUPLICATE, 0)
+def _layouts(trial: TrialResult) -> int | None:
+    """Estimate the number of distinct graphs from how often the search found known ones.
+
+    Of N equally likely graphs, n draws are expected to show N (1 - exp(-n / N)) distinct ones. The result is None if
+    few graphs came twice.
+    """
+    graphs, repeats = trial.graphs, trial.rejects.get(DUPLICATE, 0)
     if graphs == 0:
         return 0
-    if graphs >= MAX_ESTIMATE_GRAPHS or again < graphs:
+    if graphs >= MAX_ESTIMATE_GRAPHS or repeats < graphs:
         return None
     low, high = float(graphs), 1e6
     while high / low > 1.01:
         middle = (low * high) ** 0.5
-        low, high = (middle, high) if middle * -np.expm1(-(graphs + again) / middle) < graphs else (low, middle)
+        low, high = (middle, high) if middle * -np.expm1(-(graphs + repeats) / middle) < graphs else (low, middle)
     return round(low)
 
 
 def _sentence(
-    kit: Kit, finds: TrialResult, layouts: int | None, parts: tuple[int, int], broken: tuple[str, ...] = ()
+    kit: Kit, trial: TrialResult, layouts: int | None, part_range: tuple[int, int], unsupported: tuple[str, ...] = ()
 ) -> str:
-    if not finds.graphs:
-        return f"nothing: {what_keeps(kit, finds.rejects, finds.tries)}"
-    size = f"{parts[0]} to {parts[1]} parts" if parts[0] < parts[1] else f"{parts[0]} parts each"
+    if not trial.graphs:
+        return f"nothing: {what_keeps(kit, trial.rejects, trial.tries)}"
+    low, high = part_range
+    size = f"{low} to {high} parts" if low < high else f"{low} parts each"
     count = "hundreds of layouts" if layouts is None else f"about {rounded_text(layouts)} layout{'s'[: layouts != 1]}"
     if layouts is not None and layouts < MIN_USEFUL_GRAPHS:
-        return f"{count}, no dataset: {what_keeps(kit, finds.rejects, finds.tries)}"
-    if layouts is not None:  # at least: some are far rarer than others, and a long search builds on what it found
+        return f"{count}, no dataset: {what_keeps(kit, trial.rejects, trial.tries)}"
+    if layouts is not None:  # a lower bound: rare layouts are missed, and a long search builds on what it found
         count = f"{rounded_text(layouts)} or more layouts"
-    if broken:
-        names = " and ".join(broken[:MAX_LABELS_SHOWN]) + (" and others" if len(broken) > MAX_LABELS_SHOWN else "")
-        why = f"nothing stands close above or below {names}, as it does in the exemplar"
-        return f"{count} of {size} that look broken, for {why}; {LOOK_FIRST}, and bring {another_model(kit)}"
-    if has_low_diversity(finds):
-        alike = "like the exemplar" if finds.spread >= finds.distance else "like each other"
+    if unsupported:
+        names = " and ".join(unsupported[:MAX_LABELS_SHOWN])
+        names += " and others" if len(unsupported) > MAX_LABELS_SHOWN else ""
+        why = f"nothing is close above or below {names}, as it is in the exemplar"
+        return f"{count} of {size} that look broken: {why}; {LOOK_FIRST}, and bring {another_model(kit)}"
+    if has_low_diversity(trial):
+        alike = "like the exemplar" if trial.pair_distance >= trial.distance else "like each other"
         return f"{count} of {size} that look {alike}; {LOOK_FIRST}, and bring {another_model(kit)}"
-    if finds.histograms < MIN_PARTS_LISTS and not finds.by_meaning:
-        few = f"about {rounded_text(finds.histograms)} parts lists, so that many will look alike"
-        return f"{count} of {size}, but only of {few}; {LOOK_FIRST}, and bring {another_model(kit)}"
-    return f"{count} of {size}, {rounded_text(finds.histograms)} or more of them of different parts lists"
+    if trial.histograms < MIN_PARTS_LISTS and not trial.by_meaning:
+        few = f"with only about {rounded_text(trial.histograms)} parts lists: many will look alike"
+        return f"{count} of {size}, {few}; {LOOK_FIRST}, and bring {another_model(kit)}"
+    return f"{count} of {size}, {rounded_text(trial.histograms)} or more of them with different parts lists"
 
 
 def rounded_text(number: int) -> str:
-    """A number with one or two digits that mean something."""
+    """Write a number with its one or two significant digits."""
     if number < 20:
         return str(number)
     digits = 10 ** (len(str(number)) - 1) if number < 100 else 10 ** (len(str(number)) - 2)

@@ -1,4 +1,4 @@
-"""How `make verify` looks at samples that are assemblies of a kit's parts."""
+"""How `make verify` checks samples that are assemblies of a kit's parts."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import PackagedSample
 
 
-def _anew(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
-    """Contacts, grammar and penetration, from the mesh as it stands in the file."""
+def _check(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
+    """Check contacts, grammar and penetration, from the meshes in the sample's file."""
     if sample.record["language"] == LANGUAGE.name:
         yield from geometry_faults(dataset_kits(places)[sample.record["kit"]], sample.members)
 
 
-AUDIT = Audit(recheck=_anew)
+AUDIT = Audit(recheck=_check)

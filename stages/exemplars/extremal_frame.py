@@ -6,19 +6,19 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-SAME_DISTANCE = 1e-6
-"""Vertices whose distances differ by less than this share of the diagonal are equally far."""
+DISTANCE_TOLERANCE = 1e-6
+"""Difference up to which distances of vertices are equal, as a share of the diagonal."""
 
 
 def extremal_frame(vertices: FloatArray, centroid: FloatArray) -> FloatArray:
-    """The frame (4, 4) of a part with corners `vertices` (v, 3) and centre of gravity `centroid` (3,).
+    """Return the frame (4, 4) of a part with corners `vertices` (v, 3) and centre of gravity `centroid` (3,).
 
     The first axis is the shape diagonal: from the vertex farthest from the centroid to the vertex farthest from
     that one. The second points from the diagonal to the vertex with the greatest distance from it; the origin is
-    that vertex's projection onto the diagonal. Equally far vertices are averaged; where their average says nothing
-    (on a cube it is the centroid) the first of them in lexicographic order stands for them.
+    that vertex's projection onto the diagonal. Equally far vertices are averaged. If their average gives no direction
+    (on a cube it is the centroid), the first of them in lexicographic order is taken.
     """
-    slack = SAME_DISTANCE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    slack = DISTANCE_TOLERANCE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     start = _farthest(vertices, np.linalg.norm(vertices - centroid, axis=1), slack, away_from=centroid)
     end = _farthest(vertices, np.linalg.norm(vertices - start, axis=1), slack, away_from=start)
     diagonal = (end - start) / np.linalg.norm(end - start)

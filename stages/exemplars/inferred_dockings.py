@@ -1,8 +1,9 @@
-"""Fits: how parts whose surfaces never met may dock, because others of their meanings did (substructures §3, §4.1).
+"""Infer how parts whose surfaces never met may dock, from contacts of other parts of their meanings
+(substructures §3, §4.1).
 
-A contact is seen from each of its sides as an anchor: where on a part it lies, which way, how large, and how the part
-stood. Two parts fit where the anchor of the one, from a contact with any part of the other's meaning, meets the anchor
-of the other, from a contact with any part of the one's: a turned leg stands under a seat as a square one did.
+Each side of a contact is an anchor: its position and direction on the part, its size, and the part's orientation. Two
+parts may dock if an anchor of the first, from a contact with the second's meaning, fits an anchor of the second, from a
+contact with the first's meaning: a turned leg supports a seat as a square one did.
 """
 
 from __future__ import annotations
@@ -18,26 +19,31 @@ from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.pose import invert, pose_vectors, transform_points
 from stages.shape.kit import Assembly, ContactKind, Docking, PartType, labels_of
 
-OF_CONTACT = 0.25
-"""Anchors miss each other by at most this share of the smaller contact, or by the pose tolerance."""
-AS_LARGE = 0.5
-"""Contacts fit if the smaller is at least this share of the larger; what is no larger than it may miss always is."""
-SAME_TURN = 1e-3
-"""Rotations whose entries differ by less are one."""
-FACING = -0.5
-"""Greatest cosine of the outward normals of two anchors that meet."""
-FLAT = 0.25
-"""A contact has a normal if its thickness is at most this share of its width."""
+MAX_GAP_SHARE = 0.25
+"""Largest distance of fitting anchors, as a share of the smaller contact, unless the pose tolerance is larger."""
+MIN_SIZE_RATIO = 0.5
+"""Size of the smaller contact over the larger, from which they fit; contacts below the tolerance always fit."""
+ROTATION_TOLERANCE = 1e-3
+"""Difference of entries up to which rotations are equal."""
+MAX_FACING_COSINE = -0.5
+"""Largest cosine between the outward normals of two fitting anchors."""
+MAX_FLAT_THICKNESS = 0.25
+"""Thickness up to which a contact has a normal, as a share of its width."""
 
 
 @dataclass(frozen=True)
 class _Anchor:
-    """One side of a contact, in the part's own coordinates. point: the middle of the box around it; normal: out of the
-    part, zero where the contact is not flat; turn: how the part stood in the exemplar; extent: the box's diagonal."""
+    """One side of a contact, in part coordinates.
+
+    point: the middle of the box around the contact.
+    normal: points out of the part; zero if the contact is not flat.
+    rotation: of the part in the exemplar, float64 (3, 3).
+    extent: the box's diagonal.
+    """
 
     point: FloatArray
     normal: FloatArray
-    turn: FloatArray
+    rotation: FloatArray
     kind: ContactKind
     extent: float
 
@@ -46,20 +52,21 @@ def infer_dockings(
     types: Sequence[PartType], assemblies: Sequence[Assembly], dockings: Sequence[Docking], contact: ContactTest,
     tolerance: float, pose_tolerance: float,
 ) -> tuple[Docking, ...]:  # fmt: skip
-    """The dockings that follow from those seen, for pairs of labels of which one has several surfaces.
+    """Return the dockings that follow from the observed ones, for pairs of labels if one has several surfaces.
 
-    They were seen 0 times; `slack` says how far from their pose they hold: `tolerance` at most, in the kit's units.
-    Exemplars must face one way: a part takes another's place as it stood in its own exemplar. Every pair touches at
-    its pose; `depth` is what was seen between parts of these labels in contacts of this kind, and may not be passed.
+    Their count is 0. `slack` is how far from their pose they hold: `tolerance` at most, in the kit's units. Exemplars
+    must face the same way, since a part replaces another in the orientation of its own exemplar. Every pair touches at
+    its pose. `depth` is the largest between parts of these labels in contacts of this kind.
+
     assemblies: with the contacts that count, as `dockings` lists them.
     """
     labels = labels_of(types)[1].tolist()
     anchors = _anchors(types, assemblies, dockings, contact, pose_tolerance)
     deepest: dict[tuple[int, int, ContactKind], float] = {}
-    for each in dockings:
-        for pair in ((labels[each.a], labels[each.b]), (labels[each.b], labels[each.a])):
-            deepest[*pair, each.kind] = max(deepest.get((*pair, each.kind), 0.0), each.depth)
-    found: list[Docking] = []
+    for docking in dockings:
+        for pair in ((labels[docking.a], labels[docking.b]), (labels[docking.b], labels[docking.a])):
+            deepest[*pair, docking.kind] = max(deepest.get((*pair, docking.kind), 0.0), docking.depth)
+    inferred: list[Docking] = []
     for (a, other), of_a in anchors.items():
         for (b, back), of_b in anchors.items():
             several = labels.count(labels[a]) > 1 or labels.count(labels[b]) > 1
@@ -67,35 +74,35 @@ def infer_dockings(
                 continue
             length = types[b].diagonal / 2
             near: list[tuple[FloatArray, float]] = []
-            for one in of_a:
-                for two in of_b:
-                    pose = _meeting(one, two, tolerance)
-                    slack = max(pose_tolerance, min(tolerance, OF_CONTACT * min(one.extent, two.extent)))
+            for first in of_a:
+                for second in of_b:
+                    pose = _fitting_pose(first, second, tolerance)
+                    slack = max(pose_tolerance, min(tolerance, MAX_GAP_SHARE * min(first.extent, second.extent)))
                     if pose is None or _is_known(near, pose, length):
                         continue
                     if contact.touches(a, b, pose):
                         near.append((pose_vectors(symmetric_images(types[a], types[b], pose), length), slack))
-                        depth = deepest[labels[a], labels[b], one.kind]
-                        found.append(Docking(a, b, pose, one.kind, 0, depth, slack))
-    return tuple(sorted(found, key=lambda each: (each.a, each.b)))
+                        depth = deepest[labels[a], labels[b], first.kind]
+                        inferred.append(Docking(a, b, pose, first.kind, 0, depth, slack))
+    return tuple(sorted(inferred, key=lambda docking: (docking.a, docking.b)))
 
 
-def _meeting(one: _Anchor, two: _Anchor, tolerance: float) -> FloatArray | None:
-    """The pose (4, 4) of the second part in coordinates of the first where both stand as they did and their anchors
-    meet, or None where these are of different kinds or sizes or do not face each other."""
-    small, large = sorted((one.extent, two.extent))
-    if one.kind != two.kind or (large > tolerance and small < AS_LARGE * large):
+def _fitting_pose(first: _Anchor, second: _Anchor, tolerance: float) -> FloatArray | None:
+    """Return the pose (4, 4) of the second part in coordinates of the first at which their anchors fit; None if the
+    anchors have different kinds or sizes, or do not face each other."""
+    small, large = sorted((first.extent, second.extent))
+    if first.kind != second.kind or (large > tolerance and small < MIN_SIZE_RATIO * large):
         return None
     pose = np.eye(4)
-    pose[:3, :3] = one.turn.T @ two.turn
-    pose[:3, 3] = one.point - pose[:3, :3] @ two.point
-    if one.normal.any() and two.normal.any() and one.normal @ pose[:3, :3] @ two.normal > FACING:
+    pose[:3, :3] = first.rotation.T @ second.rotation
+    pose[:3, 3] = first.point - pose[:3, :3] @ second.point
+    if first.normal.any() and second.normal.any() and first.normal @ pose[:3, :3] @ second.normal > MAX_FACING_COSINE:
         return None
     return pose
 
 
 def _is_known(near: Sequence[tuple[FloatArray, float]], pose: FloatArray, length: float) -> bool:
-    """Whether a fit that is known holds at `pose`, with half of its slack to spare."""
+    """Return whether a known docking holds at `pose` with at most half of its slack."""
     vector = pose_vectors(pose[None], length)
     return any(np.linalg.norm(images - vector, axis=1).min() <= slack / 2 for images, slack in near)
 
@@ -104,10 +111,10 @@ def _anchors(
     types: Sequence[PartType], assemblies: Sequence[Assembly], dockings: Sequence[Docking], contact: ContactTest,
     tolerance: float,
 ) -> dict[tuple[int, int], list[_Anchor]]:  # fmt: skip
-    """The anchors of each type for each label that it touches, in the order in which they are seen."""
+    """Return the anchors of each type for each label that it touches, in order of appearance."""
     labels = labels_of(types)[1].tolist()
     table = DockingTable(types, dockings, tolerance)
-    found: dict[tuple[int, int], list[_Anchor]] = {}
+    anchors: dict[tuple[int, int], list[_Anchor]] = {}
     regions: dict[tuple[int, int, bytes], tuple[FloatArray, FloatArray, float]] = {}
     for assembly in assemblies:
         kinds = table.label_edges(assembly.types, assembly.poses, assembly.edges)[:, 0] // 2
@@ -125,26 +132,28 @@ def _anchors(
                 (b, a, transform_points(back, middle[None])[0], -back[:3, :3] @ normal, j),
             ):
                 anchor = _Anchor(point, out, assembly.poses[part, :3, :3], dockings[docking].kind, extent)
-                known = found.setdefault((own, labels[other]), [])
-                if not any(_same(anchor, each, tolerance) for each in known):
+                known = anchors.setdefault((own, labels[other]), [])
+                if not any(_is_same_anchor(anchor, earlier, tolerance) for earlier in known):
                     known.append(anchor)
-    return found
+    return anchors
 
 
-def _same(one: _Anchor, two: _Anchor, tolerance: float) -> bool:
+def _is_same_anchor(first: _Anchor, second: _Anchor, tolerance: float) -> bool:
     return (
-        one.kind == two.kind
-        and float(np.linalg.norm(one.point - two.point)) <= tolerance
-        and float(np.abs(one.turn - two.turn).max()) <= SAME_TURN
+        first.kind == second.kind
+        and float(np.linalg.norm(first.point - second.point)) <= tolerance
+        and float(np.abs(first.rotation - second.rotation).max()) <= ROTATION_TOLERANCE
     )
 
 
 def _region(points: FloatArray, across: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """A touching area by its points (q, 3): the middle of the box around it, its normal on the side of the direction
-    `across` (zero where it is not flat), and the box's diagonal."""
+    """Return the middle of the box around contact points (q, 3), the normal, and the box's diagonal.
+
+    The normal lies on the side of the direction `across`; it is zero if the contact is not flat.
+    """
     low, high = points.min(axis=0), points.max(axis=0)
     centred = points - points.mean(axis=0)
     _, axes = np.linalg.eigh(centred.T @ centred)
     thickness, width, _ = np.ptp(centred @ axes, axis=0)
-    normal = axes[:, 0] if thickness <= FLAT * width else np.zeros(3)
+    normal = axes[:, 0] if thickness <= MAX_FLAT_THICKNESS * width else np.zeros(3)
     return (low + high) / 2, normal if normal @ across >= 0 else -normal, float(np.linalg.norm(high - low))

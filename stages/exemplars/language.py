@@ -1,5 +1,4 @@
-"""The language of kits: a sample is an assembly of a kit's parts, and its shape is those parts, stretched where it says
-so, at their poses."""
+"""The language of kits: a sample is an assembly of a kit's parts, at their poses and with their stretches."""
 
 from __future__ import annotations
 
@@ -21,33 +20,32 @@ from stages.shape.stretch import bake, split
 
 
 class Kits:
-    """The kits that a shard reads."""
+    """Decode samples with the kits that a shard reads."""
 
     def __init__(self, kits: Mapping[str, Kit]) -> None:
         self._kits = kits
         self.sources = {name: _source(kit) for name, kit in kits.items()}
 
     def shape(self, sample: Sample) -> Shape:
-        """The parts of the sample's assembly at their poses."""
+        """Return the parts of the sample's assembly at their poses."""
         return kit_shape(self._kits[sample.kit], sample.assembly)
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
-        """The exemplars of all kits, twice `count` at most; where they leave a row of `count` unfilled, the commonest
-        part types of the kits as well."""
-        found = [(each.name, kit_shape(kit, each.assembly)) for kit in self._kits.values() for each in kit.exemplars][
-            : 2 * count
-        ]
-        captioned = [(f"{name}, {part_count(shape)}", shape) for name, shape in found]
-        return [*captioned, *self._commonest(-len(found) % count)]
+        """Return the exemplars of all kits, at most twice `count`; the commonest part types fill the last row."""
+        exemplars = [(kit, exemplar) for kit in self._kits.values() for exemplar in kit.exemplars][: 2 * count]
+        shapes = [(exemplar.name, kit_shape(kit, exemplar.assembly)) for kit, exemplar in exemplars]
+        captioned = [(f"{name}, {part_count(shape)}", shape) for name, shape in shapes]
+        return [*captioned, *self._commonest(-len(shapes) % count)]
 
     def _commonest(self, count: int) -> list[tuple[str, Shape]]:
         parts = []
         for kit in self._kits.values():
-            used = np.concatenate([each.assembly.types for each in kit.exemplars])
+            used = np.concatenate([exemplar.assembly.types for exemplar in kit.exemplars])
             commonest = np.argsort(-np.bincount(used, minlength=len(kit.types)), kind="stable")
             for index in commonest[: -(-count // len(self._kits))].tolist():
-                exemplar = next(each.assembly for each in kit.exemplars if index in each.assembly.types)
-                pose = exemplar.poses[exemplar.types == index][:1]
+                assemblies = [exemplar.assembly for exemplar in kit.exemplars]
+                assembly = next(assembly for assembly in assemblies if index in assembly.types)
+                pose = assembly.poses[assembly.types == index][:1]
                 alone = Assembly(np.array([index], dtype=np.int16), pose, np.empty((0, 2), dtype=np.int32))
                 parts.append((f"part {kit.types[index].name}", kit_shape(kit, alone)))
         return parts[:count]
@@ -56,7 +54,7 @@ class Kits:
 def _source(kit: Kit) -> Source:
     count = len(kit.exemplars)
     _, first = np.unique(kit.label_of, return_index=True)
-    colors = [np.median(kit.types[each].face_colors, axis=0).astype(np.uint8).tolist() for each in first.tolist()]
+    colors = [np.median(kit.types[index].face_colors, axis=0).astype(np.uint8).tolist() for index in first.tolist()]
     return Source(
         kit.labels,
         tuple((red, green, blue) for red, green, blue in colors),
@@ -69,33 +67,31 @@ def _reads(plan: Plan) -> tuple[str, ...]:
     return tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
 
 
-def dataset_kits(places: DatasetPaths) -> dict[str, Kit]:
-    """The kits of a dataset out of the mill's folder."""
-    made = places.stage("exemplars").root
+def dataset_kits(paths: DatasetPaths) -> dict[str, Kit]:
+    """Return the kits of a dataset, from the output of the stage `exemplars`."""
+    folder = paths.stage("exemplars").root
     return {
         path.stem: load_kit(path, path.with_suffix(".tar"))
-        for path in sorted(made.glob("*.json"))
+        for path in sorted(folder.glob("*.json"))
         if path.with_suffix(".tar").is_file()
     }
 
 
-def _anew(places: DatasetPaths) -> RebuildShape:
-    """The kit's meshes at the poses of the record."""
-    kits = dataset_kits(places)
+def _rebuild(paths: DatasetPaths) -> RebuildShape:
+    """Return a function that puts the kit's meshes at the poses of a record."""
+    kits = dataset_kits(paths)
 
     def shape(record: Mapping[str, Any], contacts: IntArray) -> Shape:
         if record["kit"] not in kits:
-            raise LookupError(f"kit {record['kit']} is not beside the dataset in .work")
+            raise LookupError(f"kit {record['kit']} is missing next to the dataset in .work")
         kit = kits[record["kit"]]
-        places = {name: place for place, name in enumerate(kit.type_names())}
-        meshes, poses = (
-            [mesh_name(each["name"]) for each in record["parts"]],
-            [each["pose"] for each in record["parts"]],
-        )
-        unknown = sorted(set(meshes) - set(places))
+        index_of = {name: index for index, name in enumerate(kit.type_names())}
+        meshes = [mesh_name(part["name"]) for part in record["parts"]]
+        poses = [part["pose"] for part in record["parts"]]
+        unknown = sorted(set(meshes) - set(index_of))
         if unknown:
             raise ValueError(f"kit {kit.name} has no part type {', '.join(unknown)}")
-        types = np.array([places[each] for each in meshes], dtype=np.int16)
+        types = np.array([index_of[mesh] for mesh in meshes], dtype=np.int16)
         rigid, stretches = split(np.array(poses, dtype=np.float64))
         meshes_in_use, assembly = bake(kit.types, Assembly(types, rigid, contacts, stretches))
         return Shape(meshes_in_use, assembly, "y", kit.labels, one_surface=kit.one_surface)
@@ -109,8 +105,7 @@ LANGUAGE = Language(
     decoder=lambda task: Kits(input_kits(task)),
     graphs=True,
     text="",
-    rebuild=_anew,
+    rebuild=_rebuild,
     coordinates="The unit is that of the model files. The origin of a mesh is the middle of the box around the part as "
-    "its model file has it; the origin of a shape is that of the exemplar that most of it stands in, and may lie "
-    "anywhere.",
+    "its model file has it. The origin of a shape is that of the exemplar with most of its parts, and may be anywhere.",
 )

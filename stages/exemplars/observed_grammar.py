@@ -1,4 +1,4 @@
-"""The tiling grammar observed in exemplars: neighbourhoods and docking configurations (strings §3, §6)."""
+"""Observe the tiling grammar of exemplars: neighbourhoods and docking configurations (strings §3, §6)."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from stages.shape.geometry.penetration import PenetrationTest
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, ContactKind, Docking, Grammar, Multiset, PartType, labels_of
 
-IMAGES = 24
-"""Most symmetric images of a docking whose penetration is measured; round parts have hundreds."""
+MAX_DEPTH_IMAGES = 24
+"""Symmetric images of a docking whose penetration is measured; round parts have hundreds."""
 
 
 def observe_neighbourhoods(assemblies: Sequence[Assembly]) -> dict[int, dict[Multiset, int]]:
-    """For each type the multisets of neighbour types around its parts, with the number of parts that have each."""
-    seen: dict[int, dict[Multiset, int]] = {}
+    """Return for each type the multisets of neighbour types around its parts, with their counts."""
+    observed: dict[int, dict[Multiset, int]] = {}
     for assembly in assemblies:
         for part, neighbours in enumerate(assembly.neighbours()):
-            rules = seen.setdefault(int(assembly.types[part]), {})
+            rules = observed.setdefault(int(assembly.types[part]), {})
             multiset = assembly.multiset(neighbours)
             rules[multiset] = rules.get(multiset, 0) + 1
-    return {index: dict(sorted(rules.items())) for index, rules in sorted(seen.items())}
+    return {index: dict(sorted(rules.items())) for index, rules in sorted(observed.items())}
 
 
 def observe_dockings(types: Sequence[PartType], assemblies: Sequence[Assembly], tolerance: float) -> list[Docking]:
-    """The classes of relative poses of parts in contact, modulo the symmetries of both parts.
+    """Return the classes of relative poses of parts in contact, modulo the symmetries of both parts.
 
-    Poses within `tolerance` of the first seen pose of a class belong to it. `kind` and `depth` are not measured
-    here: they are `face` and 0.
+    Poses within `tolerance` of the first pose of a class belong to it. `kind` and `depth` are not measured here: they
+    are `face` and 0.
     """
     classes: dict[tuple[int, int], list[tuple[Docking, FloatArray]]] = {}
     for assembly in assemblies:
@@ -44,25 +44,26 @@ def observe_dockings(types: Sequence[PartType], assemblies: Sequence[Assembly], 
             pose = invert(assembly.poses[i]) @ assembly.poses[j]
             length = types[b].diagonal / 2
             vector = pose_vectors(pose[None], length)
-            found = classes.setdefault((a, b), [])
-            for index, (docking, images) in enumerate(found):
+            known = classes.setdefault((a, b), [])
+            for index, (docking, images) in enumerate(known):
                 if np.linalg.norm(images - vector, axis=1).min() <= tolerance:
-                    found[index] = replace(docking, count=docking.count + 1), images
+                    known[index] = replace(docking, count=docking.count + 1), images
                     break
             else:
                 poses = symmetric_images(types[a], types[b], pose)
                 if a == b:
                     poses = np.concatenate([poses, symmetric_images(types[a], types[b], invert(pose))])
-                found.append((Docking(a, b, pose, "face", 1, 0.0), pose_vectors(poses, length)))
-    return [docking for _, found in sorted(classes.items()) for docking, _ in found]
+                known.append((Docking(a, b, pose, "face", 1, 0.0), pose_vectors(poses, length)))
+    return [docking for _, known in sorted(classes.items()) for docking, _ in known]
 
 
 @dataclass(frozen=True)
 class ObservedContacts:
     """The contacts in some assemblies.
 
-    dockings: their classes, with their kinds of contact and depths of 0; counted: the assemblies with those edges alone
-    whose kinds count; kinds: for each assembly the kind of every edge that it came with.
+    dockings: their classes, with kinds of contact and depths of 0.
+    counted: the assemblies with the edges whose kinds count.
+    kinds: for each assembly the kind of every original edge.
     """
 
     dockings: tuple[Docking, ...]
@@ -77,20 +78,20 @@ def observe_contacts(
     tolerance: float,
     kinds: Sequence[ContactKind],
 ) -> ObservedContacts:
-    """What the contacts of `assemblies` are, and which of them count: those of the given `kinds`."""
+    """Classify the contacts of `assemblies`; those of the given `kinds` count."""
     dockings = tuple(
-        replace(each, kind=contact.kind(each.a, each.b, each.pose) or "point")
-        for each in observe_dockings(types, assemblies, tolerance)
+        replace(docking, kind=contact.kind(docking.a, docking.b, docking.pose) or "point")
+        for docking in observe_dockings(types, assemblies, tolerance)
     )
     table = DockingTable(types, dockings, tolerance)
-    found: list[tuple[ContactKind, ...]] = []
+    kinds_of_edges: list[tuple[ContactKind, ...]] = []
     counted: list[Assembly] = []
     for assembly in assemblies:
         labels = table.label_edges(assembly.types, assembly.poses, assembly.edges)[:, 0] // 2
-        found.append(tuple(dockings[label].kind for label in labels.tolist()))
-        chosen = np.array([kind in kinds for kind in found[-1]], dtype=bool)
+        kinds_of_edges.append(tuple(dockings[label].kind for label in labels.tolist()))
+        chosen = np.array([kind in kinds for kind in kinds_of_edges[-1]], dtype=bool)
         counted.append(replace(assembly, edges=assembly.edges[chosen]))
-    return ObservedContacts(dockings, counted, found)
+    return ObservedContacts(dockings, counted, kinds_of_edges)
 
 
 def observe_grammar(
@@ -99,21 +100,21 @@ def observe_grammar(
     contacts: ObservedContacts,
     kinds: Sequence[ContactKind],
 ) -> Grammar:
-    """The grammar of `assemblies`, whose `contacts` count where they are of the given `kinds`."""
-    dockings = measure_depths(types, [each for each in contacts.dockings if each.kind in kinds])
+    """Return the grammar of `assemblies`, whose `contacts` count if they are of the given `kinds`."""
+    dockings = measure_depths(types, [docking for docking in contacts.dockings if docking.kind in kinds])
     labels = labels_of(types)[1]
-    labelled = [replace(each, types=labels[each.types]) for each in contacts.counted]
+    labelled = [replace(assembly, types=labels[assembly.types]) for assembly in contacts.counted]
     return Grammar(observe_neighbourhoods(labelled), dockings, observe_nested(types, assemblies))
 
 
 def measure_depths(types: Sequence[PartType], dockings: Sequence[Docking]) -> tuple[Docking, ...]:
-    """The dockings with how deep their parts reach into each other."""
+    """Return the dockings with the penetration depths of their parts."""
     penetration = PenetrationTest(types)
-    return tuple(replace(each, depth=round(_deepest(types, each, penetration), 6)) for each in dockings)
+    return tuple(replace(docking, depth=round(_deepest(types, docking, penetration), 6)) for docking in dockings)
 
 
 def observe_nested(types: Sequence[PartType], assemblies: Sequence[Assembly]) -> dict[tuple[int, int], float]:
-    """For pairs of types the greatest depth of parts that reach into each other without any contact of surfaces."""
+    """Return for pairs of types the largest penetration depth of parts whose surfaces do not touch."""
     penetration = PenetrationTest(types)
     nested: dict[tuple[int, int], float] = {}
     for assembly in assemblies:
@@ -131,9 +132,9 @@ def observe_nested(types: Sequence[PartType], assemblies: Sequence[Assembly]) ->
 
 
 def _deepest(types: Sequence[PartType], docking: Docking, penetration: PenetrationTest) -> float:
-    """The penetration depth of a docking: the greatest over its symmetric images, whose probes fall differently."""
+    """Return the penetration depth of a docking: the largest over its symmetric images, whose probes differ."""
     images = symmetric_images(types[docking.a], types[docking.b], docking.pose)
     rounded = np.round(pose_vectors(images, types[docking.b].diagonal / 2) / (1e-3 * types[docking.b].diagonal))
     _, first = np.unique(rounded, axis=0, return_index=True)
-    chosen = first[:: -(-len(first) // IMAGES)]
+    chosen = first[:: -(-len(first) // MAX_DEPTH_IMAGES)]
     return max(penetration.depth(docking.a, docking.b, images[index]) for index in chosen.tolist())

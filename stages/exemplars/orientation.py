@@ -1,4 +1,4 @@
-"""Which side of a surface is its outside."""
+"""Orient the faces of a surface outward."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from stages.shape.geometry.components import connected_components
 
 
 def face_outward(vertices: FloatArray, faces: IntArray, original: IntArray) -> IntArray:
-    """`faces` int32 (f, 3), one orientation in each sheet already, with whole sheets turned around where needed.
+    """Return `faces` int32 (f, 3), which have one orientation in each sheet, with some sheets reversed.
 
-    original: int32 (f, 3), the same faces as the file had them. An open sheet shows the side that most of its faces
-    showed. A closed shell faces outward; if it lies inside another one, it keeps its relation to the outermost around
-    it, so that a cavity goes on facing into the cavity.
+    original: int32 (f, 3), the same faces as in the file.
+
+    An open sheet shows the side that most of its faces showed. A closed shell faces outward. A shell inside another
+    keeps its relation to the outermost one, so that a cavity still faces into the cavity.
     """
     if not len(faces):
         return faces
@@ -29,7 +30,7 @@ def face_outward(vertices: FloatArray, faces: IntArray, original: IntArray) -> I
 
 
 def flipped_faces(faces: IntArray, original: IntArray) -> BoolArray:
-    """Whether each face runs around its corners the other way than in `original`; both int32 (f, 3)."""
+    """Return whether each face has the opposite orientation in `original`; both int32 (f, 3)."""
     first = (original == faces[:, :1]).argmax(axis=1)
     following = np.take_along_axis(original, (first[:, None] + 1) % 3, axis=1)[:, 0]
     flipped: BoolArray = following != faces[:, 1]
@@ -37,7 +38,7 @@ def flipped_faces(faces: IntArray, original: IntArray) -> BoolArray:
 
 
 def _sheets(faces: IntArray) -> tuple[IntArray, BoolArray]:
-    """The sheet of each face, connected across edges that two faces share, and whether each sheet has no border."""
+    """Return the sheet of each face, connected across edges of two faces, and whether each sheet has no border."""
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(len(faces)), 3)
     order = np.lexsort((edges[:, 1], edges[:, 0]))
@@ -52,7 +53,7 @@ def _sheets(faces: IntArray) -> tuple[IntArray, BoolArray]:
 
 
 def _outermost(vertices: FloatArray, faces: IntArray, sheet: IntArray, solid: BoolArray) -> IntArray:
-    """For each sheet the outermost `solid` one that encloses it, else itself."""
+    """Return for each sheet the outermost `solid` one that encloses it, else itself."""
     around = np.arange(len(solid), dtype=np.int32)
     shells = np.flatnonzero(solid)
     if len(shells) < 2:
@@ -60,23 +61,23 @@ def _outermost(vertices: FloatArray, faces: IntArray, sheet: IntArray, solid: Bo
     order = np.argsort(sheet, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(sheet[order])) + 1)
     corners = [vertices[faces[groups[index]]] for index in shells]
-    low = np.array([each.min(axis=(0, 1)) for each in corners])
-    high = np.array([each.max(axis=(0, 1)) for each in corners])
+    low = np.array([triangles.min(axis=(0, 1)) for triangles in corners])
+    high = np.array([triangles.max(axis=(0, 1)) for triangles in corners])
     size = np.prod(high - low, axis=1)
-    for place in range(len(shells)):
-        boxes = np.flatnonzero((low < low[place]).all(axis=1) & (high > high[place]).all(axis=1))
-        probes = corners[place][[0, len(corners[place]) // 2, -1], 0]
+    for inner in range(len(shells)):
+        boxes = np.flatnonzero((low < low[inner]).all(axis=1) & (high > high[inner]).all(axis=1))
+        probes = corners[inner][[0, len(corners[inner]) // 2, -1], 0]
         for outer in boxes[np.argsort(-size[boxes], kind="stable")].tolist():
             if all(abs(_winding(corners[outer], probe)) > 0.5 for probe in probes):
-                around[shells[place]] = shells[outer]
+                around[shells[inner]] = shells[outer]
                 break
     return around
 
 
 def _winding(corners: FloatArray, point: FloatArray) -> float:
-    """How often a closed surface of triangles (f, 3, 3) goes around a point: solid angles over 4 pi."""
+    """Return the winding number of a closed surface of triangles (f, 3, 3) around a point: solid angles over 4 pi."""
     a, b, c = np.moveaxis(corners - point, 1, 0)
-    la, lb, lc = (np.linalg.norm(each, axis=1) for each in (a, b, c))
+    la, lb, lc = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
     dot = np.einsum
     under = la * lb * lc + dot("ij,ij->i", a, b) * lc + dot("ij,ij->i", b, c) * la + dot("ij,ij->i", c, a) * lb
     return float(np.arctan2(dot("ij,ij->i", a, np.cross(b, c)), under).sum() / (2 * np.pi))

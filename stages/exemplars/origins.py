@@ -1,4 +1,4 @@
-"""Where the exemplars of a dataset come from, and whose they are."""
+"""The origins of a dataset's exemplars: files, authors and licences."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from stages.shape.collection.origin import Origin
 
 
 def exemplar_origins(config: Config) -> list[Origin]:
-    """The model files of all kits, in the order of the config."""
+    """Return the origins of the model files of all kits, in the order of the config."""
     return [
         Origin(
             kit=kit.name,

@@ -1,4 +1,4 @@
-"""Reading exemplars: each model file in a process of its own, which may take so much and no more."""
+"""Read model files: from the bytes of a file to parts with rigid poses, in a child process with limits."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from pathlib import Path
 from pipeline.bounded import ChildFailed, in_child
 from pipeline.errors import ConfigError
 from stages.exemplars.model import Model, pack_model, unpack_model
-from stages.exemplars.scene_file import parse_model
-from stages.exemplars.segmentation import Segmentation
-from stages.exemplars.settings import ReadLimits
+from stages.exemplars.rigid_parts import rigid_parts
+from stages.exemplars.scene_file import check_size, first_warnings, read_scene
+from stages.exemplars.segmentation import segment_into_parts
+from stages.exemplars.settings import ReadLimits, Segmentation
 
 
 def read_model(path: Path, segmentation: Segmentation = "auto", limits: ReadLimits | None = None) -> Model:
-    """The parts of a model file: GLB, glTF, OBJ with MTL, PLY, STL, OFF or DAE; as `parse_model`.
+    """Return the parts of a model file: GLB, glTF, OBJ with MTL, PLY, STL, OFF or DAE; as `parse_model`.
 
-    Raises ConfigError, with the file, the element and the mend, for a file of which no parts can be made, whatever it
-    did to the process that read it, and for one that takes more than `limits`.
+    Raises ConfigError, with the file, the element and the mend, for a file without usable parts, whatever it did
+    to the child process, and for one that takes more than `limits`.
     """
     limits = limits or ReadLimits()
     try:
@@ -34,3 +35,18 @@ def read_model(path: Path, segmentation: Segmentation = "auto", limits: ReadLimi
         ) from None
     except ValueError:
         raise ConfigError(f"{path}: cannot be read: its parts are no meshes; export it again") from None
+
+
+def parse_model(path: Path, segmentation: Segmentation, limits: ReadLimits) -> Model:
+    """Return the parts of a model file, in the calling process.
+
+    Opens nothing outside the folder of `path`. Scale, shear and mirroring of the scene move into the vertices, so that
+    poses are rigid. A model far from the origin is moved there, with a warning. Raises ConfigError, with the file, the
+    element and the mend, for a file without usable parts, and any error that a reader did not foresee.
+    """
+    scene = read_scene(path)
+    check_size(path, scene, limits)
+    segmented, source, why = segment_into_parts(path, scene, segmentation)
+    check_size(path, segmented, limits)
+    parts, warnings = rigid_parts(path, segmented)
+    return Model(path, parts, source, why, first_warnings([*scene.warnings, *warnings]), scene.up)

@@ -1,4 +1,4 @@
-"""Repair of part meshes with PyMeshLab; the surface stays where it is, and every change is counted."""
+"""Repair part meshes with PyMeshLab; the surface does not move, and every change is counted."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from stages.exemplars.orientation import face_outward, flipped_faces
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.connected_faces import connected_corners, connected_faces
 
-FLAT = 1e-7
-"""Height of a face, as a share of the mesh's diagonal, that 32-bit coordinates cannot carry: it has no area."""
+MIN_FACE_HEIGHT = 1e-7
+"""Height of a face, as a share of the mesh's diagonal, below which 32-bit coordinates give it no area."""
 
 
 @dataclass(frozen=True)
 class Repair:
-    """How often a repair changed what: `merged_vertices`, `unreferenced_vertices`, `duplicate_faces`,
-    `zero_area_faces`, `nonmanifold_edges`, `flipped_faces`. What needed no change is left out.
+    """The number of changes by kind: `merged_vertices`, `unreferenced_vertices`, `duplicate_faces`, `zero_area_faces`,
+    `nonmanifold_edges`, `flipped_faces`. Kinds without changes are left out.
     """
 
     changes: dict[str, int] = field(default_factory=dict)
@@ -26,16 +26,19 @@ class Repair:
 def repair_mesh(
     vertices: FloatArray, faces: IntArray, face_colors: ByteArray
 ) -> tuple[FloatArray, IntArray, ByteArray, Repair]:
-    """The mesh without duplicate vertices and faces, faces without area and non-manifold edges, facing outward.
+    """Return the mesh without duplicates, faces without area and non-manifold edges, oriented outward.
 
-    Vertices at equal positions become one within each solid; solids that only touch stay apart, and a surface that
-    meets itself in an edge is cut there and stays in place. A face and its reverse are duplicates, except where two
-    solids share a wall. Neighbouring faces get one orientation: closed shells face outward (a cavity that the file
-    has facing the other way faces inward), open sheets keep the side that most of their faces showed. No vertex
-    moves, and the surface changes by less than 1e-7 of its diagonal.
+    Vertices at equal positions are merged within each solid; solids that only touch stay apart, and a surface that
+    meets itself in an edge is cut there. A face and its reverse are duplicates, unless two solids share a wall.
+    Neighbouring faces get one orientation: closed shells face outward (a cavity that the file orients the other way
+    faces inward), open sheets keep the side that most of their faces showed. No vertex moves, and the surface changes
+    by less than 1e-7 of its diagonal.
 
-    vertices: float64 (v, 3); faces: int32 (f, 3); face_colors: uint8 (f, 3), which stay with their faces. Nothing is
-    left, three empty arrays, of a mesh whose faces have no area at all.
+    vertices: float64 (v, 3).
+    faces: int32 (f, 3).
+    face_colors: uint8 (f, 3), which stay with their faces.
+
+    The result is three empty arrays for a mesh whose faces have no area.
     """
     used = np.unique(faces)
     whole = _distinct_corners(vertices, faces)
@@ -46,7 +49,7 @@ def repair_mesh(
     solid_of[whole] = solid
     points, manifold = _cut_apart(vertices, faces[unique], solid_of[unique])
     oriented = face_outward(points, _coherent(points, manifold), manifold)
-    high = _heights(points, oriented) > FLAT * np.linalg.norm(np.ptp(vertices[used], axis=0))
+    high = _heights(points, oriented) > MIN_FACE_HEIGHT * np.linalg.norm(np.ptp(vertices[used], axis=0))
     kept, renumbered = np.unique(oriented[high], return_inverse=True)
     changes = {
         "merged_vertices": _count_rows(np.column_stack([manifold.ravel(), faces[unique].ravel()])) - len(points),
@@ -65,7 +68,7 @@ def repair_mesh(
 
 
 def _without_duplicates(vertices: FloatArray, faces: IntArray) -> np.ndarray:
-    """Indices of the faces that are left when of faces with the same corners only one stays, ascending."""
+    """Return the indices of one face of each set of faces with the same corners, ascending."""
     import pymeshlab
 
     if not len(faces):
@@ -78,7 +81,7 @@ def _without_duplicates(vertices: FloatArray, faces: IntArray) -> np.ndarray:
 
 
 def _coherent(vertices: FloatArray, faces: IntArray) -> IntArray:
-    """The faces of a manifold, in their order, with neighbours running around the same way."""
+    """Return the faces of a manifold, in their order, with one orientation among neighbours."""
     import pymeshlab
 
     if not len(faces):
@@ -91,16 +94,16 @@ def _coherent(vertices: FloatArray, faces: IntArray) -> IntArray:
 
 
 def _distinct_corners(vertices: FloatArray, faces: IntArray) -> np.ndarray:
-    """Indices of the faces whose corners stand at three different places."""
+    """Return the indices of the faces with corners at three different positions."""
     corners = vertices[faces]
     same = [(corners[:, i] == corners[:, j]).all(axis=1) for i, j in ((0, 1), (1, 2), (2, 0))]
     return np.flatnonzero(~np.any(same, axis=0))
 
 
 def _weld(vertices: FloatArray, faces: IntArray, solid: IntArray) -> tuple[FloatArray, IntArray]:
-    """One vertex for each place and solid.
+    """Merge the vertices at each position of each solid.
 
-    PyMeshLab's own filter merges by place alone, and makes one surface of solids that only touch.
+    PyMeshLab's own filter merges by position alone, and makes one surface of solids that only touch.
     """
     keys = np.column_stack([np.repeat(solid, 3), vertices[faces.ravel()]])
     welded, inverse = np.unique(keys, axis=0, return_inverse=True)
@@ -108,9 +111,9 @@ def _weld(vertices: FloatArray, faces: IntArray, solid: IntArray) -> tuple[Float
 
 
 def _cut_apart(vertices: FloatArray, faces: IntArray, solid: IntArray) -> tuple[FloatArray, IntArray]:
-    """The same faces on vertices of their own wherever more than two would meet in an edge.
+    """Return the same faces with separate vertices wherever more than two would meet in an edge.
 
-    PyMeshLab's own filter opens shells that touch, and loses track of which face is which.
+    PyMeshLab's own filter opens shells that touch, and confuses the faces.
     """
     corners = connected_corners(vertices, faces, solid)
     sides = np.sort(corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
@@ -126,9 +129,9 @@ def _cut_apart(vertices: FloatArray, faces: IntArray, solid: IntArray) -> tuple[
 
 
 def _without_reversed_solids(vertices: FloatArray, faces: IntArray, solid: IntArray) -> np.ndarray:
-    """Indices of the faces but those of solids that repeat others, face by face: two-sided exports of closed shells."""
-    _, place = np.unique(vertices, axis=0, return_inverse=True)
-    _, same = np.unique(np.sort(place.reshape(-1)[faces], axis=1), axis=0, return_inverse=True)
+    """Return the indices of the faces without solids that repeat others face by face: two-sided exports of shells."""
+    _, position = np.unique(vertices, axis=0, return_inverse=True)
+    _, same = np.unique(np.sort(position.reshape(-1)[faces], axis=1), axis=0, return_inverse=True)
     same = same.reshape(-1)
     earliest = np.full(same.max(initial=-1) + 1, len(faces))
     np.minimum.at(earliest, same, solid)
@@ -138,7 +141,7 @@ def _without_reversed_solids(vertices: FloatArray, faces: IntArray, solid: IntAr
 
 
 def _crowded_edges(faces: IntArray) -> int:
-    """At how many edges of a mesh more than two faces meet."""
+    """Count the edges of a mesh at which more than two faces meet."""
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     _, counts = np.unique(edges, axis=0, return_counts=True)
     return int(np.count_nonzero(counts > 2))
@@ -149,7 +152,7 @@ def _count_rows(rows: np.ndarray) -> int:
 
 
 def _heights(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Height of each face over its longest side."""
+    """Return the height of each face over its longest side."""
     corners = vertices[faces]
     sides = np.roll(corners, -1, axis=1) - corners
     heights: FloatArray = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / (

@@ -1,26 +1,27 @@
-"""What is a part: scene nodes, named objects, or the pieces of a mesh by material, colour, connection, symmetry or
-sections."""
+"""Cut a scene into parts: its nodes or objects, or pieces by material, colour, connection, symmetry or sections."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from pathlib import Path
 
 import numpy as np
 
+from pipeline.errors import ConfigError
 from stages.exemplars.cut_surface import cut_by_sections, cut_by_symmetry, search_size
 from stages.exemplars.formats.scene import ModelScene, Placement, Surface, UniqueNames
+from stages.exemplars.model import STATED_IN_CONFIG
+from stages.exemplars.settings import Segmentation
 from stages.shape.geometry.connected_faces import connected_faces
 
-Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry", "sections"]
 SOURCES: tuple[Segmentation, ...] = ("nodes", "objects", "materials", "colors", "components")
 
-PALETTE = 64
-"""More colours than this are shading, not labels."""
-ENOUGH = 3
-"""A mesh in one piece is cut by its symmetries if that makes so many parts."""
-LARGEST = 1_200_000
-"""Cells and triangles up to which symmetries are looked for unasked: with more it takes minutes and gigabytes."""
+MAX_LABEL_COLORS = 64
+"""More colours are shading, not labels."""
+MIN_SYMMETRY_PARTS = 3
+"""Parts from which a mesh in one piece is cut by its symmetries."""
+MAX_SEARCH_SIZE = 1_200_000
+"""Cells and triangles up to which `auto` looks for symmetries: more takes minutes and gigabytes."""
 
 _WORDS = {
     "nodes": "scene nodes",
@@ -31,24 +32,44 @@ _WORDS = {
 }
 
 
+def segment_into_parts(
+    path: Path, scene: ModelScene, segmentation: Segmentation
+) -> tuple[ModelScene, Segmentation, str]:
+    """Return the scene with one placement for each part, the source of the parts, and a sentence that says why.
+
+    Raises ConfigError for a stated source that the scene does not have.
+    """
+    if segmentation == "auto":
+        source, why, segmented = pick_segmentation(scene)
+        return segmented, source, why
+    if segmentation not in (scene.kind, "symmetry", "sections"):
+        counts = count_parts(scene)
+        if segmentation not in counts:
+            offered = ", ".join(f"{name} ({count})" for name, count in counts.items())
+            raise ConfigError(
+                f"{path}: has no {segmentation} to take parts from; it has {offered}, or set `parts: auto`"
+            )
+    return segment_scene(scene, segmentation), segmentation, STATED_IN_CONFIG
+
+
 def count_parts(scene: ModelScene) -> dict[Segmentation, int]:
-    """How many parts each source of parts would make of a scene; a source that the scene does not have is left out, and
-    so is symmetry, which takes long."""
+    """Return how many parts each source would make of a scene; without sources that the scene does not have, and
+    without symmetry, which takes long."""
     counts: dict[Segmentation, int] = {scene.kind: len(scene.placements)}
     for source in SOURCES[2:]:
-        pieces = [_pieces(each, source) for each in scene.surfaces]
-        if any(each is not None for each in pieces):
-            sizes = [1 if each is None else len(each) for each in pieces]
+        pieces = [_pieces(surface, source) for surface in scene.surfaces]
+        if any(listed is not None for listed in pieces):
+            sizes = [1 if listed is None else len(listed) for listed in pieces]
             counts[source] = sum(sizes[placement.surface] for placement in scene.placements)
     return counts
 
 
 def pick_segmentation(scene: ModelScene) -> tuple[Segmentation, str, ModelScene]:
-    """The source that `auto` takes, one sentence that says why, and the scene with one placement for each part.
+    """Return the source that `auto` takes, one sentence that says why, and the scene with one placement for each part.
 
-    Scene nodes or named objects if there are at least two, for they are their author's parts; then materials, then
-    colours, unless they are too many to be labels; then connected components; and of a mesh in one piece what repeats,
-    unless it has so much surface for its size that the search would take long.
+    Two or more scene nodes or named objects are their author's parts. Otherwise materials are tried, then colours
+    unless they are too many to be labels, then connected components. A mesh in one piece is cut where it repeats
+    itself, unless its surface is so large for its size that the search would take long.
     """
     if len(scene.placements) > 1:
         return scene.kind, f"{len(scene.placements)} {_WORDS[scene.kind]}", scene
@@ -58,7 +79,7 @@ def pick_segmentation(scene: ModelScene) -> tuple[Segmentation, str, ModelScene]
         labels = _label_count(scene, source)
         if labels < 2 and source != "components":
             passed.append(f"one of the {_WORDS[source]}" if labels else f"no {_WORDS[source]}")
-        elif source == "colors" and labels > PALETTE:
+        elif source == "colors" and labels > MAX_LABEL_COLORS:
             passed.append(f"{labels} colours, which are shading and not labels")
         elif counts[source] > 1:
             pieces = f"{counts[source]} {_WORDS[source]}"
@@ -67,23 +88,23 @@ def pick_segmentation(scene: ModelScene) -> tuple[Segmentation, str, ModelScene]
             return source, f"{', '.join(passed)}; {pieces}", segment_scene(scene, source)
         else:
             passed.append("one connected component")
-    told = ", ".join(passed)
+    reasons = ", ".join(passed)
     size = search_size(scene)
-    if size > LARGEST:
-        why = f"{told}: too much surface to look unasked for what repeats, about {size:,} cells and triangles"
-        return scene.kind, f"{why} where {LARGEST:,} are the most; `parts: symmetry` looks all the same", scene
-    parted = cut_by_symmetry(scene)
-    if len(parted.placements) >= ENOUGH:
-        return "symmetry", f"{told}; {len(parted.placements)} pieces between copies of what repeats", parted
-    return scene.kind, f"{told}: nothing tells parts apart", scene
+    if size > MAX_SEARCH_SIZE:
+        why = f"{reasons}: too much surface to look unasked for what repeats, about {size:,} cells and triangles"
+        return scene.kind, f"{why} where {MAX_SEARCH_SIZE:,} are the most; `parts: symmetry` looks all the same", scene
+    segmented = cut_by_symmetry(scene)
+    if len(segmented.placements) >= MIN_SYMMETRY_PARTS:
+        return "symmetry", f"{reasons}; {len(segmented.placements)} pieces between copies of what repeats", segmented
+    return scene.kind, f"{reasons}: nothing tells parts apart", scene
 
 
 def segment_scene(scene: ModelScene, source: Segmentation) -> ModelScene:
-    """The scene with one placement for each part.
+    """Return the scene with one placement for each part, taken from `source`.
 
-    Nodes and objects are what the scene already has. The pieces of one material or of one colour are the connected
-    regions of its faces, named and labelled by it; pieces of a surface that several nodes place stay shared. Pieces by
-    symmetry are those of the whole scene, and those that are equal share a surface.
+    The scene already has its nodes or objects. The pieces of one material or colour are the connected regions of its
+    faces, named and labelled by it; pieces of a surface that several nodes place stay shared. Pieces by symmetry are
+    those of the whole scene, and equal pieces share a surface.
     """
     if source == scene.kind:
         return scene
@@ -109,7 +130,8 @@ def segment_scene(scene: ModelScene, source: Segmentation) -> ModelScene:
 
 
 def _pieces(surface: Surface, source: Segmentation) -> list[tuple[str, str | None, np.ndarray]] | None:
-    """Name, label and faces of each piece of a surface, in the order of their first faces; None without a source."""
+    """Return name, label and faces of each piece of a surface, in the order of their first faces; None if the surface
+    does not have the source."""
     labels: list[str | None]
     kinds = np.zeros(len(surface.faces), dtype=np.int64)
     if source == "materials":
@@ -139,7 +161,7 @@ def _pieces(surface: Surface, source: Segmentation) -> list[tuple[str, str | Non
 
 
 def _label_count(scene: ModelScene, source: Segmentation) -> int:
-    """How many materials or colours the faces of a scene have."""
-    of_faces = [each.face_material if source == "materials" else each.paint for each in scene.surfaces]
-    found = [each for each in of_faces if each is not None]
-    return len(np.unique(np.concatenate(found), axis=0)) if found else 0
+    """Return how many materials or colours the faces of a scene have."""
+    labels = [surface.face_material if source == "materials" else surface.paint for surface in scene.surfaces]
+    known = [of_faces for of_faces in labels if of_faces is not None]
+    return len(np.unique(np.concatenate(known), axis=0)) if known else 0

@@ -14,7 +14,7 @@ from stages.shape.collection.origin import Credit
 from stages.shape.kit import ContactKind, Strictness
 
 AUTO_KEYS = ("up", "contact.tolerance", "contact.kinds", "grammar", "hubs.types", "disconnected")
-"""The keys of a kit that may be left at `auto`, in the order in which they are decided."""
+"""The keys of a kit that may be left at `auto`, in the order in which they are resolved."""
 
 STRICTEST: Mapping[str, Any] = {
     "up": "y",
@@ -24,16 +24,16 @@ STRICTEST: Mapping[str, Any] = {
     "hubs.types": "none",
     "disconnected": "error",
 }
-"""Where every choice of these keys begins."""
+"""The values with which every search for these keys begins."""
 
 MAX_CONTACT_TOLERANCE = 0.05
-"""The greatest contact tolerance, as a share of the median part's diagonal."""
+"""As a share of the median part's diagonal."""
 
 Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry", "sections"]
 
 
 class ReadLimits(StrictModel):
-    """What reading one model may take; a model that takes more is refused."""
+    """Limits of reading one model; a model beyond them is refused."""
 
     cpu_seconds: int = Field(300, ge=1, le=86_400, description="Most CPU seconds of reading one model.")
     memory_mb: int = Field(4_000, ge=100, description="Most memory of reading one model; unit: MB.")
@@ -41,38 +41,37 @@ class ReadLimits(StrictModel):
     triangles: int = Field(
         5_000_000,
         ge=1,
-        description="Most triangles of one model, those of a mesh that stands often counted once.",
+        description="Most triangles of one model; those of a mesh that is placed often count once.",
     )
 
 
 class ContactConfig(StrictModel):
-    """When two parts are neighbours."""
+    """Which parts are neighbours."""
 
     tolerance: Literal["auto"] | Annotated[float, Field(gt=0, le=MAX_CONTACT_TOLERANCE)] = Field(
         "auto",
         description="Largest distance of parts in contact, as a share of the median part diagonal; `auto` takes 0.001, "
-        "or as much more as makes one piece of every exemplar.",
+        "or the smallest multiple that makes one piece of every exemplar.",
     )
     kinds: Literal["auto"] | Annotated[tuple[ContactKind, ...], Field(min_length=1)] = Field(
         "auto",
-        description="Kinds of contact that make neighbours; leave out `point` and `line` to demand faces. `auto` "
-        "takes as many as leave something to find.",
+        description="Kinds of contact that make neighbours; leave out `point` and `line` to demand faces. `auto` takes "
+        "all kinds with which a search still finds enough.",
     )
 
 
 class HubConfig(StrictModel):
-    """Part types that touch so much that nothing around them can be exchanged."""
+    """Hubs: part types with too many contacts for an exchange around them."""
 
     types: Literal["none", "auto"] | tuple[str, ...] = Field(
         "auto",
-        description="Part types left out of the shape graph of the search: none, a list of type names (in quotes where "
-        "they are numbers), or, with `auto`, those of the highest degree, one after another, as far as it helps.",
+        description="Part types left out of the shape graph of the search: none, a list of type names (in quotes if "
+        "they are numbers), or, with `auto`, those of the highest degree, one after another, if that helps.",
     )
     restore: bool = Field(
         True,
-        description="What becomes of hub parts: they are not in the shapes, or every finished variant gets them back "
-        "where they fit: where a hub has three quarters of the neighbours that one of its type had in an exemplar, "
-        "and touches nothing in a way that no exemplar shows.",
+        description="Whether finished variants get back hub parts where they fit: where a hub has three quarters of "
+        "the neighbours that one of its type had in an exemplar, and all its contacts occur in exemplars.",
     )
 
 
@@ -81,14 +80,14 @@ class ShapeFile(StrictModel):
 
     path: ExistingFile = Field(description="The file, from the run's folder.")
     credit: Credit | None = Field(
-        None, exclude=True, description="Whose the model is, where it is not what the kit says."
+        None, exclude=True, description="Author and licence of the model, if they differ from the kit's."
     )
 
     @model_validator(mode="before")
     @classmethod
-    def _a_path_is_enough(cls, said: Any) -> Any:
-        """Of most files the path is all there is to say."""
-        return said if isinstance(said, dict) else {"path": said}
+    def _path_alone(cls, stated: Any) -> Any:
+        """Accept a path in place of the keys."""
+        return stated if isinstance(stated, dict) else {"path": stated}
 
 
 class KitConfig(StrictModel):
@@ -102,26 +101,26 @@ class KitConfig(StrictModel):
         description="Model files (GLB, glTF, OBJ, PLY, STL, OFF, DAE), from the run's folder: their paths, or the keys "
         "below.",
     )
-    # excluded from what the stage's fingerprint sees: a mended licence makes the card anew and no shape
+    # excluded from the stage's fingerprint: a corrected licence rebuilds the card and no shape
     credit: Credit = Field(
-        default_factory=Credit, exclude=True, description="Whose the models are; card and manifest say it."
+        default_factory=Credit, exclude=True, description="Author and licence of the models, for card and manifest."
     )
     parts: Segmentation = Field(
         "auto",
-        description="What makes a part; `auto` picks and says what it picked. `symmetry` cuts one mesh between copies "
-        "of what it repeats, `sections` between parallel planes whose sections are alike. A kit that "
-        "leaves a key of its own open is cut so where a search finds nothing in the pieces of a mesh that `auto` took.",
+        description="What makes a part; `auto` reports what it picks. `symmetry` cuts one mesh between copies of what "
+        "it repeats, `sections` between parallel planes with similar sections. A kit with other keys at `auto` is cut "
+        "into sections if a search finds nothing in the pieces of a mesh that `auto` took.",
     )
     types: Literal["congruence", "labels", "meaning"] = Field(
         "congruence",
         description="What makes a part type: congruent geometry; congruent geometry with the model's own label; or "
-        "that label alone, whatever the geometry: parts of one meaning take each other's places where they fit.",
+        "that label alone, whatever the geometry: parts of one meaning replace each other where they fit.",
     )
     label_map: dict[str, Annotated[tuple[str, ...], Field(min_length=1)]] = Field(
         default_factory=dict,
-        description="With `types: meaning` or `labels` what parts mean whose models do not say so: a meaning, and the "
-        "names or patterns (`leg*`) of the parts, of their labels or of their meshes; `chair/leg*` for those of the "
-        "one model of that file or folder. The first that fits a part counts.",
+        description="With `types: meaning` or `labels`: labels for parts that have none or useless ones. Each label "
+        "lists names or patterns (`leg*`) of parts, of their own labels or of their meshes; `chair/leg*` is limited to "
+        "the model of that file or folder. The first pattern that fits a part counts.",
     )
     mirror_images_match: bool = Field(False, description="Whether a part and its mirror image are one type.")
     congruence_tolerance: float = Field(
@@ -138,57 +137,56 @@ class KitConfig(StrictModel):
         0.02,
         gt=0,
         le=0.2,
-        description="With `types: meaning` how far contacts of parts that take each other's places may miss each "
-        "other, as a share of the median part diagonal; never more than a quarter of the contact.",
+        description="With `types: meaning`: largest gap between the contacts of parts that replace each other, as a "
+        "share of the median part diagonal; never more than a quarter of the contact.",
     )
     contact: ContactConfig = Field(default_factory=ContactConfig, description="When two parts are neighbours.")
     grammar: Literal["auto"] | Strictness = Field(
         "auto",
-        description="Which neighbours a part may have: the very numbers of neighbours of each type that were observed "
-        "around its type; as many neighbours, of the same set of types, as observed once; as many neighbours as "
-        "observed, each two of their types observed together around its type; or as many neighbours as observed, each "
-        "of their types observed around its type (the published rule). Each of these admits all that the former "
-        "admits. Beside them, by place and not by number: in each slot around a part a state that was seen there "
-        "(`slots`), of each two slots also which are filled and which empty (`slot_fillings`), or their very states "
-        "(`slot_pairs`). `auto` takes the strictest under which a short search finds enough.",
+        description="Which neighbours a part may have. `multiset`: the observed numbers of neighbours of each type. "
+        "`count_and_set`: an observed number of neighbours with their set of types. `count_and_pairs`: an observed "
+        "number, each two types observed together. `count_and_types`: an observed number, each type observed (the "
+        "published rule). Each level admits whatever the previous one admits. Other levels go by place: `slots` asks "
+        "for an observed state in each slot around a part, `slot_fillings` for each two slots also which are filled, "
+        "`slot_pairs` for their states. `auto` takes the strictest under which a short search finds enough.",
     )
     hubs: HubConfig = Field(
         default_factory=HubConfig,
-        description="Part types that touch so much that nothing around them can be exchanged.",
+        description="Part types with too many contacts for an exchange around them.",
     )
     disconnected: Literal["auto", "error", "largest"] = Field(
         "auto",
         description="What to do with an exemplar in several pieces: stop, or keep its largest piece; `auto` keeps it "
-        "where the other choices leave the exemplar in pieces.",
+        "if the other resolved keys leave the exemplar in pieces.",
     )
     up: Literal["auto", "y", "z"] = Field(
         "auto",
-        description="The axis that points up in the model files; `auto` looks at what they say and at how they stand.",
+        description="The axis that points up in the model files; `auto` decides by the files and by the shapes.",
     )
 
     @model_validator(mode="after")
-    def _hubs_are_surfaces(self) -> KitConfig:
+    def _hubs_need_other_types(self) -> KitConfig:
         if self.types == "meaning" and isinstance(self.hubs.types, tuple):
             raise ValueError("with `types: meaning` no hubs can be left out; set `hubs.types: none`, or other types")
         return self
 
     @model_validator(mode="after")
-    def _meanings_are_asked_for(self) -> KitConfig:
+    def _label_map_needs_labels(self) -> KitConfig:
         if self.label_map and self.types == "congruence":
-            raise ValueError("`meanings` name parts, and types go by congruence; set `types: meaning`, or `labels`")
+            raise ValueError("`label_map` labels parts, and types go by congruence; set `types: meaning`, or `labels`")
         return self
 
     def auto_keys(self) -> tuple[str, ...]:
-        """Those of OPEN_KEYS that are `auto`."""
+        """Return those of AUTO_KEYS that are `auto`."""
         return tuple(key for key in AUTO_KEYS if self._value(key) == "auto")
 
-    def resolve(self, chosen: Mapping[str, Any]) -> KitConfig:
-        """This kit with the values `chosen`, by OPEN_KEYS, of the keys that it leaves open; what it states stays."""
-        listed = {key: tuple(each) if isinstance(each, list) else each for key, each in chosen.items()}
+    def resolve(self, values: Mapping[str, Any]) -> KitConfig:
+        """Return this kit with `values`, by AUTO_KEYS, for the keys that it leaves at `auto`; stated keys stay."""
+        listed = {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
         left = {key: listed[key] for key in self.auto_keys() if key in listed}
-        contact = {key.removeprefix("contact."): each for key, each in left.items() if key.startswith("contact.")}
+        contact = {key.removeprefix("contact."): value for key, value in left.items() if key.startswith("contact.")}
         hubs = {"types": left["hubs.types"]} if "hubs.types" in left else {}
-        own = {key: each for key, each in left.items() if "." not in key}
+        own = {key: value for key, value in left.items() if "." not in key}
         return self.model_copy(
             update={
                 **own,
@@ -198,7 +196,7 @@ class KitConfig(StrictModel):
         )
 
     def resolved(self) -> ResolvedSettings:
-        """The values of OPEN_KEYS. Raises ConfigError where one of them is still `auto`."""
+        """Return the values of AUTO_KEYS. Raises ConfigError if one of them is still `auto`."""
         tolerance, kinds, hubs = self.contact.tolerance, self.contact.kinds, self.hubs.types
         up, grammar, disconnected = self.up, self.grammar, self.disconnected
         if (
@@ -209,20 +207,25 @@ class KitConfig(StrictModel):
             or hubs == "auto"
             or disconnected == "auto"
         ):
-            raise ConfigError(f"kit {self.name}: nobody has decided {', '.join(self.auto_keys())}")
+            raise ConfigError(f"kit {self.name}: {', '.join(self.auto_keys())} must be resolved first")
         return ResolvedSettings(up, tolerance, kinds, grammar, () if hubs == "none" else hubs, disconnected)
 
     def _value(self, key: str) -> Any:
-        found: Any = self
+        value: Any = self
         for step in key.split("."):
-            found = getattr(found, step)
-        return found
+            value = getattr(value, step)
+        return value
 
 
 @dataclass(frozen=True)
 class ResolvedSettings:
-    """What a kit's config says of the keys that could be left open. tolerance: a share of the median part diagonal;
-    hubs: names of the types that are left out."""
+    """The values of a kit's AUTO_KEYS, all resolved.
+
+    tolerance: largest distance of parts in contact, as a share of the median part diagonal.
+    kinds: kinds of contact that count.
+    grammar: the strictness.
+    hubs: names of the types that are left out.
+    """
 
     up: Literal["y", "z"]
     tolerance: float
@@ -233,16 +236,14 @@ class ResolvedSettings:
 
 
 class ExemplarsConfig(StrictModel):
-    """The kits of a dataset that is made of exemplars."""
+    """The kits of a dataset that is generated from exemplars."""
 
-    kits: tuple[KitConfig, ...] = Field(
-        (), description="One or more kits; none for a dataset that is made of programs."
-    )
-    # excluded from what the stage's fingerprint sees: a model that was read is read alike under wider limits
+    kits: tuple[KitConfig, ...] = Field((), description="One or more kits; none for a dataset without exemplars.")
+    # excluded from the stage's fingerprint: wider limits do not change a model that was read
     limits: ReadLimits = Field(
         default_factory=ReadLimits,
         exclude=True,
-        description="What reading one model may take, in a process of its own; one that takes more is refused.",
+        description="Limits of reading one model, in a child process; a model beyond them is refused.",
     )
 
     @field_validator("kits")

@@ -16,8 +16,7 @@ BYTES_A_KIT = 8_000_000
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """One shard a kit; the digests of its model files make it anew when they change. It reads what was chosen for it
-    where its config leaves a key open."""
+    """Return one shard a kit, rebuilt if its model files change; it reads the resolved settings of `auto` keys."""
     return [
         Shard(
             kit.name,
@@ -29,7 +28,7 @@ def plan(plan: Plan) -> list[Shard]:
 
 
 def run_shard(task: Task) -> Outcome:
-    """Read, repair, identify, observe, write."""
+    """Read the models, build the kit and write it."""
     from stages.exemplars.build import build_kit
     from stages.exemplars.kit_figure import kit_figure
     from stages.exemplars.read import read_model
@@ -37,11 +36,11 @@ def run_shard(task: Task) -> Outcome:
 
     section = task.config.section(ExemplarsConfig)
     config = next(kit for kit in section.kits if kit.name == task.shard.params["kit"])
-    chosen: dict[str, Any] = {"resolved": {}, "reasons": {}}
+    resolution: dict[str, Any] = {"resolved": {}, "reasons": {}}
     if config.auto_keys():
-        chosen = json.loads(task.input("autoconfig", f"{config.name}.json").read_bytes())
-        config = config.resolve(chosen["resolved"])
-        config = config.model_copy(update={"parts": chosen["resolved"].get("parts", config.parts)})
+        resolution = json.loads(task.input("autoconfig", f"{config.name}.json").read_bytes())
+        resolved = resolution["resolved"]
+        config = config.resolve(resolved).model_copy(update={"parts": resolved.get("parts", config.parts)})
     models = [read_model(shape.path, config.parts, section.limits) for shape in config.shapes]
     kit, report = build_kit(config, models)
     with task.output(f"{kit.name}.json") as text, task.output(f"{kit.name}.tar") as arrays:
@@ -53,7 +52,7 @@ def run_shard(task: Task) -> Outcome:
         summary={
             "kit": kit.name,
             "types": len(kit.types),
-            "parts": [len(each.assembly) for each in kit.exemplars],
+            "parts": [len(exemplar.assembly) for exemplar in kit.exemplars],
             "contacts": report.contacts,
             "rules": sum(len(rules) for rules in kit.grammar.neighbourhoods.values()),
             "dockings": len(kit.grammar.dockings),
@@ -62,25 +61,25 @@ def run_shard(task: Task) -> Outcome:
             "aliases": {name: list(words) for name, words in report.aliases.items()},
             "hubs": [kit.types[index].name for index in kit.grammar.hubs],
             "warnings": list(report.warnings),
-            "resolved": chosen["resolved"],
-            "reasons": chosen["reasons"],
+            "resolved": resolution["resolved"],
+            "reasons": resolution["reasons"],
         },
     )
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """A line for each kit."""
+    """Return lines for each kit: its counts, its aliases and its warnings."""
     lines = []
     for name in plan.shards("exemplars"):
-        seen = plan.summary("exemplars", name)
-        if seen is not None:
-            parts = " + ".join(str(count) for count in seen["parts"])
+        summary = plan.summary("exemplars", name)
+        if summary is not None:
+            parts = " + ".join(str(count) for count in summary["parts"])
             lines.append(
-                f"{name}: {parts} parts of {seen['types']} types, {seen['rules']} neighbourhoods, "
-                f"{seen['dockings']} dockings"
+                f"{name}: {parts} parts of {summary['types']} types, {summary['rules']} neighbourhoods, "
+                f"{summary['dockings']} dockings"
             )
-            lines.extend(f"{name}: {kind} is also {', '.join(words)}" for kind, words in seen["aliases"].items())
-            lines.extend(f"{name}: warning: {warning}" for warning in seen["warnings"])
+            lines.extend(f"{name}: {kind} is also {', '.join(names)}" for kind, names in summary["aliases"].items())
+            lines.extend(f"{name}: warning: {warning}" for warning in summary["warnings"])
     lines.extend(f"warning: {sentence}" for sentence in missing_licenses(exemplar_origins(plan.config)))
     return lines
 

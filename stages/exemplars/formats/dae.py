@@ -19,23 +19,23 @@ from stages.exemplars.formats.colors import color_bytes, decode_image, face_pain
 from stages.exemplars.formats.enclosure import Enclosure, Outside
 from stages.exemplars.formats.markup import check_markup
 from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, SENSELESS, ModelScene, Placement, Surface, type_label
+from stages.exemplars.formats.scene import GREY, INVALID, ModelScene, Placement, Surface, type_label
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-_DEEPEST = 200
-_MOST_NODES = 200_000
-"""Nodes that are walked at most. Nodes that place others doubly double at each level, without a part in them."""
+_MAX_DEPTH = 200
+_MAX_NODES = 200_000
+"""Nodes that are visited. If every node places its children twice, their number doubles at each level."""
 
 X_TO_Y = np.array([[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-"""The turn after which y points up where x did."""
+"""The rotation that turns the x axis upward to y."""
 
 
 def read_dae(path: Path, enclosure: Enclosure) -> ModelScene:
-    """The scene of a `.dae` file; placements stand in depth-first order of its node tree.
+    """Return the scene of a `.dae` file; placements are in depth-first order of its node tree.
 
-    Everything that one node places is one surface. Coordinates are in metres, by the file's own unit; up is the axis
-    that it says, and y where that is x, for then all is turned.
-    Raises ConfigError for a file that is no COLLADA, or declares XML entities.
+    Everything that one node places is one surface. Coordinates are converted to metres. The up axis is the file's; if
+    it is x, the scene is turned and the axis is y. Raises ConfigError for a file that is no COLLADA, or declares XML
+    entities.
     """
     import collada
 
@@ -47,7 +47,7 @@ def read_dae(path: Path, enclosure: Enclosure) -> ModelScene:
         return _Reader(path, enclosure, document).scene()
     except (ArithmeticError, AttributeError, LookupError, SyntaxError, TypeError, ValueError, collada.common.DaeError):
         raise ConfigError(
-            f"{path}: not a whole COLLADA file ({enclosure.at} {SENSELESS}); copy or export it again"
+            f"{path}: not a whole COLLADA file ({enclosure.at} {INVALID}); copy or export it again"
         ) from None
 
 
@@ -63,52 +63,54 @@ class _Reader:
     def scene(self) -> ModelScene:
         surfaces: list[Surface] = []
         placements: list[Placement] = []
-        place_of: dict[tuple[Any, ...], int] = {}
+        surface_of: dict[tuple[Any, ...], int] = {}
         for error in self.document.errors:
-            told = re.sub(r" `?<.*>`?", "", error.msg)  # for want of a name it may show an object of Python
-            self.warnings.append(f"left out: {told}")
+            message = re.sub(r" `?<.*>`?", "", error.msg)  # without a name it may show a Python object
+            self.warnings.append(f"left out: {message}")
         roots = [] if self.document.scene is None else self.document.scene.nodes
         for node, pose, geometries in self.walk(roots, np.eye(4), 0):
             key = tuple(
-                (each.geometry.id, *((bound.symbol, getattr(bound.target, "id", None)) for bound in each.materials))
-                for each in geometries
+                (placed.geometry.id, *((bound.symbol, getattr(bound.target, "id", None)) for bound in placed.materials))
+                for placed in geometries
             )
-            if key not in place_of:
-                place_of[key] = len(surfaces)
+            if key not in surface_of:
+                surface_of[key] = len(surfaces)
                 surfaces.append(self.surface(geometries))
-            name = getattr(node, "name", None) or node.id or surfaces[place_of[key]].name
-            placements.append(Placement(name, type_label(name), place_of[key], pose))
-        said = getattr(self.document.assetInfo, "upaxis", None)
-        placed = self.in_metres(surfaces, placements, X_TO_Y if said == "X_UP" else np.eye(4))
+            name = getattr(node, "name", None) or node.id or surfaces[surface_of[key]].name
+            placements.append(Placement(name, type_label(name), surface_of[key], pose))
+        up = getattr(self.document.assetInfo, "upaxis", None)
+        placed = self.in_metres(surfaces, placements, X_TO_Y if up == "X_UP" else np.eye(4))
         warnings = tuple(dict.fromkeys(self.warnings))
-        return ModelScene("nodes", *placed, warnings, "z" if said == "Z_UP" else "y")
+        return ModelScene("nodes", *placed, warnings, "z" if up == "Z_UP" else "y")
 
     def in_metres(
         self, surfaces: list[Surface], placements: list[Placement], turn: FloatArray
     ) -> tuple[tuple[Surface, ...], tuple[Placement, ...]]:
-        """Everything scaled by the file's unit, and then turned."""
+        """Scale everything by the file's unit, and then rotate it by `turn`."""
         unit = float(getattr(self.document.assetInfo, "unitmeter", None) or 1.0)
         moved = []
-        for each in placements:
-            pose = each.pose.copy()
+        for placement in placements:
+            pose = placement.pose.copy()
             pose[:3, 3] *= unit
-            moved.append(replace(each, pose=turn @ pose))
-        scaled = surfaces if unit == 1.0 else [replace(each, vertices=unit * each.vertices) for each in surfaces]
+            moved.append(replace(placement, pose=turn @ pose))
+        scaled = (
+            surfaces if unit == 1.0 else [replace(surface, vertices=unit * surface.vertices) for surface in surfaces]
+        )
         return tuple(scaled), tuple(moved)
 
     def walk(self, nodes: Any, parent: FloatArray, depth: int) -> Iterator[tuple[Any, FloatArray, list[Any]]]:
-        """Nodes that place geometry, with their world matrix and what they place."""
+        """Yield nodes that place geometry, with their world matrix and what they place."""
         from collada.scene import ControllerNode, GeometryNode, Node
 
-        if depth > _DEEPEST:
-            raise ConfigError(f"{self.path}: its nodes nest deeper than {_DEEPEST}; one may contain itself")
+        if depth > _MAX_DEPTH:
+            raise ConfigError(f"{self.path}: its nodes nest deeper than {_MAX_DEPTH}; one may contain itself")
         for node in nodes:
             if not isinstance(node, Node):
                 continue
             self.walked += 1
-            if self.walked > _MOST_NODES:
+            if self.walked > _MAX_NODES:
                 raise ConfigError(
-                    f"{self.path}: places more than {_MOST_NODES:,} nodes, by placing nodes again; export it simpler"
+                    f"{self.path}: places more than {_MAX_NODES:,} nodes, by placing nodes again; export it simpler"
                 )
             self.enclosure.at = f"node {node.id!r}"
             pose = parent @ np.asarray(node.matrix, dtype=np.float64)
@@ -128,7 +130,7 @@ class _Reader:
         offset = 0
         for placed in geometries:
             self.enclosure.at = f"geometry {placed.geometry.id!r}"
-            bound = {each.symbol: each.target for each in placed.materials}
+            bound = {material.symbol: material.target for material in placed.materials}
             for primitive in placed.geometry.primitives:
                 corners = self.corners(primitive)
                 if corners is None:
@@ -157,7 +159,7 @@ class _Reader:
         )
 
     def corners(self, primitive: Any) -> tuple[IntArray, IntArray] | None:
-        """Faces as vertex indices and as rows of the primitive's index table; None for lines and empty primitives."""
+        """Return faces as vertex indices and as rows of the index table; None for lines and empty primitives."""
         from collada.polylist import Polylist
         from collada.triangleset import TriangleSet
 
@@ -203,7 +205,7 @@ class _Reader:
                     f"texture {name!r} is outside the folder of the model and is not opened; its faces are grey"
                 )
             except FileNotFoundError:
-                self.warnings.append(f"texture {name!r} is not there; its faces are grey")
+                self.warnings.append(f"texture {name!r} is missing; its faces are grey")
             except OSError as error:
                 self.warnings.append(f"texture {name!r} cannot be read: {error}")
         return self.images[name]

@@ -1,4 +1,4 @@
-"""The folder of a model: files that a model names are read from inside it, and from nowhere else."""
+"""The folder of a model: files that a model names are read from inside it only."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from urllib.parse import unquote
 from pipeline.errors import ConfigError
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
-_LONGEST = 4096
-"""Characters that the name of a file has at most, on Linux."""
+_MAX_NAME_LENGTH = 4096
+"""On Linux."""
 
 
 class Outside(ConfigError):
-    """A name that leads out of the model's folder, or nowhere: that of a texture or of a material library costs the
-    colours and not the model."""
+    """A file name leads out of the model's folder. Without a texture or a material library only colours are lost."""
 
 
 class Enclosure:
-    """Reads the files that the model at `model` names: buffers, materials, images.
+    """Read the files that the model at `model` names: buffers, materials, images.
 
     A name that leaves the model's folder (`..`, an absolute path, a URL, a link that points out, percent-encoded
     or with backslashes) is refused before anything is opened.
@@ -29,15 +28,16 @@ class Enclosure:
 
     def __init__(self, model: Path) -> None:
         self.model = model
-        self.at = "the file"  # the element that is being read, for whoever finds that it makes no sense
+        self.at = "the file"  # the element that is being read, for error messages
         self._folder = model.parent.resolve()
 
     def read(self, name: str, element: str, *, encoded: bool = False) -> bytes:
-        """The bytes of the file that `element` of the model calls `name`.
+        """Return the bytes of the file that `element` of the model calls `name`.
 
-        `encoded` says that `name` is a URI: it may be percent-encoded and may be a `data:` URI.
-        Raises Outside if the name leaves the folder or is no file name at all, FileNotFoundError if there is no such
-        file, OSError for one that cannot be read.
+        encoded: whether `name` is a URI, which may be percent-encoded or a `data:` URI.
+
+        Raises Outside if the name leaves the folder or is no file name, FileNotFoundError for a missing file, and
+        OSError for one that cannot be read.
         """
         self.check(name, element, encoded=encoded)
         if encoded and name.startswith("data:"):
@@ -50,29 +50,29 @@ class Enclosure:
         return path.read_bytes()
 
     def check(self, name: str, element: str, *, encoded: bool = False) -> None:
-        """Raise Outside, without opening anything, if `name` leaves the folder or is no name of a file."""
+        """Raise Outside, without opening anything, if `name` leaves the folder or is no file name."""
         if not isinstance(name, str):
-            raise Outside(f"{self.model}: {element} names a file by what is no text; export it again")
+            raise Outside(f"{self.model}: {element} names a file by something that is no text; export it again")
         if encoded and name.startswith("data:"):
             return
-        if len(name) > _LONGEST:
+        if len(name) > _MAX_NAME_LENGTH:
             raise Outside(f"{self.model}: {element} names a file by {len(name):,} characters; export it again")
-        written = [name]
-        while (decoded := unquote(written[-1])) != written[-1]:
-            written.append(decoded)  # an encoded slash may itself be encoded
-        for each in written:
-            plain = each.strip().replace("\\", "/")
+        spellings = [name]
+        while (decoded := unquote(spellings[-1])) != spellings[-1]:
+            spellings.append(decoded)  # an encoded slash may itself be encoded
+        for spelling in spellings:
+            plain = spelling.strip().replace("\\", "/")
             leaves = plain.startswith(("/", "~")) or "\0" in plain or _SCHEME.match(plain) is not None
             if leaves or not self._leads_inside(plain):
                 raise Outside(
                     f"{self.model}: {element} names {name!r}, a path outside the folder of the model; nothing outside "
-                    "is opened. Put the file beside the model and name it by a relative path, or embed it (as .glb)"
+                    "is opened. Put the file next to the model and name it by a relative path, or embed it (as .glb)"
                 )
 
     def _leads_inside(self, name: str) -> bool:
         try:
             return self._path(name).resolve().is_relative_to(self._folder)
-        except (OSError, RuntimeError, ValueError):  # a name that is too long, links in a ring, half a character
+        except (OSError, RuntimeError, ValueError):  # a name that is too long, circular links, a lone surrogate
             return False
 
     def _path(self, name: str) -> Path:

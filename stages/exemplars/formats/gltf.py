@@ -23,22 +23,22 @@ from stages.exemplars.formats.colors import (
 )
 from stages.exemplars.formats.enclosure import Enclosure, Outside
 from stages.exemplars.formats.gltf_file import COMPRESSED, GltfFile
-from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, ModelScene, Placement, Surface, type_label
+from stages.exemplars.formats.scene import GREY, INVALID, Malformed, ModelScene, Placement, Surface, type_label
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_MODE_TRIANGLES, _MODE_STRIP, _MODE_FAN = 4, 5, 6
 
 
 def read_gltf(path: Path, enclosure: Enclosure) -> ModelScene:
-    """The scene of a `.glb` or `.gltf` file; placements stand in depth-first order of its node tree.
+    """Return the scene of a `.glb` or `.gltf` file; placements are in depth-first order of its node tree.
 
     Several primitives of a mesh are one surface. Skins, morph targets, cameras, lights and animations are left out.
-    Raises ConfigError for a file that is cut off, malformed, or compressed beyond what is read here.
+    Raises ConfigError for a file that is cut off, malformed or compressed.
     """
     try:
         return _Reader(GltfFile(path, enclosure)).scene()
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        reason = error if isinstance(error, Malformed) else f"{enclosure.at} {SENSELESS}"
+        reason = error if isinstance(error, Malformed) else f"{enclosure.at} {INVALID}"
         raise ConfigError(
             f"{path}: malformed glTF: {reason}; check it with a glTF validator and export it again"
         ) from None
@@ -55,7 +55,7 @@ class _Reader:
         nodes = list(self.walk())
         used = sorted({self.header["nodes"][index]["mesh"] for index, _ in nodes})
         surfaces = [self.surface(index) for index in used]
-        place_of = {mesh: place for place, mesh in enumerate(used)}
+        surface_of = {mesh: index for index, mesh in enumerate(used)}
         placements = []
         for index, pose in nodes:
             self.file.enclosure.at = f"node {index}"
@@ -64,13 +64,13 @@ class _Reader:
             node_name = self.name("node", index)
             name = node_name or mesh_name or f"node{index}"
             if "skin" in node:
-                self.warnings.append(f"node {name!r} has a skin; it is left out and the mesh is taken as it stands")
+                self.warnings.append(f"node {name!r} has a skin; it is left out and the mesh is taken unposed")
             label = type_label(name) if type_label(name) != name else mesh_name or node_name
-            placements.append(Placement(name, label, place_of[node["mesh"]], pose))
+            placements.append(Placement(name, label, surface_of[node["mesh"]], pose))
         return ModelScene("nodes", tuple(surfaces), tuple(placements), tuple(dict.fromkeys(self.warnings)))
 
     def walk(self) -> Iterator[tuple[int, FloatArray]]:
-        """Index and world matrix of each node with a mesh, depth first, children in file order."""
+        """Yield index and world matrix of each node with a mesh, depth first, children in file order."""
         nodes = self.header.get("nodes", [])
         scenes = self.header.get("scenes", [])
         if len(scenes) > 1:
@@ -85,7 +85,7 @@ class _Reader:
         while stack:
             index, parent = stack.pop()
             if index in seen:
-                raise Malformed(f"node {index} hangs from two places of the node tree")
+                raise Malformed(f"node {index} has two parents in the node tree")
             seen.add(index)
             self.file.enclosure.at = f"node {index}"
             node = nodes[index]
@@ -104,10 +104,10 @@ class _Reader:
             stack.extend((child, pose) for child in reversed(node.get("children", [])))
 
     def name(self, kind: Literal["node", "mesh", "material"], index: int) -> str | None:
-        """What a node, mesh or material is called, if it is."""
+        """Return the name of a node, mesh or material, if it has one."""
         name = self.header[f"{kind}es" if kind == "mesh" else f"{kind}s"][index].get("name")
         if name is not None and not isinstance(name, str):
-            self.warnings.append(f"{kind} {index} has a name that is no text, and goes without")
+            self.warnings.append(f"{kind} {index} has a name that is no text; it is ignored")
             return None
         return name or None
 
@@ -140,15 +140,15 @@ class _Reader:
             vertices=np.concatenate(vertices),
             faces=np.concatenate(faces),
             face_colors=np.concatenate(colors) if colors else np.empty((0, 3), np.uint8),
-            materials=tuple(self.name("material", each) or f"material{each}" for each in range(len(materials))),
+            materials=tuple(self.name("material", number) or f"material{number}" for number in range(len(materials))),
             face_material=np.concatenate(material) if material else np.empty(0, np.int32),
             paint=np.concatenate(paint) if painted else None,
         )
 
     def triangles(self, primitive: dict[str, Any], element: str) -> tuple[FloatArray, IntArray] | None:
-        """Vertices and faces of a primitive; None for points, lines and primitives without vertices."""
-        mode = primitive.get("mode", _TRIANGLES)
-        if mode not in (_TRIANGLES, _STRIP, _FAN):
+        """Return vertices and faces of a primitive; None for points, lines and primitives without vertices."""
+        mode = primitive.get("mode", _MODE_TRIANGLES)
+        if mode not in (_MODE_TRIANGLES, _MODE_STRIP, _MODE_FAN):
             self.warnings.append(f"{element} is made of {'points' if mode == 0 else 'lines'} and is left out")
             return None
         attributes = primitive["attributes"]
@@ -165,11 +165,11 @@ class _Reader:
             corners = np.arange(len(vertices))
         if len(corners) and corners.max() >= len(vertices):
             raise Malformed(f"{element} has a face on vertex {corners.max()} of {len(vertices)}")
-        if mode == _TRIANGLES:
+        if mode == _MODE_TRIANGLES:
             faces = corners[: len(corners) // 3 * 3].reshape(-1, 3)
         else:
             faces = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
-            if mode == _STRIP:
+            if mode == _MODE_STRIP:
                 faces[1::2] = faces[1::2, ::-1]
             else:
                 faces[:, 0] = corners[0]
@@ -178,7 +178,7 @@ class _Reader:
     def face_colors(
         self, primitive: dict[str, Any], faces: IntArray, element: str
     ) -> tuple[FloatArray, ByteArray | None]:
-        """Linear colours (f, 3) of the faces of a primitive, and its vertex colours as face paint, if it has any."""
+        """Return linear colours (f, 3) of the faces of a primitive, and its vertex colours as face paint, if any."""
         attributes = primitive["attributes"]
         paint = None
         if "material" in primitive:
@@ -217,9 +217,9 @@ class _Reader:
         return linear * linear_from_srgb(sample_texture(image, uv, faces))
 
     def image(self, texture: dict[str, Any]) -> ByteArray | None:
-        """The pixels behind a texture, decoded once; None, with a warning, where there is no readable image."""
-        sources = [each.get("source") for each in texture.get("extensions", {}).values()] + [texture.get("source")]
-        index = next((each for each in sources if each is not None), None)
+        """Return the pixels of a texture, decoded once; None, with a warning, without a readable image."""
+        extensions = [*texture.get("extensions", {}).values(), texture]
+        index = next((holder["source"] for holder in extensions if holder.get("source") is not None), None)
         if index is None:
             return None
         if index not in self.images:
@@ -235,13 +235,13 @@ class _Reader:
                 self.warnings.append(f"image {index} is a file outside the folder of the model, which is not opened")
             except OSError as error:
                 self.images[index] = None
-                said = "is not there" if isinstance(error, FileNotFoundError) else f"cannot be read: {error}"
-                self.warnings.append(f"image {index} ({image.get('uri', 'embedded')[:80]}) {said}")
+                fault = "is missing" if isinstance(error, FileNotFoundError) else f"cannot be read: {error}"
+                self.warnings.append(f"image {index} ({image.get('uri', 'embedded')[:80]}) {fault}")
         return self.images[index]
 
 
 def _local_matrix(node: dict[str, Any]) -> FloatArray:
-    """Transform of a node in its parent, float64 (4, 4): its matrix, or translation @ rotation @ scale."""
+    """Return the transform of a node, float64 (4, 4): its matrix, or translation @ rotation @ scale."""
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
     x, y, z, w = np.array(node.get("rotation", (0, 0, 0, 1)), dtype=np.float64) / (

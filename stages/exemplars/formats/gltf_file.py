@@ -20,10 +20,10 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
 class GltfFile:
-    """A `.glb` or `.gltf` file, its buffers read when they are first needed.
+    """A `.glb` or `.gltf` file whose buffers are read on first use.
 
-    Raises ConfigError for a file that is cut off or names files outside its folder, Malformed for what was looked at,
-    and whatever indexing and conversion raise where the header contradicts itself; `enclosure.at` then says where.
+    Raises ConfigError for a file that is cut off or names files outside its folder, and Malformed for known faults. If
+    the header contradicts itself, indexing and conversion raise other errors; `enclosure.at` then says where.
     """
 
     def __init__(self, path: Path, enclosure: Enclosure) -> None:
@@ -34,17 +34,17 @@ class GltfFile:
         version = str(self.header.get("asset", {}).get("version", ""))
         if not version.startswith("2."):
             raise ConfigError(f"{path}: glTF version {version or 'unknown'}; only 2.x is read, export it again as 2.0")
-        for index, each in enumerate(self.header.get("buffers", [])):
+        for index, buffer in enumerate(self.header.get("buffers", [])):
             enclosure.at = f"buffer {index}"
-            if "uri" in each:
-                enclosure.check(each["uri"], f"buffer {index}", encoded=True)
+            if "uri" in buffer:
+                enclosure.check(buffer["uri"], f"buffer {index}", encoded=True)
 
     def is_stored(self, accessor: int) -> bool:
         stored: dict[str, Any] = self.header["accessors"][accessor]
         return "bufferView" in stored or "sparse" in stored
 
     def accessor(self, index: int, element: str) -> np.ndarray:
-        """The values of an accessor (count, width), sparse ones filled in, normalised ones as float64."""
+        """Return the values of an accessor (count, width), sparse ones filled in, normalised ones as float64."""
         accessor = self.header["accessors"][index]
         width, dtype = _WIDTHS[accessor["type"]], np.dtype(_COMPONENTS[accessor["componentType"]])
         values = np.zeros((accessor["count"], width), dtype)
@@ -74,7 +74,7 @@ class GltfFile:
         return np.ndarray(shape, dtype, content, offset, (stride or row, np.dtype(dtype).itemsize)).copy()
 
     def view(self, index: int, element: str) -> tuple[bytes, int]:
-        """Bytes and stride (0 for none) of a buffer view."""
+        """Return bytes and stride (0 for none) of a buffer view."""
         view = self.header["bufferViews"][index]
         buffer = self.buffer(view["buffer"], element, "EXT_meshopt_compression" in view.get("extensions", {}))
         start, length = view.get("byteOffset", 0), view["byteLength"]
@@ -93,7 +93,7 @@ class GltfFile:
                     self.buffers[index] = self.enclosure.read(uri, f"buffer {index}", encoded=True)
                 except FileNotFoundError:
                     raise ConfigError(
-                        f"{self.path}: buffer {index} is the file {uri!r}, which is not there; put it beside the model"
+                        f"{self.path}: buffer {index} is the file {uri!r}, which is missing; put it next to the model"
                     ) from None
                 except OSError:
                     raise ConfigError(f"{self.path}: buffer {index}, the file {uri!r}, cannot be read") from None
@@ -107,14 +107,14 @@ class GltfFile:
 
 
 def _container(path: Path) -> tuple[dict[str, Any], bytes | None]:
-    """The JSON header and the binary chunk of a file."""
+    """Return the JSON header and the binary chunk of a file."""
     content = path.read_bytes()
     chunk = None
     if content[:4] == b"glTF":
         if len(content) < 20 or len(content) < struct.unpack_from("<I", content, 8)[0]:
-            said = struct.unpack_from("<I", content, 8)[0] if len(content) >= 12 else "more"
+            stated = struct.unpack_from("<I", content, 8)[0] if len(content) >= 12 else "more"
             raise ConfigError(
-                f"{path}: truncated GLB: its header says {said} bytes, the file has {len(content)}; "
+                f"{path}: truncated GLB: its header says {stated} bytes, the file has {len(content)}; "
                 "copy or export it again"
             )
         version, _, length = struct.unpack_from("<III", content, 4)

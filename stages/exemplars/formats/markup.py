@@ -1,7 +1,6 @@
-"""What the XML of a COLLADA file must be before pycollada sees it.
+"""Check the XML of a COLLADA file before pycollada reads it.
 
-pycollada would open an archive, its parser would follow entities, both go down as deep as a file goes, and an array is
-made as long as a file announces.
+pycollada would open an archive and follow entities, to any depth, and allocate arrays of any announced length.
 """
 
 from __future__ import annotations
@@ -11,20 +10,20 @@ from xml.parsers import expat
 
 from pipeline.errors import ConfigError
 
-_DEEPEST = 250
+_MAX_DEPTH = 250
 
 
 def check_markup(path: Path, content: bytes) -> None:
-    """Look through the XML of a COLLADA file, in whatever encoding.
+    """Check the XML of a COLLADA file, in any encoding.
 
-    Raises ConfigError for what is no plain XML, declares entities, nests deeper than 250 elements, or announces
+    Raises ConfigError for a file that is no plain XML, declares entities, nests deeper than 250 elements, or announces
     polygons of more corners than the file has bytes.
     """
     if content[:2] == b"PK":
         raise ConfigError(f"{path}: is a zip archive; unpack it and name the .dae file in it")
-    look = _Look(path, len(content))
+    checker = _Checker(path, len(content))
     try:
-        look.parser.Parse(content, True)
+        checker.parser.Parse(content, True)
     except expat.ExpatError as error:
         where = f"line {error.lineno}, column {error.offset + 1}"
         raise ConfigError(f"{path}: not a whole COLLADA file ({where} is no XML); copy or export it again") from None
@@ -32,7 +31,7 @@ def check_markup(path: Path, content: bytes) -> None:
         raise ConfigError(f"{path}: not a whole COLLADA file (its encoding is unknown); export it as UTF-8") from None
 
 
-class _Look:
+class _Checker:
     def __init__(self, path: Path, size: int) -> None:
         self.path = path
         self.size = size
@@ -49,8 +48,10 @@ class _Look:
 
     def enter(self, name: str, _: object) -> None:
         self.depth += 1
-        if self.depth > _DEEPEST:
-            raise ConfigError(f"{self.path}: its elements nest deeper than {_DEEPEST}, at <{name}>; export it flatter")
+        if self.depth > _MAX_DEPTH:
+            raise ConfigError(
+                f"{self.path}: its elements nest deeper than {_MAX_DEPTH}, at <{name}>; export it flatter"
+            )
         if name == "vcount":
             self.parser.CharacterDataHandler = self.counts.append
 

@@ -9,16 +9,16 @@ import numpy as np
 from pipeline.errors import ConfigError
 from stages.exemplars.formats.colors import color_bytes, face_paint
 from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, ModelScene, Placement, Surface
+from stages.exemplars.formats.scene import GREY, INVALID, Malformed, ModelScene, Placement, Surface
 from stages.shape.arrays import ByteArray
 
 
 def read_off(path: Path) -> ModelScene:
-    """The one surface of an ASCII `.off` file. Raises ConfigError for a file that is cut off or malformed."""
+    """Return the surface of an ASCII `.off` file. Raises ConfigError for a file that is cut off or malformed."""
     try:
         surface = _parse(path.read_bytes().decode("utf-8", errors="replace"), path.stem)
     except (ArithmeticError, LookupError, ValueError) as error:
-        reason = error if isinstance(error, Malformed) else f"its count of vertices and faces, or a colour, {SENSELESS}"
+        reason = error if isinstance(error, Malformed) else f"its count of vertices and faces, or a colour, {INVALID}"
         raise ConfigError(f"{path}: not a whole ASCII OFF file ({reason}); copy or export it again") from None
     return ModelScene("objects", (surface,), (Placement(path.stem, None, 0, np.eye(4)),))
 
@@ -40,22 +40,22 @@ def _parse(text: str, name: str) -> Surface:
     colors: list[ByteArray | None] = []
     for row in lines[1 + vertex_count : 1 + vertex_count + face_count]:
         try:
-            count, *places = (int(word) for word in row[: 1 + max(0, int(row[0]))])
+            count, *indices = (int(word) for word in row[: 1 + max(0, int(row[0]))])
         except ValueError:
             raise Malformed(f"face {' '.join(row)[:40]!r} is not made of whole numbers") from None
-        if len(places) != count or any(not 0 <= place < vertex_count for place in places):
-            raise Malformed(f"face {' '.join(row)[:40]!r} does not stand on {vertex_count} vertices")
-        corners += places
+        if len(indices) != count or any(not 0 <= index < vertex_count for index in indices):
+            raise Malformed(f"face {' '.join(row)[:40]!r} has other corners than {vertex_count} vertices")
+        corners += indices
         counts.append(count)
         colors.append(_color(row[1 + count :]))
     triangles, polygon = triangulate(vertices, np.array(corners, np.int64), np.array(counts, np.int64))
     faces = np.array(corners, np.int64)[triangles].astype(np.int32)
     paint = None
-    if any(each is not None for each in colors):
-        paint = np.array([GREY if each is None else each for each in colors], dtype=np.uint8)[polygon]
+    if any(color is not None for color in colors):
+        paint = np.array([GREY if color is None else color for color in colors], dtype=np.uint8)[polygon]
     elif kind in ("COFF", "CNOFF"):
         of_vertices = [_color(row[6:] if kind == "CNOFF" else row[3:]) for row in rows]
-        paint = face_paint(np.array([GREY if each is None else each for each in of_vertices], np.uint8), faces)
+        paint = face_paint(np.array([GREY if color is None else color for color in of_vertices], np.uint8), faces)
     grey = np.tile(np.array(GREY, np.uint8), (len(faces), 1))
     return Surface(name, vertices, faces, grey if paint is None else paint, paint=paint)
 
@@ -69,7 +69,7 @@ def _point(words: list[str]) -> list[float]:
 
 
 def _color(words: list[str]) -> ByteArray | None:
-    """The colour behind a vertex or a face: whole numbers to 255, or fractions; None where there are not three."""
+    """Return the colour after a vertex or a face, whole numbers to 255 or fractions; None for fewer than three."""
     if len(words) < 3:
         return None
     if all(word.lstrip("+").isdigit() for word in words):

@@ -15,7 +15,7 @@ from pipeline.errors import ConfigError
 from stages.exemplars.formats.colors import color_bytes, decode_image, face_paint, sample_texture, unit_colors
 from stages.exemplars.formats.enclosure import Enclosure, Outside
 from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, ModelScene, Placement, Surface
+from stages.exemplars.formats.scene import GREY, INVALID, Malformed, ModelScene, Placement, Surface
 from stages.shape.arrays import ByteArray, FloatArray
 
 _TYPES = {
@@ -57,14 +57,17 @@ class _Element:
 
 @dataclass(frozen=True)
 class _Column:
-    """Values of one property, item after item, and for lists how many each item has."""
+    """The values of one property, item after item.
+
+    lengths: the number of values of each item, for lists.
+    """
 
     values: np.ndarray
     lengths: np.ndarray | None = None
 
 
 def read_ply(path: Path, enclosure: Enclosure) -> ModelScene:
-    """The one surface of a `.ply` file. Raises ConfigError for a file that is cut off or malformed."""
+    """Return the surface of a `.ply` file. Raises ConfigError for a file that is cut off or malformed."""
     content = path.read_bytes()
     try:
         elements, order, texture, start = _header(content, enclosure)
@@ -73,17 +76,17 @@ def read_ply(path: Path, enclosure: Enclosure) -> ModelScene:
         vertex, face = columns.get("vertex", {}), columns.get("face", {})
         vertices = _rows("vertex", vertex, ("x", "y", "z")).astype(np.float64)
         corners = face.get("vertex_indices") or face.get("vertex_index")
-        places = lengths = np.empty(0, np.int64)
+        indices = lengths = np.empty(0, np.int64)
         if corners is not None and corners.lengths is not None:
-            places, lengths = corners.values.astype(np.int64), corners.lengths
-        if len(places) and (places.min() < 0 or places.max() >= len(vertices)):
-            raise Malformed(f"a face on vertex {places.max()} of {len(vertices)}")
+            indices, lengths = corners.values.astype(np.int64), corners.lengths
+        if len(indices) and (indices.min() < 0 or indices.max() >= len(vertices)):
+            raise Malformed(f"a face on vertex {indices.max()} of {len(vertices)}")
         of_faces, of_vertices = _colors("face", face), _colors("vertex", vertex)
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-        reason = error if isinstance(error, Malformed) else f"{enclosure.at} {SENSELESS}"
+        reason = error if isinstance(error, Malformed) else f"{enclosure.at} {INVALID}"
         raise ConfigError(f"{path}: not a whole PLY file ({reason}); copy or export it again") from None
-    triangles, polygon = triangulate(vertices, places, lengths)
-    faces = places[triangles].astype(np.int32)
+    triangles, polygon = triangulate(vertices, indices, lengths)
+    faces = indices[triangles].astype(np.int32)
     warnings: list[str] = []
     paint: ByteArray | None = None
     face_colors: ByteArray = np.tile(np.array(GREY, np.uint8), (len(faces), 1))
@@ -99,25 +102,27 @@ def read_ply(path: Path, enclosure: Enclosure) -> ModelScene:
 
 
 def read_ply_points(path: Path, enclosure: Enclosure) -> tuple[FloatArray, FloatArray | None, ByteArray | None] | None:
-    """Points (n, 3), normals (n, 3) and colours uint8 (n, 3) sRGB of a `.ply` file without faces, a point cloud; None
-    for one with faces. Raises ConfigError for a file that is cut off or malformed."""
+    """Return points (n, 3), normals (n, 3) and colours uint8 (n, 3) sRGB of a point cloud; None for a file with faces.
+
+    Raises ConfigError for a file that is cut off or malformed.
+    """
     content = path.read_bytes()
     try:
         elements, order, _, start = _header(content, enclosure)
-        if any(each.name == "face" and each.count for each in elements):
+        if any(element.name == "face" and element.count for element in elements):
             return None
         vertex = (_ascii if order == "" else _binary)(content[start:], elements, order, enclosure).get("vertex", {})
         points = _rows("vertex", vertex, ("x", "y", "z")).astype(np.float64)
-        ways = ("nx", "ny", "nz")
-        normals = _rows("vertex", vertex, ways).astype(np.float64) if vertex.keys() >= set(ways) else None
+        axes = ("nx", "ny", "nz")
+        normals = _rows("vertex", vertex, axes).astype(np.float64) if vertex.keys() >= set(axes) else None
         return points, normals, _colors("vertex", vertex)
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-        reason = error if isinstance(error, Malformed) else f"{enclosure.at} {SENSELESS}"
+        reason = error if isinstance(error, Malformed) else f"{enclosure.at} {INVALID}"
         raise ConfigError(f"{path}: not a whole PLY file ({reason}); copy or export it again") from None
 
 
 def _header(content: bytes, enclosure: Enclosure) -> tuple[list[_Element], str, str | None, int]:
-    """Elements, byte order (empty for ASCII), texture file, and where the header ends."""
+    """Return elements, byte order (empty for ASCII), texture file, and the offset after the header."""
     end = content.find(b"end_header")
     if not content.startswith(b"ply") or end < 0:
         raise Malformed("no PLY header")
@@ -137,10 +142,10 @@ def _header(content: bytes, enclosure: Enclosure) -> tuple[list[_Element], str, 
             elements[-1].properties.append(_Property(words[4], _TYPES[words[3]], _TYPES[words[2]]))
         elif words[:1] == ["property"]:
             elements[-1].properties.append(_Property(words[2], _TYPES[words[1]], None))
-    # a row without properties takes no bytes, so that nothing would end a count that is too large
-    elements = [each for each in elements if each.properties]
-    if any(each.count < 0 for each in elements):
-        raise Malformed("an element of fewer than no rows")
+    # a row without properties takes no bytes, so nothing would limit its count
+    elements = [element for element in elements if element.properties]
+    if any(element.count < 0 for element in elements):
+        raise Malformed("an element has a negative number of rows")
     if order is None:
         raise Malformed("no format line")
     return elements, order, texture, start
@@ -157,39 +162,39 @@ def _binary(body: bytes, elements: list[_Element], order: str, enclosure: Enclos
             continue
         gathered: list[list[np.ndarray]] = [[] for _ in element.properties]
         for _ in range(element.count):
-            for each, values in zip(element.properties, gathered, strict=True):
+            for column, values in zip(element.properties, gathered, strict=True):
                 size = 1
-                if each.length is not None:
-                    size = int(np.frombuffer(body, order + each.length, 1, offset)[0])
-                    offset += np.dtype(each.length).itemsize
+                if column.length is not None:
+                    size = int(np.frombuffer(body, order + column.length, 1, offset)[0])
+                    offset += np.dtype(column.length).itemsize
                 if size < 0:
                     raise Malformed(f"element {element.name} has a list of {size} values")
-                values.append(np.frombuffer(body, order + each.dtype, size, offset))
-                offset += size * np.dtype(each.dtype).itemsize
+                values.append(np.frombuffer(body, order + column.dtype, size, offset))
+                offset += size * np.dtype(column.dtype).itemsize
         columns[element.name] = {
-            each.name: _Column(
-                np.concatenate(values) if values else np.empty(0, each.dtype),
-                None if each.length is None else np.array([len(value) for value in values], dtype=np.int64),
+            column.name: _Column(
+                np.concatenate(values) if values else np.empty(0, column.dtype),
+                None if column.length is None else np.array([len(value) for value in values], dtype=np.int64),
             )
-            for each, values in zip(element.properties, gathered, strict=True)
+            for column, values in zip(element.properties, gathered, strict=True)
         }
     return columns
 
 
 def _fixed_rows(body: bytes, offset: int, element: _Element, order: str) -> tuple[dict[str, _Column], int] | None:
-    """The columns of an element whose lists are all as long as in its first item, read at once; else None."""
+    """Return the columns of an element, read together; None if its lists have several lengths."""
     fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
     at, lengths = offset, {}
-    for each in element.properties:
-        if each.length is not None:
-            size = int(np.frombuffer(body, order + each.length, 1, at)[0]) if element.count else 0
-            lengths[each.name] = size
-            fields.append((f"{each.name} length", order + each.length))
-            fields.append((each.name, order + each.dtype, (size,)))
-            at += np.dtype(each.length).itemsize + size * np.dtype(each.dtype).itemsize
+    for column in element.properties:
+        if column.length is not None:
+            size = int(np.frombuffer(body, order + column.length, 1, at)[0]) if element.count else 0
+            lengths[column.name] = size
+            fields.append((f"{column.name} length", order + column.length))
+            fields.append((column.name, order + column.dtype, (size,)))
+            at += np.dtype(column.length).itemsize + size * np.dtype(column.dtype).itemsize
         else:
-            fields.append((each.name, order + each.dtype))
-            at += np.dtype(each.dtype).itemsize
+            fields.append((column.name, order + column.dtype))
+            at += np.dtype(column.dtype).itemsize
     dtype = np.dtype(fields)
     if offset + element.count * dtype.itemsize > len(body):
         if lengths:
@@ -199,11 +204,11 @@ def _fixed_rows(body: bytes, offset: int, element: _Element, order: str) -> tupl
     if any((rows[f"{name} length"] != size).any() for name, size in lengths.items()):
         return None
     columns = {
-        each.name: _Column(
-            rows[each.name].ravel(),
-            None if each.length is None else np.full(element.count, lengths[each.name], dtype=np.int64),
+        column.name: _Column(
+            rows[column.name].ravel(),
+            None if column.length is None else np.full(element.count, lengths[column.name], dtype=np.int64),
         )
-        for each in element.properties
+        for column in element.properties
     }
     return columns, offset + element.count * dtype.itemsize
 
@@ -217,9 +222,9 @@ def _ascii(body: bytes, elements: list[_Element], order: str, enclosure: Enclosu
         gathered: list[list[bytes]] = [[] for _ in element.properties]
         lengths: list[list[int]] = [[] for _ in element.properties]
         for _ in range(element.count):
-            for number, each in enumerate(element.properties):
+            for number, column in enumerate(element.properties):
                 size = 1
-                if each.length is not None:
+                if column.length is not None:
                     size = int(words[at])
                     at += 1
                 if not 0 <= size <= len(words) - at:
@@ -228,17 +233,17 @@ def _ascii(body: bytes, elements: list[_Element], order: str, enclosure: Enclosu
                 lengths[number].append(size)
                 at += size
         columns[element.name] = {
-            each.name: _Column(
-                np.array(gathered[number], dtype=np.float64).astype(each.dtype if each.dtype[0] != "f" else "f8"),
-                None if each.length is None else np.array(lengths[number], dtype=np.int64),
+            column.name: _Column(
+                np.array(gathered[number], dtype=np.float64).astype(column.dtype if column.dtype[0] != "f" else "f8"),
+                None if column.length is None else np.array(lengths[number], dtype=np.int64),
             )
-            for number, each in enumerate(element.properties)
+            for number, column in enumerate(element.properties)
         }
     return columns
 
 
 def _rows(element: str, columns: dict[str, _Column], names: tuple[str, ...]) -> np.ndarray:
-    """The single values called `names` of each item of an element (n, len(names))."""
+    """Return the single values called `names` of each item of an element (n, len(names))."""
     for name in names:
         if name not in columns:
             raise Malformed(f"element {element} has no property {name}")
@@ -263,7 +268,7 @@ def _textured(
     plain: ByteArray,
     warnings: list[str],
 ) -> ByteArray:
-    """Face colours from the texture, by the coordinates of face corners or of vertices; `plain` without them."""
+    """Return face colours from the texture, by coordinates of face corners or of vertices; `plain` without them."""
     uv: FloatArray | None = None
     corners = faces
     for names in (("texture_u", "texture_v"), ("s", "t"), ("u", "v")):
@@ -274,14 +279,14 @@ def _textured(
         if texcoord.lengths is not None and np.array_equal(texcoord.lengths, 2 * lengths):
             uv, corners = texcoord.values.reshape(-1, 2).astype(np.float64), triangles
         else:
-            warnings.append("property texcoord of element face has not two numbers for each corner, and is left out")
+            warnings.append("property texcoord of element face has no two numbers for each corner; it is left out")
     try:
         image = decode_image(enclosure.read(texture, "TextureFile"))
     except Outside:
         warnings.append(f"texture {texture!r} is outside the folder of the model and is not opened; its faces are grey")
         return plain
     except FileNotFoundError:
-        warnings.append(f"texture {texture!r} is not there; its faces are grey")
+        warnings.append(f"texture {texture!r} is missing; its faces are grey")
         return plain
     except OSError as error:
         warnings.append(f"texture {texture!r} cannot be read: {error}")

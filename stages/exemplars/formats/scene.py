@@ -1,4 +1,4 @@
-"""What every reader makes of a file: surfaces, placed in the world, with what the file says about their faces."""
+"""The result of every reader: surfaces and their placements, with face colours and materials."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-SENSELESS = "is not there, or says what cannot be"
-"""What becomes of an element in a message, where only Python knows more."""
+INVALID = "is missing or invalid"
+"""The fault of an element in a message, if the reader does not know more."""
 
 
 class Malformed(ValueError):
-    """What a file says makes no sense; the message says what and where, in our words."""
+    """A file is malformed; the message says what is wrong and where."""
 
 
 GREY = (160, 160, 160)
-"""sRGB of a face of which the file says nothing."""
+"""sRGB of faces without a colour."""
 
-_LONGEST = 200
-"""Characters that the name of a part has at most."""
+_MAX_NAME_LENGTH = 200
 
 
 @dataclass(frozen=True)
 class Surface:
     """A triangle mesh of the file.
 
-    vertices: float64 (v, 3); faces: int32 (f, 3); face_colors: uint8 (f, 3) sRGB.
-    face_material: int32 (f,), index into `materials`, -1 where a face has none.
-    paint: uint8 (f, 3) sRGB, the face or vertex colours of the file itself, apart from its materials; None where
-    it has none.
+    vertices: float64 (v, 3).
+    faces: int32 (f, 3).
+    face_colors: uint8 (f, 3) sRGB.
+    face_material: int32 (f,), index into `materials`, -1 for a face without material.
+    paint: uint8 (f, 3) sRGB, the face or vertex colours of the file, without materials; None if it has none.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Surface:
     paint: ByteArray | None = None
 
     def select(self, faces: np.ndarray) -> Surface:
-        """The surface of the faces with indices `faces`, with the vertices that these use, in their order."""
+        """Return the surface of the faces with indices `faces`, without unused vertices."""
         used, renumbered = np.unique(self.faces[faces], return_inverse=True)
         return Surface(
             name=self.name,
@@ -59,9 +59,9 @@ class Surface:
 
 @dataclass(frozen=True)
 class Placement:
-    """A surface in the world under a name of its own.
+    """A named surface in the world.
 
-    label: the file's own word for the type of the part, if it has one.
+    label: the file's label for the type of the part, if it has one.
     pose: float64 (4, 4), any affine map with an inverse.
     """
 
@@ -76,7 +76,7 @@ class ModelScene:
     """The surfaces of a file and their placements, in the order of the file.
 
     kind: whether placements are nodes of a scene graph or named objects of one mesh.
-    up: the axis that points up by the file's own word, where the format lets files choose.
+    up: the axis that points up as the file states it, if its format lets files choose.
     """
 
     kind: Literal["nodes", "objects"]
@@ -87,31 +87,31 @@ class ModelScene:
 
 
 def type_label(name: str) -> str:
-    """The word for the type in the name of a part: `wall` of `wall.003` and of `wall_12`, else the name itself."""
+    """Return the type in the name of a part: `wall` of `wall.003` and of `wall_12`, else the name itself."""
     return re.sub(r"(?<=.)[._]\d+$", "", name)
 
 
 class UniqueNames:
-    """Gives names out, each once."""
+    """Give every name once."""
 
     def __init__(self) -> None:
         self._copies: dict[str, int] = {}
 
     def __call__(self, name: str) -> str:
-        """`name`, or `name#2`, `name#3`, ... where that is taken."""
-        found = name
-        while found in self._copies:
+        """Return `name`, or `name#2`, `name#3`, ... if it is taken."""
+        unique = name
+        while unique in self._copies:
             self._copies[name] += 1
-            found = f"{name}#{self._copies[name]}"
-        self._copies[found] = 1
-        return found
+            unique = f"{name}#{self._copies[name]}"
+        self._copies[unique] = 1
+        return unique
 
 
 def plain_text(text: str) -> str:
-    """`text` as it can be shown and written anywhere: what does not print, and half a character, is replaced."""
-    return text if text.isprintable() else "".join(each if each.isprintable() else "\ufffd" for each in text)
+    """Return `text` with unprintable characters and lone surrogates replaced."""
+    return text if text.isprintable() else "".join(char if char.isprintable() else "\ufffd" for char in text)
 
 
 def plain_name(name: str) -> str:
-    """`plain_text`, cut where it is too long for a name."""
-    return plain_text(name) if len(name) <= _LONGEST else plain_text(name[:_LONGEST]) + "…"
+    """Return `plain_text` of a name, cut if it is too long."""
+    return plain_text(name) if len(name) <= _MAX_NAME_LENGTH else plain_text(name[:_MAX_NAME_LENGTH]) + "…"

@@ -1,6 +1,6 @@
 """STL, ASCII and binary. The solids of an ASCII file are its objects.
 
-trimesh's reader is not used here: it ends a file of text where its words stop being numbers, and says nothing.
+trimesh's reader is not used here: it silently stops reading at the first word that is no number.
 """
 
 from __future__ import annotations
@@ -13,18 +13,20 @@ from pipeline.errors import ConfigError
 from stages.exemplars.formats.scene import GREY, Malformed, ModelScene, Placement, Surface
 from stages.shape.arrays import FloatArray
 
-_HEAD, _TRIANGLE = 84, 50  # bytes
+_HEAD_BYTES, _TRIANGLE_BYTES = 84, 50
 _ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def read_stl(path: Path) -> ModelScene:
-    """The surfaces of a `.stl` file, one for each solid. Raises ConfigError, with the line where the file is text, for
-    a file that is cut off or malformed."""
+    """Return the surfaces of a `.stl` file, one for each solid.
+
+    Raises ConfigError for a file that is cut off or malformed, with the line if it is text.
+    """
     content = path.read_bytes()
-    announced = int.from_bytes(content[80:_HEAD], "little")
+    announced = int.from_bytes(content[80:_HEAD_BYTES], "little")
     try:
-        if len(content) == _HEAD + _TRIANGLE * announced:
-            corners = np.ndarray(announced, _ROW, content, _HEAD)["corners"]
+        if len(content) == _HEAD_BYTES + _TRIANGLE_BYTES * announced:
+            corners = np.ndarray(announced, _ROW, content, _HEAD_BYTES)["corners"]
             solids = [(path.stem, corners.reshape(-1, 3).astype(np.float64))]
         elif content.lstrip()[:5].lower() == b"solid":
             solids = _solids(content.decode("utf-8", errors="replace"), path.stem)
@@ -43,7 +45,7 @@ def read_stl(path: Path) -> ModelScene:
 
 
 def _solids(text: str, stem: str) -> list[tuple[str, FloatArray]]:
-    """Name and corners, float64 (3 * f, 3), of each solid that has any; one alone is called as the file."""
+    """Return name and corners, float64 (3 * f, 3), of each solid with faces; a single solid has the file's name."""
     solids: list[tuple[str, FloatArray]] = []
     corners: list[list[float]] = []
     name: str | None = None
@@ -68,4 +70,4 @@ def _solids(text: str, stem: str) -> list[tuple[str, FloatArray]]:
             name, corners = None, []
     if name is not None or corners:
         raise Malformed("its last solid does not end")
-    return solids if len(solids) > 1 else [(stem, each) for _, each in solids]
+    return solids if len(solids) > 1 else [(stem, corners) for _, corners in solids]

@@ -1,7 +1,7 @@
 """Wavefront OBJ with its MTL: named objects in file order, n-gons, materials, textures, vertex colours.
 
-trimesh's reader is not used here: it gathers faces by material, so that objects lose their order and their unity,
-reads one material library only, takes negative indices from the end of the file, and splits n-gons into fans.
+trimesh's reader is not used here: it groups faces by material, which breaks up objects and their order. It also reads
+one material library only, counts negative indices from the end of the file, and splits n-gons into fans.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class _Material:
 
 @dataclass
 class _Lines:
-    """What the lines of an OBJ say, before triangulation."""
+    """The content of the lines of an OBJ, before triangulation."""
 
     positions: list[list[float]] = field(default_factory=list)
     colors: list[list[float]] = field(default_factory=list)
@@ -45,9 +45,9 @@ class _Lines:
 
 
 def read_wavefront(path: Path, enclosure: Enclosure) -> ModelScene:
-    """The scene of an `.obj` file: a placement for each object (`o`; `g` where there is at most one `o`).
+    """Return the scene of an `.obj` file: a placement for each object (`o`; `g` if there is at most one `o`).
 
-    Raises ConfigError, with the line, for a number or an index that makes no sense.
+    Raises ConfigError, with the line, for an invalid number or index.
     """
     lines = _parse(path)
     warnings = [f"{kind} are left out" for kind in sorted(lines.skipped)]
@@ -56,8 +56,8 @@ def read_wavefront(path: Path, enclosure: Enclosure) -> ModelScene:
     corners = np.array(lines.corners, dtype=np.int64)
     triangles, polygon = triangulate(vertices, corners, np.array(lines.counts, dtype=np.int64))
     names = sorted({state[2] for state in lines.states if state[2] is not None})
-    place_of: dict[str | None, int] = {None: -1, **{name: place for place, name in enumerate(names)}}
-    material_of = np.array([place_of[state[2]] for state in lines.states], dtype=np.int32)
+    index_of: dict[str | None, int] = {None: -1, **{name: index for index, name in enumerate(names)}}
+    material_of = np.array([index_of[state[2]] for state in lines.states], dtype=np.int32)
     warnings += [
         f"material {name!r} is not in its library; its faces are grey" for name in names if name not in materials
     ]
@@ -129,10 +129,10 @@ def _parse(path: Path) -> _Lines:
 
 
 def _parse_face(lines: _Lines, words: Sequence[str]) -> None:
-    """Append a face. Raises ValueError for an index that is zero, no number, or beyond what was listed so far."""
+    """Append a face. Raises ValueError for an index that is zero, no number, or not yet listed."""
     for word in words:
-        place, _, rest = word.partition("/")
-        lines.corners.append(_index(place, len(lines.positions)))
+        vertex, _, rest = word.partition("/")
+        lines.corners.append(_index(vertex, len(lines.positions)))
         texture = rest.partition("/")[0]
         lines.texture_corners.append(_index(texture, len(lines.texture)) if texture else -1)
     lines.counts.append(len(words))
@@ -147,7 +147,7 @@ def _index(word: str, count: int) -> int:
 
 
 def _objects(states: Sequence[tuple[str | None, str | None, str | None]], stem: str) -> tuple[np.ndarray, list[str]]:
-    """The object of each polygon, and the objects' names in order of appearance."""
+    """Return the object of each polygon, and the objects' names in order of appearance."""
     by_object, by_group = ({state[key] for state in states} for key in (0, 1))
     key = 1 if len(by_object) < 2 <= len(by_group) else 0
     names: dict[str, int] = {}
@@ -174,7 +174,7 @@ def _libraries(libraries: Sequence[str], enclosure: Enclosure, warnings: list[st
                 _parse_library(content.decode("utf-8", errors="replace"), enclosure, materials, warnings)
             break
         else:
-            warnings.append(f"material library {line!r} is not there; its faces are grey")
+            warnings.append(f"material library {line!r} is missing; its faces are grey")
     return materials
 
 
@@ -201,13 +201,13 @@ def _parse_library(text: str, enclosure: Enclosure, materials: dict[str, _Materi
                     "material's colour"
                 )
             except FileNotFoundError:
-                warnings.append(f"texture {name!r} is not there; its faces have the material's colour")
+                warnings.append(f"texture {name!r} is missing; its faces have the material's colour")
             except OSError as error:
                 warnings.append(f"texture {name!r} cannot be read: {error}")
 
 
 def _map_file(rest: str) -> str:
-    """The file name of a `map_Kd` line, behind its options; it may hold blanks."""
+    """Return the file name of a `map_Kd` line, after its options; it may hold blanks."""
     words = rest.split()
     while words and words[0].startswith("-"):
         option, arguments = words[0], _MAP_OPTIONS.get(words[0], 1)
@@ -238,10 +238,10 @@ def _face_colors(
     for index, material in enumerate(materials):
         if material is None:
             continue
-        mine = face_material == index
+        has_material = face_material == index
         if paint is None:
-            colors[mine] = material.color
-        textured = mine & (uv_faces >= 0).all(axis=1)
+            colors[has_material] = material.color
+        textured = has_material & (uv_faces >= 0).all(axis=1)
         if material.image is not None and textured.any():
             colors[textured] = sample_texture(material.image, uv, uv_faces[textured])
     return colors

@@ -1,4 +1,4 @@
-"""A closed box is told from what is open, or has something standing out."""
+"""Closed boxes are distinguished from open shapes and from boxes with something protruding."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def whole(placed: list[Placed]) -> Shape:
 
 
 @pytest.mark.parametrize(
-    ("more", "boxed"),
+    ("more", "closed"),
     [
         ([("back", pose(0, 0, 0.45))], True),
         (
@@ -44,18 +44,18 @@ def whole(placed: list[Placed]) -> Shape:
         ([("back", pose(0, 0, 0.45)), ("handle", pose(0, 0, 0.525)), ("handle", pose(1.025, 0, 0, 1))], False),
     ],
 )
-def test_a_box_is_closed_with_one_side_that_has_something_on_it(more: list[Placed], boxed: bool) -> None:
-    assert is_closed_box(whole([*WITHOUT_FRONT, *more])) == boxed
+def test_closed_box_may_have_one_side_with_something_on_it(more: list[Placed], closed: bool) -> None:
+    assert is_closed_box(whole([*WITHOUT_FRONT, *more])) == closed
 
 
-def test_shares_are_those_of_the_sides_of_the_box_around_a_shape() -> None:
+def test_side_shares_are_those_of_the_box_around_a_shape() -> None:
     front, right, back, left, top, bottom = side_shares(whole(WITHOUT_FRONT))
     np.testing.assert_allclose([right, back, left, top, bottom], 1.0)
     # of 2 x 1 the edges of two lids and two sides
     assert front == pytest.approx((2 * 2 * 0.1 + 2 * 0.1 * 0.8) / 2, abs=0.03)
 
 
-def test_other_proportions_of_a_closed_box_are_said_to_look_alike() -> None:
+def test_resized_closed_box_is_reported_to_look_alike() -> None:
     kit = kit_of(PANELS, [[*WITHOUT_FRONT, ("back", pose(0, 0, 0.45))]])
-    assert "look alike, for it is a closed box with plain sides" in estimate_resizing(kit, 2).sentence
+    assert "look alike, since the exemplar is a closed box with plain sides" in estimate_resizing(kit, 2).sentence
     assert "alike" not in estimate_resizing(stools(), 2).sentence

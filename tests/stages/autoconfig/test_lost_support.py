@@ -1,4 +1,4 @@
-"""What stands close above and below parts in exemplars, without any contact, is missed where it is gone."""
+"""Parts lose support if what is close above or below them in exemplars, without any contact, is gone."""
 
 from __future__ import annotations
 
@@ -38,21 +38,21 @@ def hall(bays: int, storeys: int = 1, columns: bool = True) -> list[Placed]:
 
 
 def put(kit: Kit, shape: Sequence[Placed]) -> Assembly:
-    names = [each.name for each in kit.types]
+    names = [kind.name for kind in kit.types]
     types = np.array([names.index(name) for name, _ in shape], dtype=np.int16)
     return Assembly(types, np.array([at for _, at in shape]), np.empty((0, 2), dtype=np.int32))
 
 
-def test_columns_are_bared_where_the_walls_grow_past_them() -> None:
+def test_columns_lose_support_if_the_walls_grow_past_them() -> None:
     kit = kit_of(HALL, [hall(4)])
     low, high = put(kit, hall(6)), put(kit, hall(4, 2))
     assert lost_support(kit, [high, high, low]) == ("column",)
     assert lost_support(kit, [low, low, high]) == ()  # most of the shapes are whole
-    assert lost_support(kit, [put(kit, hall(4, 2, columns=False))]) == ()  # what is not there is not bared
+    assert lost_support(kit, [put(kit, hall(4, 2, columns=False))]) == ()  # absent columns lose nothing
     assert lost_support(kit, []) == ()
 
 
-def test_what_hung_close_below_something_and_what_stood_close_above_it_are_both_missed() -> None:
+def test_support_from_above_and_from_below_counts() -> None:
     shelf = {"board": box(1, 0.1, 1), "jar": box(0.3, 0.6, 0.3), "side": box(0.1, 2, 1)}
     row = [("board", pose(1.5 * k, 0, 0)) for k in range(4)] + [("jar", pose(1.5 * k, 0.36, 0)) for k in range(4)]
     lifted = [(name, pose(0, 3.0, 0) @ at if name == "jar" else at) for name, at in row]
@@ -61,21 +61,21 @@ def test_what_hung_close_below_something_and_what_stood_close_above_it_are_both_
     assert set(lost_support(kit, [put(kit, lifted)])) == {"jar", "board"}
 
 
-def test_a_lamp_among_many_parts_does_not_count() -> None:
+def test_single_part_among_many_does_not_count() -> None:
     lamp: Placed = ("lamp", pose(0, 0.85, 0.2))
     kit = kit_of(HALL, [[*hall(8), lamp]])
     lower: Placed = ("lamp", pose(0, 0.5, 0.2))
     assert lost_support(kit, [put(kit, [*hall(8), lower])]) == ()
 
 
-@pytest.mark.parametrize(("names", "enough"), [((), True), (("column",), False)])
-def test_what_looks_broken_is_not_enough_and_hardly_more_than_nothing(names: tuple[str, ...], enough: bool) -> None:
+@pytest.mark.parametrize(("names", "sufficient"), [((), True), (("column",), False)])
+def test_shapes_that_look_broken_do_not_suffice_and_hardly_count(names: tuple[str, ...], sufficient: bool) -> None:
     setting = Setting(("face",), "multiset")
-    found = CandidateSetting(setting, TrialResult(2500, 100, 90, 0.2, 0.1, 0.5, 1.0), 1.0, (), names)
+    candidate = CandidateSetting(setting, TrialResult(2500, 100, 90, 0.2, 0.1, 0.5, 1.0), 1.0, (), names)
     nothing, few = (
         CandidateSetting(setting, TrialResult(2500, 0, 0, 0.0, 0.0), 1.0),
         CandidateSetting(setting, TrialResult(2500, 3, 3, 0.1, 0.1), 1.0),
     )
-    assert found.gives_enough == enough
-    assert found.score > nothing.score
-    assert (found.score > few.score) == enough
+    assert candidate.is_sufficient == sufficient
+    assert candidate.score > nothing.score
+    assert (candidate.score > few.score) == sufficient

@@ -1,4 +1,4 @@
-"""Which rungs of the ladder are tried."""
+"""Which candidate settings are tried."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from tests.toy_kits.chains_and_rings import CHAIN, chain, config_of, models_of
 
 
 @pytest.mark.parametrize(
-    ("histograms", "tried"),
+    ("histograms", "expected"),
     [(9, ["multiset", "count_and_pairs", "slots"]), (10, list(CANDIDATE_GRAMMARS))],
 )
-def test_stricter_slots_are_tried_only_where_the_loosest_find_something(
-    histograms: int, tried: list[str], monkeypatch: pytest.MonkeyPatch
+def test_stricter_slots_are_tried_only_if_the_loosest_find_something(
+    histograms: int, expected: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All that a stricter level of slots admits, the loosest admits, too."""
-    asked: list[str] = []
+    """The loosest level of slots admits whatever a stricter one admits."""
+    tried: list[str] = []
 
-    def rung(_: Any, setting: Setting, *__: Any) -> CandidateSetting:
-        asked.append(setting.grammar)
-        found = histograms if setting.grammar == "slots" else 0
-        return CandidateSetting(setting, TrialResult(100, found, found, 0.1, 0.1), 1.0)
+    def try_setting(_: Any, setting: Setting, *__: Any) -> CandidateSetting:
+        tried.append(setting.grammar)
+        count = histograms if setting.grammar == "slots" else 0
+        return CandidateSetting(setting, TrialResult(100, count, count, 0.1, 0.1), 1.0)
 
-    monkeypatch.setattr(setting_search, "_rung", rung)
+    monkeypatch.setattr(setting_search, "_try_setting", try_setting)
     shape = chain(3)
-    sight = ContactAnalysis(identify_parts(models_of(CHAIN, [shape]), config_of([shape])), 1e-3, 1e-2, "y")
-    rungs = search_settings(sight, SearchSpace(kinds=(("face",),), hubs=()), 100)
-    assert sorted(asked) == sorted(tried)  # each once
-    assert {each.setting.grammar for each in rungs} == set(tried)
-    assert rungs[-1].setting.grammar == "slots"
+    analysis = ContactAnalysis(identify_parts(models_of(CHAIN, [shape]), config_of([shape])), 1e-3, 1e-2, "y")
+    candidates = search_settings(analysis, SearchSpace(kinds=(("face",),), hubs=()), 100)
+    assert sorted(tried) == sorted(expected)  # once each
+    assert {candidate.setting.grammar for candidate in candidates} == set(expected)
+    assert candidates[-1].setting.grammar == "slots"

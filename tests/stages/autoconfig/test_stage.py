@@ -1,4 +1,4 @@
-"""Kits with keys at `auto` through the real mill: decided once, recorded, and built as inspect would."""
+"""Kits with keys at `auto` through the pipeline: resolved once, recorded, and built as an inspection would."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def run(folder: Path, stages: tuple[str, ...], out: str = "out") -> str:
     printed = ""
     for stage in stages:
         arguments = ("--config", folder / "toy.yaml", "--out", folder / out, "--workers", 1)
-        code, said = shapemill("run", stage, *arguments)
-        assert code == 0, said
-        printed += said
+        code, text = shapemill("run", stage, *arguments)
+        assert code == 0, text
+        printed += text
     return printed
 
 
@@ -41,7 +41,7 @@ def record(folder: Path, stage: str, shard: str, out: str = "out") -> dict[str, 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A kit of rings that leaves all open, beside one that leaves nothing."""
+    """Return a run with a kit of rings that leaves all keys at `auto`, and one that states all."""
     folder = tmp_path_factory.mktemp("autoconfig")
     shapes = [[(name, Z_UP @ at) for name, at in ring(*size)] for size in ((1, 1), (2, 3))]
     paths = [write_model(folder / f"ring{k}.glb", ROAD, shape) for k, shape in enumerate(shapes)]
@@ -51,35 +51,35 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return folder, run(folder, ("autoconfig", "exemplars"))
 
 
-def test_only_a_kit_that_leaves_something_open_is_probed(made: tuple[Path, str]) -> None:
+def test_only_kits_with_auto_keys_are_resolved(made: tuple[Path, str]) -> None:
     records = made[0] / "out" / ".work" / "toy" / "autoconfig" / "records"
     assert [path.name for path in records.iterdir()] == ["open.json"]
 
 
-def test_the_kit_is_built_as_was_chosen_and_the_record_says_why(made: tuple[Path, str]) -> None:
-    chosen = record(made[0], "autoconfig", "open")["summary"]
+def test_kit_is_built_with_the_recorded_settings(made: tuple[Path, str]) -> None:
+    summary = record(made[0], "autoconfig", "open")["summary"]
     built = record(made[0], "exemplars", "open")["summary"]
-    assert chosen["resolved"]["up"] == "z"
-    assert (built["resolved"], built["reasons"]) == (chosen["resolved"], chosen["reasons"])
+    assert summary["resolved"]["up"] == "z"
+    assert (built["resolved"], built["reasons"]) == (summary["resolved"], summary["reasons"])
     kit = json.loads((made[0] / "out" / ".work" / "toy" / "exemplars" / "open.json").read_text())
-    assert (kit["up"], kit["strictness"]) == ("z", chosen["resolved"]["grammar"])
+    assert (kit["up"], kit["strictness"]) == ("z", summary["resolved"]["grammar"])
     assert record(made[0], "exemplars", "stated")["summary"]["resolved"] == {}
 
 
-def test_people_are_told_what_was_chosen(made: tuple[Path, str]) -> None:
+def test_resolved_settings_are_printed(made: tuple[Path, str]) -> None:
     assert "open: up: z: the lowest points span" in made[1]
 
 
-def test_near_copies_are_refused_where_the_choice_found_enough_beside_them(tmp_path: Path) -> None:
+def test_near_copies_are_rejected_if_auto_finds_enough_other_variants(tmp_path: Path) -> None:
     shapes = sorted(map(str, (ROOT / "datasets" / "exemplars" / "playground").glob("*.glb")))
     kit = stated({"name": "open", "shapes": shapes, "disconnected": "auto"})
     variations = {"samples_per_kit": 24, "search": {"tries": 2000}, "splits": {"by": "graph", "shards": 1}}
     config = {"name": "toy", "exemplars": {"kits": [kit]}, "variations": variations}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     run(tmp_path, ("autoconfig", "exemplars", "variations"))
-    unasked = {"require.stable": False, "require.labels": []}
-    chosen = record(tmp_path, "autoconfig", "open")["summary"]["resolved"]
-    assert chosen == {"disconnected": "error", "require.max_copied_share": 0.9, **unasked}
+    requirements = {"require.stable": False, "require.labels": []}
+    summary = record(tmp_path, "autoconfig", "open")["summary"]["resolved"]
+    assert summary == {"disconnected": "error", "require.max_copied_share": 0.9, **requirements}
     samples = [
         sample
         for shard in (tmp_path / "out" / ".work" / "toy" / "variations").glob("toy-t*.tar")
@@ -90,7 +90,7 @@ def test_near_copies_are_refused_where_the_choice_found_enough_beside_them(tmp_p
     assert record(tmp_path, "variations", "open-r000-lane00")["rejects"]["too much copied whole"] > 0
 
 
-def test_other_proportions_come_instead_of_next_to_no_layouts_as_inspect_foretells(
+def test_exemplars_are_resized_if_there_are_too_few_layouts_as_inspect_predicts(
     made: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     paths = [str(made[0] / f"ring{k}.glb") for k in (0, 1)]
@@ -101,26 +101,26 @@ def test_other_proportions_come_instead_of_next_to_no_layouts_as_inspect_foretel
         "variations": {"samples_per_kit": 12, "splits": {"by": "graph", "val": 0.25, "shards": 1}},
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
-    said = run(tmp_path, ("autoconfig", "exemplars", "variations", "proportions"))
-    assert "rings: instead: proportions: 100% of what is drawn holds together; of other layouts about 16" in said
+    text = run(tmp_path, ("autoconfig", "exemplars", "variations", "proportions"))
+    assert "rings: fallback: proportions: 100% of what is drawn holds together; of other layouts about 16" in text
     work = tmp_path / "out" / ".work" / "toy"
     assert not list((work / "variations").glob("toy-*.tar"))
-    samples = [each for shard in (work / "proportions").glob("toy-*.tar") for each in read_samples(shard)]
-    assert sorted(each.split for each in samples) == ["test"] + 8 * ["train"] + 3 * ["val"]
-    assert {each.lineage["method"] for each in samples} == {"proportions"}
+    samples = [sample for shard in (work / "proportions").glob("toy-*.tar") for sample in read_samples(shard)]
+    assert sorted(sample.split for sample in samples) == ["test"] + 8 * ["train"] + 3 * ["val"]
+    assert {sample.lineage["method"] for sample in samples} == {"proportions"}
     capsys.readouterr()
     assert main([*paths, "--json", "--tries", "200"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["autoconfig"]["resolved"] == record(tmp_path, "autoconfig", "rings")["summary"]["resolved"]
-    assert found["autoconfig"]["resolved"]["proportions.require.stable"] is True
+    result = json.loads(capsys.readouterr().out)
+    assert result["autoconfig"]["resolved"] == record(tmp_path, "autoconfig", "rings")["summary"]["resolved"]
+    assert result["autoconfig"]["resolved"]["proportions.require.stable"] is True
     config["variations"] |= {"fallback": "nothing"}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     run(tmp_path, ("autoconfig",))
     assert "fallback" not in record(tmp_path, "autoconfig", "rings")["summary"]["resolved"]
 
 
-def test_the_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path) -> None:
-    """Two rings have 16 other layouts, which is no dataset, so other proportions are proposed; and layouts go, too."""
+def test_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path) -> None:
+    """Two rings have 16 other layouts, too few for a dataset, so resizing is proposed; layouts work, too."""
     paths = [str(made[0] / f"ring{k}.glb") for k in (0, 1)]
     assert main([*paths, "--tries", "200", "--out", str(tmp_path)]) == 0
     written = yaml.safe_load((tmp_path / "ring0.yaml").read_text())

@@ -1,4 +1,4 @@
-"""What a probe finds by which method."""
+"""How the methods of a trial search share the variants that are wanted."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 
 @pytest.mark.parametrize(("evenly", "grown"), [(False, 0), (True, 4)])
-def test_methods_share_what_is_wanted_where_it_is_asked_for(evenly: bool, grown: int) -> None:
-    """Many rings can be made of two, by either method."""
-    probe = TrialSearch(ContactOracle(kit_of(ROAD, [ring(3, 5), ring(4, 2)])), np.random.default_rng(1))
-    finds = probe.go_on(3000, 8, evenly)
-    assert finds.graphs == len(probe.variants) == 8
-    methods = Counter(each.lineage["method"] for each in probe.variants)
+def test_methods_find_equal_shares_if_asked_to(evenly: bool, grown: int) -> None:
+    """Either method makes many rings of two."""
+    search = TrialSearch(ContactOracle(kit_of(ROAD, [ring(3, 5), ring(4, 2)])), np.random.default_rng(1))
+    trial = search.run(3000, 8, evenly)
+    assert trial.graphs == len(search.variants) == 8
+    methods = Counter(variant.lineage["method"] for variant in search.variants)
     assert methods["growth"] == grown
     assert methods["exchange"] == 8 - grown

@@ -162,7 +162,7 @@ class TestLeftOut:
         assert len(kit.exemplars[0].assembly.edges) == len(block_kit(ring()).exemplars[0].assembly.edges)
         (warning,) = (each for each in report.warnings if "left out" in each)
         assert "thrice.glb: 2 parts are left out of the model: " in warning
-        assert "cube.1 (it stands at the very place of again), and again (it stands at the very" in warning
+        assert "cube.1 (it coincides with again), and again (it coincides with" in warning
 
     def test_parts_that_only_stand_inside_each_other_stay(self) -> None:
         eighth = np.array([[1, -1, 0], [1, 1, 0], [0, 0, np.sqrt(2)]]) / np.sqrt(2)

@@ -14,10 +14,8 @@ import pytest
 
 from pipeline.errors import ConfigError
 from stages.exemplars.model import pack_model, unpack_model
-from stages.exemplars.read import read_model
-from stages.exemplars.scene_file import parse_model
-from stages.exemplars.segmentation import Segmentation
-from stages.exemplars.settings import ReadLimits
+from stages.exemplars.read import parse_model, read_model
+from stages.exemplars.settings import ReadLimits, Segmentation
 from tests.hostile.corpus import LIMITS, outcomes
 from tests.hostile.good import write_good
 from tests.stages.exemplars.model_files import BOX_FACES, Glb, box, textured_dae, textured_glb, write_obj
@@ -216,7 +214,7 @@ def test_model_comes_out_of_its_process_as_it_was_read(tmp_path: Path) -> None:
 def test_faces_beyond_the_vertices_do_not_come_out(tmp_path: Path) -> None:
     model = parse_model(two_boxes().write(tmp_path / "m.glb"), "auto", ReadLimits())
     model.parts[0].faces[0, 0] = 8
-    with pytest.raises(ValueError, match="a face of a vertex that is not there"):
+    with pytest.raises(ValueError, match="a face has a vertex that does not exist"):
         unpack_model(model.path, pack_model(model))
 
 

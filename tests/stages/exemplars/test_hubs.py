@@ -77,7 +77,7 @@ def test_without_its_hub_an_exemplar_may_fall_apart_and_the_message_says_so() ->
 
 
 def test_nothing_is_built_while_hubs_are_undecided() -> None:
-    with pytest.raises(ConfigError, match=r"kit toy: nobody has decided hubs\.types"):
+    with pytest.raises(ConfigError, match=r"kit toy: hubs\.types must be resolved"):
         observe([on_plate(3)], hubs=HubConfig())
 
 

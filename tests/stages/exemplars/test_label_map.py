@@ -59,7 +59,7 @@ def test_meshes_and_labels_are_names_too() -> None:
 
 
 def test_a_pattern_that_fits_nothing_is_refused_with_the_names_that_there_are() -> None:
-    with pytest.raises(ConfigError, match=r"kit toy: meanings\.leg: .* called 'q\*'; parts are called p0, p1, .*p4$"):
+    with pytest.raises(ConfigError, match=r"kit toy: label_map\.leg: .* called 'q\*'; parts are called p0, p1, .*p4$"):
         named({"top": ("p0",), "leg": ("p1", "q*")}, ONE)
 
 

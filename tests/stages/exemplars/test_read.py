@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 
 from pipeline.errors import ConfigError
 from stages.exemplars.model import Model, RawPart
-from stages.exemplars.read import read_model
-from stages.exemplars.scene_file import parse_model
+from stages.exemplars.read import parse_model, read_model
 from stages.exemplars.settings import ReadLimits
 from tests.stages.exemplars.model_files import (
     BOX_FACES,
@@ -549,7 +548,7 @@ class TestBadFiles:
         with pytest.raises(ConfigError, match="cut off"):
             read_model(tmp_path / "m.gltf")
         (tmp_path / "m.bin").unlink()
-        with pytest.raises(ConfigError, match=r"'m.bin', which is not there"):
+        with pytest.raises(ConfigError, match=r"'m.bin', which is missing"):
             read_model(tmp_path / "m.gltf")
 
     def test_a_mesh_without_triangles_is_refused(self, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stages.exemplars.scene_file import parse_model
+from stages.exemplars.read import parse_model
 from stages.exemplars.segmentation import segment_scene
 from stages.exemplars.settings import ReadLimits
 from stages.symmetry.sections.parallel_cuts import find_parallel_cuts
