@@ -45,12 +45,12 @@ def bench() -> Iterator[Measure]:
         return len(clouds)
 
     few, many = (torch.from_numpy(_clouds(count)) for count in (POINTS, PUBLISHED_POINTS))
-    equal = rate(lambda: step(ours, few), seconds=1.0, max_rounds=2)
+    equal = rate(lambda: step(ours, few), seconds=1.0, rounds=2)
     name = "recovery, a step of training"
-    peer_rate = rate(lambda: step(peer, few), seconds=1.0, max_rounds=1)
+    peer_rate = rate(lambda: step(peer, few), seconds=1.0, rounds=1)
     yield Measure(f"{name}, {POINTS} points", "clouds", equal, "DGCNN as published", peer_rate)
-    peer_rate = rate(lambda: step(peer, many), seconds=1.0, max_rounds=1)
-    ours_many = rate(lambda: step(ours, many), seconds=1.0, max_rounds=1)
+    peer_rate = rate(lambda: step(peer, many), seconds=1.0, rounds=1)
+    ours_many = rate(lambda: step(ours, many), seconds=1.0, rounds=1)
     yield Measure(f"{name}, {PUBLISHED_POINTS} points", "clouds", ours_many, "DGCNN as published", peer_rate)
 
     yield Measure("recovery of a cloud, guessed and searched", "clouds", _recoveries(), note="300 shapes of a chair")
@@ -68,7 +68,7 @@ def _recoveries() -> float:
         recover(cloud, "chair", models, up="y", budget=300)
         return 1
 
-    return rate(once, seconds=1.0, max_rounds=1)
+    return rate(once, seconds=1.0, rounds=1)
 
 
 def _clouds(n: int) -> np.ndarray:

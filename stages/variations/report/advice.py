@@ -55,7 +55,7 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
     if known > REGULAR * tries:
         regular = "what can be exchanged gives the exemplar again, or a piece of it: it is regular"
         return (
-            f"{regular}; bring {another}, or write a program of its counts and sizes, as stages/programs/GUIDE.md says"
+            f"{regular}; bring {another}, or write a program of its counts and sizes, as stages/programs/README.md says"
         )
     alone = int((counts == 1).sum())
     if alone > used / 2:
