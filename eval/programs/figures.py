@@ -19,7 +19,7 @@ from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.views.portrait import PAPER
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.shapeassembly.analysis.structure import signature
-from stages.shapeassembly.editing.edits import edited
+from stages.shapeassembly.editing.edits import edit_program
 from stages.shapeassembly.execution.interpreter import execute
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.syntax.program import AssemblyProgram
@@ -30,7 +30,7 @@ WIDTH = 200
 """Of a picture on a sheet; unit: pixels."""
 
 SPREAD = 0.25
-"""How far the variants of figure 8 go (`shapeassembly.programs.spread`)."""
+"""How far the variants of figure 8 go (`shapeassembly.programs.log_std`)."""
 
 STOPS = 5
 """Shapes between the two ends of a way."""
@@ -82,7 +82,7 @@ def neighbours_table(rows: Sequence[tuple[TableCell, ...]]) -> Table:
 
 def edits_sheet(name: str, category: str, programs: Sequence[AssemblyProgram], rng: np.random.Generator) -> Figure:
     """Figure 8: programs that a model wrote, below each a variant with other numbers and the same structure."""
-    variants = [edited(each, SPREAD, rng) for each in programs]
+    variants = [edit_program(each, SPREAD, rng) for each in programs]
     rows = {
         f"Written by {name}": [("", drawn(each)) for each in boxes_of_programs(programs)],
         "The same program with other sizes and places": [("", drawn(each)) for each in boxes_of_programs(variants)],

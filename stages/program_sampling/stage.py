@@ -74,7 +74,7 @@ def run_shard(task: Task) -> Outcome:
     with task.output(f"{task.shard.name}.jsonl") as stream:
         for number, program in enumerate(programs, params["first"]):
             name = f"{params['folder']}/{number:06d}"
-            stream.write(json_bytes({"kind": params["kind"], "name": name, "text": print_program(program)}))
+            stream.write(json_bytes({"kit": params["kind"], "name": name, "text": print_program(program)}))
     return Outcome(0, {"programs": len(programs), "drawn": drawn})
 
 

@@ -1,4 +1,4 @@
-"""Which programs become samples: those that pass every check, and edits of them that do."""
+"""Select the programs that become samples: those that pass every check, and edits of them that do."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pipeline.errors import Rejected
 from pipeline.stage import Task
 from stages.shape.physics.judge import unmet_requirement
 from stages.shapeassembly.analysis.structure import signature
-from stages.shapeassembly.editing.edits import edited
+from stages.shapeassembly.editing.edits import edit_program
 from stages.shapeassembly.execution.interpreter import execute
 from stages.shapeassembly.extraction.shards import read_program_texts
 from stages.shapeassembly.settings import ShapeAssemblyConfig
@@ -22,71 +22,70 @@ from stages.shapeassembly.syntax.parser import parse
 from stages.shapeassembly.syntax.printer import print_program
 
 MAX_EDIT_TRIES = 8
-"""Edits of a program that are tried for one that passes."""
 
 
-def accepted_rows(task: Task, config: ShapeAssemblyConfig, refused: Counter[str]) -> Iterator[dict[str, Any]]:
-    """The programs that become samples, each followed by its edits; the others are refused, and counted in `refused`.
+def accepted_rows(task: Task, config: ShapeAssemblyConfig, rejected: Counter[str]) -> Iterator[dict[str, Any]]:
+    """Yield the programs that become samples, each followed by its edits.
 
-    A row has `key`, `kit`, `file` (its name in its source; of an edit, that of the program), `method`, `text`
-    (canonical), `graph` (its signature), `parts` (leaf cuboids) and `labels` (theirs, a set).
+    A row has `key`, `kit`, `file` (name in its source; of an edit, that of the program), `method`, `text` (canonical),
+    `graph` (signature), `parts` (leaf cuboids) and `labels` (of the leaves, a set).
+    rejected: counts the other programs by reason.
     """
-    known: set[str] = set()
-    places: Counter[str] = Counter()
-    edits = {source.name: (source.edits, source.spread) for source in config.programs}
+    texts_seen: set[str] = set()
+    counts: Counter[str] = Counter()
+    edits = {source.name: (source.edits, source.log_std) for source in config.programs}
 
-    def accepted(kind: str, name: str, text: str, method: str) -> dict[str, Any]:
+    def accepted(kit: str, name: str, text: str, method: str) -> dict[str, Any]:
         row = _row(text, config)
-        if row["text"] in known:
-            raise Rejected("program is there already", name)
-        known.add(row["text"])
-        places[kind] += 1
-        return {"key": f"{kind}-{places[kind] - 1:06d}", "kit": kind, "file": name, "method": method, **row}
+        if row["text"] in texts_seen:
+            raise Rejected("duplicate program", name)
+        texts_seen.add(row["text"])
+        counts[kit] += 1
+        return {"key": f"{kit}-{counts[kit] - 1:06d}", "kit": kit, "file": name, "method": method, **row}
 
-    texts = list(_texts(task, config))
-    for place, (kind, name, text) in enumerate(texts):
-        task.progress(place, len(texts))
+    programs = list(_texts(task, config))
+    for done, (kit, name, text) in enumerate(programs):
+        task.progress(done, len(programs))
         try:
-            row = accepted(kind, name, text, "executed")
+            row = accepted(kit, name, text, "executed")
         except (ProgramError, Rejected) as error:
             detail = str(error) if isinstance(error, ProgramError) else error.detail
-            task.reject(f"{kind}/{name}", error.reason, detail)
-            refused[error.reason] += 1
+            task.reject(f"{kit}/{name}", error.reason, detail)
+            rejected[error.reason] += 1
             continue
         yield row
-        count, spread = edits.get(kind, (0, 0.0))
+        count, log_std = edits.get(kit, (0, 0.0))
         for number in range(count):
-            rng = task.rng("edit", kind, name, number)
+            rng = task.rng("edit", kit, name, number)
             for _ in range(MAX_EDIT_TRIES):
                 try:
-                    yield accepted(kind, name, print_program(edited(parse(row["text"]), spread, rng)), "edited")
+                    yield accepted(kit, name, print_program(edit_program(parse(row["text"]), log_std, rng)), "edited")
                     break
                 except (ProgramError, Rejected):
                     continue
             else:
-                task.reject(f"{kind}/{name}", "no edit passed", f"in {MAX_EDIT_TRIES} tries; a smaller spread may help")
+                task.reject(f"{kit}/{name}", "no edit passed", f"in {MAX_EDIT_TRIES} tries; a smaller log_std may help")
 
 
 def _texts(task: Task, config: ShapeAssemblyConfig) -> Iterator[tuple[str, str, str]]:
-    """Of each program the name of its source, its own name there, and its text: those read, those extracted, and those
-    that models have written."""
+    """Yield kit, name and text of each program: those read, those extracted, and those sampled from models."""
     for source in config.programs:
         for name, text in program_texts(source.path, source.folder):
             if name not in source.lists.values():
                 yield source.name, name, text
-    for each in read_program_texts(task):
-        yield each.kind, each.name, each.text
+    for program in read_program_texts(task):
+        yield program.kit, program.name, program.text
 
 
 def _row(text: str, config: ShapeAssemblyConfig) -> dict[str, Any]:
-    """What there is to say of one program. Raises ProgramError or Rejected where it does not pass."""
+    """Return the row of one program. Raises ProgramError or Rejected where it does not pass."""
     program = parse(text)
     execution = execute(program)
     if not config.min_parts <= len(execution) <= config.max_parts:
         raise Rejected("number of parts", f"{len(execution)} leaf cuboids")
-    beyond = overflow(program, execution)
-    if beyond > config.overflow:
-        raise Rejected("reaches out of the bounding box", f"by {100 * beyond:.1f} % of its size")
+    excess = overflow(program, execution)
+    if excess > config.max_overflow:
+        raise Rejected("reaches out of the bounding box", f"by {100 * excess:.1f} % of its size")
     if config.accept == "valid":
         broken = violations(program)
         if broken:
@@ -94,9 +93,9 @@ def _row(text: str, config: ShapeAssemblyConfig) -> dict[str, Any]:
         for block in program.blocks:
             for name in protruding_parts(block):
                 raise Rejected("reaches out of its assembly", f"{name} of {block.name}")
-    weak = unmet_requirement(config.require, shape_of_execution(execution))
-    if weak is not None:
-        raise Rejected(weak)
+    missing = unmet_requirement(config.require, shape_of_execution(execution))
+    if missing is not None:
+        raise Rejected(missing)
     return {
         "text": print_program(program),
         "graph": signature(program),

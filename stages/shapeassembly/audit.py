@@ -1,4 +1,4 @@
-"""How `make verify` looks at samples that are ShapeAssembly programs."""
+"""How `shapemill verify` checks samples that are ShapeAssembly programs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stages.shapeassembly.syntax.parser import parse
 def _faults(sample: PackagedSample) -> Iterator[str]:
     record = sample.record
     if record["language"] == LANGUAGE.name and signature(parse(record["text"])) != record["graph"]:
-        yield "its program has another signature than its json names"
+        yield "its program has another signature than its json states"
 
 
 AUDIT = Audit(faults=_faults)

@@ -1,4 +1,4 @@
-"""The language of ShapeAssembly programs: a sample is a program, and its shape is its cuboids."""
+"""The sample format of ShapeAssembly programs: a sample is a program, and its shape is its cuboids."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from stages.shapeassembly.shape import label_colors, shape_of_text
 
 
 class ProgramDecoder:
-    """The categories of programs that the assignment has listed with the labels of their parts."""
+    """Decodes programs, with the labels of each category from the assignment."""
 
     def __init__(self, listed: Mapping[str, Sequence[str]]) -> None:
         self.sources = {kit: _source(tuple(labels)) for kit, labels in listed.items()}
 
     def shape(self, sample: Sample) -> Shape:
-        """The executed program, its labels those of its category. Raises ProgramError for a text that is none."""
+        """Return the executed program with the labels of its category. Raises ProgramError for an invalid text."""
         return shape_of_text(sample.text, self.sources[sample.kit].labels)
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
-        """Nothing: a program begins with a text."""
+        """Return nothing: a program starts from a text, not from shapes."""
         return ()
 
 
@@ -34,7 +34,7 @@ def _source(labels: tuple[str, ...]) -> Source:
 
 
 def assignment_name(dataset: str) -> str:
-    """The shard that shares out the programs of a dataset, and lists the labels of their parts."""
+    """Return the shard that assigns programs to splits, and lists the labels of their parts."""
     return f"{dataset}-assignment"
 
 
@@ -42,27 +42,27 @@ def _reads(plan: Plan) -> tuple[str, ...]:
     return (f"shapeassembly/{assignment_name(plan.config.name)}",)
 
 
-def _speaker(task: Task) -> ProgramDecoder:
+def _decoder(task: Task) -> ProgramDecoder:
     listed = task.input("shapeassembly", f"{assignment_name(task.config.name)}.labels.json")
     return ProgramDecoder(json.loads(listed.read_bytes()))
 
 
-def _anew(places: DatasetPaths) -> RebuildShape:
-    """The executed program, its labels those of its category as the dataset lists them."""
+def _rebuild(places: DatasetPaths) -> RebuildShape:
+    """Return the function that executes a record's program, with the labels that the dataset lists."""
     labels: dict[str, list[str]] = {}
     path = places.out / places.dataset / "classes.json"
-    for each in json.loads(path.read_bytes()) if path.is_file() else ():
-        labels.setdefault(each["kit"], []).append(each["name"])
+    for entry in json.loads(path.read_bytes()) if path.is_file() else ():
+        labels.setdefault(entry["kit"], []).append(entry["name"])
     return lambda record, _: upright(shape_of_text(record["text"], labels.get(record["kit"], ())))
 
 
 LANGUAGE = Language(
     name="shapeassembly",
     reads=_reads,
-    decoder=_speaker,
+    decoder=_decoder,
     graphs=False,
     text="Its ShapeAssembly program.",
-    rebuild=_anew,
+    rebuild=_rebuild,
     coordinates="The unit is that of the program. The middle of its bounding box is the origin, and the middle of each "
     "cuboid is the origin of its mesh.",
 )

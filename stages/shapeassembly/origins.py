@@ -1,4 +1,4 @@
-"""Where the programs and part hierarchies of a dataset come from, and whose they are."""
+"""The origins of the programs and part hierarchies of a dataset, with their credits."""
 
 from __future__ import annotations
 
@@ -13,16 +13,19 @@ from stages.shapeassembly.sources import source_digest
 
 
 def program_origins(plan: Plan) -> list[Origin]:
-    """The folders and archives of the config, in its order, and the weights of the models that write programs. The
-    digest of a folder is of the names and bytes of the files in it that count."""
+    """Return folders, archives and model weights in the order of the config.
+
+    The digest of a folder is of the names and bytes of the files that are read.
+    """
     section = plan.config.section(ShapeAssemblyConfig)
-    programs = [_origin("programs", each, each.path, source_digest(each.path)) for each in section.programs]
+    programs = [_origin("programs", files, files.path, source_digest(files.path)) for files in section.programs]
     hierarchies = [
-        _origin("hierarchies", each, each.path, each.source.digest(0, len(each.source))) for each in section.hierarchies
+        _origin("hierarchies", files, files.path, files.source.digest(0, len(files.source)))
+        for files in section.hierarchies
     ]
-    weights = [(each, plan.published(f"{each.folder}/weights.safetensors")) for each in section.sampled]
-    written = [_origin("sampled", each, path, file_digest(path)) for each, path in weights]
-    return [*programs, *hierarchies, *written]
+    weights = [(model, plan.published(f"{model.folder}/weights.safetensors")) for model in section.sampled]
+    sampled = [_origin("sampled", model, path, file_digest(path)) for model, path in weights]
+    return [*programs, *hierarchies, *sampled]
 
 
 def _origin(key: str, files: NamedFiles, path: Path, digest: str) -> Origin:

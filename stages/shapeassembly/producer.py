@@ -1,4 +1,4 @@
-"""What stage `shapeassembly` says of itself as a producer of samples."""
+"""The stage `shapeassembly` as a producer of samples."""
 
 from __future__ import annotations
 
@@ -13,6 +13,6 @@ PRODUCER = Producer(
     sentence="ShapeAssembly programs are executed; a shape's program is its `txt`.",
     origins=program_origins,
     limits=("All parts are cuboids.",),
-    splits="Samples of programs that are alike up to their numbers stand in one split.",
+    splits="Programs that differ only in their numbers are in one split.",
     graphs_share_split=True,
 )

@@ -14,12 +14,13 @@ from stages.shapeassembly.extraction.settings import Cleaning, Gates, HierarchyF
 from stages.shapeassembly.sources import existing_programs
 
 DEFAULT_TOP_P = 0.8
-"""Of 360 chairs that a language model wrote 83 % stay up, of the real ones 92 %, and about 29 % have the commonest
-structure, of the real ones 8 %; with 0.7 it is 88 % of 160, and half of them have one structure."""
+"""Of 360 sampled chairs 83 % are stable (92 % of the real ones) and 29 % share the most frequent structure (8 % of the
+real ones). With 0.7, 88 % of 160 are stable, but half of them share one structure.
+"""
 
 
 class ProgramFiles(NamedFiles):
-    """Programs of one kind of shape."""
+    """Programs of one category of shapes."""
 
     path: Annotated[Path, AfterValidator(existing_programs)] = Field(
         description="A folder of .txt files, or a tar archive (also .tar.gz, .tar.xz), one program a file."
@@ -29,24 +30,22 @@ class ProgramFiles(NamedFiles):
     )
     lists: dict[Literal["val", "test"], str] = Field(
         default_factory=dict,
-        description="Splits that were published: files below `path` that name programs, one a line, such as `{val: "
-        "data_splits/chair/val.txt}`. The named programs make the split, all others of the entry are for training, and "
-        "`splits` shares out none of them.",
+        description="Published splits: files below `path` that list programs, one a line, such as `{val: "
+        "data_splits/chair/val.txt}`. All other programs of the entry are for training; `splits` does not apply to it.",
     )
     edits: int = Field(
         0,
         ge=0,
         le=1_000,
-        description="So many continuous edits of each accepted program: other sizes and places of attachment, the same "
-        "structure. Unit: programs.",
+        description="Continuous edits of each accepted program: other numbers, the same structure. Unit: programs.",
     )
-    spread: float = Field(
-        0.2, gt=0, le=1, description="How far edits go: standard deviation of the logarithm of the size along an axis."
+    log_std: float = Field(
+        0.2, gt=0, le=1, description="Strength of edits: standard deviation of the logarithm of the size along an axis."
     )
 
 
 class SampledPrograms(NamedFiles):
-    """Programs that a trained model writes."""
+    """Programs that are sampled from a trained model."""
 
     dataset: str = Field(
         pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$",
@@ -58,23 +57,21 @@ class SampledPrograms(NamedFiles):
         max_length=32,
         description="Name of the model there, as in training.models.",
     )
-    kit: str = Field(description="What it has learnt: a name of `programs` or `hierarchies` there.")
-    seed: int = Field(0, ge=0, lt=100, description="Which of its trainings, if it has several seeds.")
-    samples: int = Field(
-        ge=1, le=10_000_000, description="Programs that it writes; those that it writes twice count once."
-    )
+    kit: str = Field(description="Category that it was trained on: a name of `programs` or `hierarchies` there.")
+    seed: int = Field(0, ge=0, lt=100, description="Which of its trainings, if there are several seeds.")
+    samples: int = Field(ge=1, le=10_000_000, description="Programs to sample; duplicates count once.")
     temperature: float = Field(
         1.0,
         gt=0,
         le=10,
-        description="Of a VAE the spread of the points of its latent space, 1 being that of the programs it has learnt "
-        "of; of a language model how evenly it draws words, 1 being as it says.",
+        description="For a VAE: factor of the standard deviation of latent points, where 1 is that of the training "
+        "programs. For a language model: divisor of the logits.",
     )
     top_p: float = Field(
         DEFAULT_TOP_P,
         gt=0,
         le=1,
-        description="A language model draws each number among the likeliest that have this share together.",
+        description="A language model samples numbers from the likeliest ones with this total probability.",
     )
 
     @property
@@ -87,25 +84,26 @@ class ShapeAssemblyConfig(StrictModel):
     """Shapes from ShapeAssembly programs."""
 
     programs: tuple[ProgramFiles, ...] = Field(
-        (), description="Where the programs are; none for a dataset that is made in another way."
+        (), description="Folders and archives of programs; empty for a dataset of another producer."
     )
     hierarchies: tuple[HierarchyFiles, ...] = Field(
-        (), description="Where the part hierarchies are from which programs are extracted."
+        (), description="Part hierarchies from which programs are extracted."
     )
-    sampled: tuple[SampledPrograms, ...] = Field((), description="The trained models that write programs.")
-    extraction: Gates = Field(default_factory=Gates, description="What an extracted program must pass.")
-    cleaning: Cleaning = Field(default_factory=Cleaning, description="How hierarchies are made tidier before.")
+    sampled: tuple[SampledPrograms, ...] = Field((), description="Trained models to sample programs from.")
+    extraction: Gates = Field(default_factory=Gates, description="Quality gates of extracted programs.")
+    cleaning: Cleaning = Field(default_factory=Cleaning, description="Cleaning of hierarchies before extraction.")
     accept: Literal["executable", "valid"] = Field(
         "executable",
-        description="Which programs become samples: all that can be executed, or those that keep every rule.",
+        description="Which programs become samples: all that can be executed, or only those that keep every rule.",
     )
-    overflow: float = Field(
-        0.05, ge=0, description="How far cuboids may reach out of the bounding box, as a share of its size."
+    max_overflow: float = Field(
+        0.05, ge=0, description="Maximum excess of cuboids over the bounding box, as a share of its size."
     )
-    min_parts: int = Field(1, ge=1, description="Fewest leaf cuboids of an executed program.")
-    max_parts: int = Field(10_000, ge=1, description="Most leaf cuboids of an executed program.")
+    min_parts: int = Field(1, ge=1, description="Minimum number of leaf cuboids of an executed program.")
+    max_parts: int = Field(10_000, ge=1, description="Maximum number of leaf cuboids of an executed program.")
     require: Requirements = Field(
-        default_factory=Requirements, description="What every shape must be physically; others are refused and counted."
+        default_factory=Requirements,
+        description="Physical requirements of every shape; others are rejected and counted.",
     )
     splits: SplitConfig = Field(
         default_factory=SplitConfig,
@@ -115,9 +113,9 @@ class ShapeAssemblyConfig(StrictModel):
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
-        names = [each.name for each in (*self.programs, *self.hierarchies, *self.sampled)]
+        names = [entry.name for entry in (*self.programs, *self.hierarchies, *self.sampled)]
         if len(set(names)) < len(names):
-            raise ValueError(f"two entries of programs, hierarchies and written have one name: {', '.join(names)}")
+            raise ValueError(f"two entries of programs, hierarchies and sampled have one name: {', '.join(names)}")
         return self
 
     @property

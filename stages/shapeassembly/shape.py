@@ -1,4 +1,4 @@
-"""An executed program as a shape: one box a leaf cuboid, named by its path, labelled by its place in the hierarchy."""
+"""An executed program as a shape: a box for each leaf cuboid, named by path, labelled by place in the hierarchy."""
 
 from __future__ import annotations
 
@@ -16,26 +16,24 @@ _FACES = np.array(
     [[0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4],
      [2, 6, 7], [2, 7, 3], [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5]], dtype=np.int32,
 )  # fmt: skip
-"""Triangles of a box over corners in the order of `Execution.corners`, seen from outside counter-clockwise."""
+"""Triangles of a box over corners in the order of `Execution.corners`, counter-clockwise from outside."""
 
 _TONES = np.array(
     [[190, 140, 92], [126, 158, 171], [205, 178, 128], [136, 152, 106], [176, 112, 96], [150, 150, 156],
      [222, 204, 174], [104, 128, 150], [158, 118, 84], [172, 178, 150], [142, 110, 122]], np.uint8,
 )  # fmt: skip
-"""One tone after the other for the labels, sRGB: woods, cloths and paints."""
+"""Colours of the labels in order, sRGB: woods, cloths and paints."""
 
 
 def shape_of_text(text: str, labels: Sequence[str] = ()) -> Shape:
-    """The shape of a program's text, as `shape_of_execution`. Raises ProgramError where it cannot be read or
-    executed."""
+    """Return the shape of a program's text. Raises ProgramError where it cannot be read or executed."""
     return shape_of_execution(execute(parse(text)), labels)
 
 
 def shape_of_execution(execution: Execution, labels: Sequence[str] = ()) -> Shape:
-    """One mesh a leaf cuboid, centred, with its pose, y up; `own_names` are the paths.
+    """Return one centred mesh a leaf cuboid with its pose, y up; `own_names` are the paths.
 
-    labels: those of all programs of a category; without them the shape has its own, sorted. The place of a label among
-    them decides its colour.
+    labels: those of all programs of a category, whose order decides the colours; without them the shape's own, sorted.
     """
     known = tuple(labels) or tuple(sorted(set(execution.labels)))
     color_of = dict(zip(known, label_colors(len(known)), strict=True))
@@ -52,5 +50,5 @@ def shape_of_execution(execution: Execution, labels: Sequence[str] = ()) -> Shap
 
 
 def label_colors(count: int) -> ByteArray:
-    """The colours of the first `count` labels of a category, sRGB uint8 (count, 3)."""
+    """Return the colours of the first `count` labels of a category, sRGB uint8 (count, 3)."""
     return _TONES[np.arange(count) % len(_TONES)]

@@ -1,4 +1,4 @@
-"""Where programs are read from: folders and archives of text files. Nothing is unpacked, no link is followed."""
+"""Read programs from folders and archives of text files. Nothing is unpacked, no link is followed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from stages.shapeassembly.syntax.limits import MAX_TEXT_CHARACTERS
 
 
 def existing_programs(path: Path) -> Path:
-    """`path` itself. Raises ValueError when it is neither a folder nor a tar archive."""
+    """Return the path. Raises ValueError where it is neither a folder nor a tar archive."""
     if path.is_dir() or (path.is_file() and tarfile.is_tarfile(path)):
         return path
     if path.exists():
@@ -22,26 +22,25 @@ def existing_programs(path: Path) -> Path:
 
 
 def program_texts(path: Path, folder: str = "") -> Iterator[tuple[str, str]]:
-    """The name below `path` and the text of every `.txt` file, in the order of the names.
+    """Yield name below `path` and text of every `.txt` file, sorted by name.
 
-    A file that is no UTF-8, or longer than a program may be, comes with its bad bytes replaced, or its start, so that
-    whoever parses it refuses it. folder: only files below this folder.
+    Invalid UTF-8 is replaced and overlong files are cut, so that the parser rejects them.
+    folder: only files below this folder.
     """
     if path.is_dir():
-        files = [each for each in path.rglob("*.txt") if each.is_file() and not each.is_symlink()]
-        for name, file in sorted((each.relative_to(path).as_posix(), each) for each in files):
+        for name, file in _text_files(path):
             if _below(name, folder):
                 with open(file, "rb") as stream:
                     yield name, stream.read(MAX_TEXT_CHARACTERS + 1).decode(errors="replace")
         return
     with tarfile.open(path) as archive:
         members = {
-            each.name: each
-            for each in archive.getmembers()
-            if each.isfile() and each.name.endswith(".txt") and _below(each.name, folder)
+            entry.name: entry
+            for entry in archive.getmembers()
+            if entry.isfile() and entry.name.endswith(".txt") and _below(entry.name, folder)
         }
         texts = {}
-        # In the order of the archive, which a compressed one is read in; then by name.
+        # A compressed archive is read in its own order.
         for name, member in members.items():
             stored = archive.extractfile(member)
             assert stored is not None
@@ -50,8 +49,7 @@ def program_texts(path: Path, folder: str = "") -> Iterator[tuple[str, str]]:
 
 
 def listed_names(path: Path, name: str) -> list[str]:
-    """The lines of the list called `name` below `path`, without those that are empty. Raises KeyError where there is no
-    such `.txt` file."""
+    """Return the lines of a `.txt` list below `path`, without empty ones. Raises KeyError where it does not exist."""
     lists = dict(program_texts(path, name.rpartition("/")[0]))
     return lists[name].split()
 
@@ -61,18 +59,26 @@ def _below(name: str, folder: str) -> bool:
 
 
 def source_digest(path: Path) -> str:
-    """Hex sha256 of an archive, or of the names and bytes of all `.txt` files of a folder."""
+    """Return the hex sha256 of an archive, or of the names and bytes of all `.txt` files of a folder."""
     if path.is_file():
-        return _known_digest(path, path.stat().st_mtime_ns, path.stat().st_size)
+        return cached_digest(path)
     digest = hashlib.sha256()
-    files = [each for each in path.rglob("*.txt") if each.is_file() and not each.is_symlink()]
-    for name, file in sorted((each.relative_to(path).as_posix(), each) for each in files):
-        state = file.stat()
-        digest.update(f"{name}\0{_known_digest(file, state.st_mtime_ns, state.st_size)}\n".encode())
+    for name, file in _text_files(path):
+        digest.update(f"{name}\0{cached_digest(file)}\n".encode())
     return digest.hexdigest()
 
 
+def _text_files(path: Path) -> list[tuple[str, Path]]:
+    files = [file for file in path.rglob("*.txt") if file.is_file() and not file.is_symlink()]
+    return sorted((file.relative_to(path).as_posix(), file) for file in files)
+
+
+def cached_digest(file: Path) -> str:
+    """Return the sha256 of a file, computed once for each state of it: plans are computed often."""
+    state = file.stat()
+    return _digest_of_state(file, state.st_mtime_ns, state.st_size)
+
+
 @lru_cache(maxsize=65536)
-def _known_digest(file: Path, modified: int, size: int) -> str:
-    """`file_digest`, asked once for each state of a file: a plan is made often."""
+def _digest_of_state(file: Path, modified: int, size: int) -> str:
     return file_digest(file)

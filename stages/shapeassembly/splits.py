@@ -1,4 +1,4 @@
-"""Which split each program stands in: the one that a published list names, or one shared out by structure."""
+"""Assign programs to splits: by a published list, or by structure."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from stages.shapeassembly.sources import listed_names
 def splits_of(
     rows: Sequence[Mapping[str, Any]], config: ShapeAssemblyConfig, rng: np.random.Generator
 ) -> npt.NDArray[np.int64]:
-    """The split of each row, int64 (n,), counted as in SPLITS.
+    """Return the split of each row, int64 (n,), an index into SPLITS.
 
-    Programs of a source with `lists` stand where these say. Of the others, those of one structure stand in one split.
-    rows: each with `kit`, the name of its source, `file`, its own name there, and `graph`, its structure. Raises
-    ShardFailed for a list that is not there, and for one that names a program twice or one that no accepted row is.
+    Programs of a source with `lists` follow these. Other programs of one structure share a split.
+    rows: with `kit`, the name of the source, `file`, the name in it, and `graph`, the structure.
+    Raises ShardFailed for a missing list, a list that names a program twice, or lists that name no accepted program.
     """
     listed = {source.name: _listed(source) for source in config.programs if source.lists}
     split_of = np.zeros(len(rows), dtype=np.int64)
@@ -36,23 +36,23 @@ def splits_of(
             free.append(index)
     split_of[free] = assign_splits(list(groups.values()), config.splits, rng)
     for kit, names in listed.items():
-        there = {PurePosixPath(row["file"]).stem for row in rows if row["kit"] == kit}
-        if there and names and not there & set(names):
-            raise ShardFailed(f"shapeassembly.programs[{kit}].lists name none of its programs, such as {min(there)}")
+        files = {PurePosixPath(row["file"]).stem for row in rows if row["kit"] == kit}
+        if files and names and not files & set(names):
+            raise ShardFailed(f"shapeassembly.programs[{kit}].lists name none of its programs, such as {min(files)}")
     return split_of
 
 
 def _listed(source: ProgramFiles) -> dict[str, int]:
-    """The split of every program that a list of the source names, by its name without folder and ending."""
+    """Return the split of every listed program of a source, by name without folder and suffix."""
     key = f"shapeassembly.programs[{source.name}].lists"
-    found: dict[str, int] = {}
+    splits: dict[str, int] = {}
     for split, name in source.lists.items():
         try:
             names = listed_names(source.path, name)
         except KeyError:
             raise ShardFailed(f"{key}: there is no {name} in {source.path}") from None
-        for each in names:
-            stem = each.removesuffix(".txt")
-            if found.setdefault(stem, SPLITS.index(split)) != SPLITS.index(split):
-                raise ShardFailed(f"{key} name {each} for both val and test")
-    return found
+        for program in names:
+            stem = program.removesuffix(".txt")
+            if splits.setdefault(stem, SPLITS.index(split)) != SPLITS.index(split):
+                raise ShardFailed(f"{key} name {program} for both val and test")
+    return splits

@@ -1,9 +1,8 @@
-"""Stage `shapeassembly`: ShapeAssembly programs in; those that pass, as the shards `<dataset>-<split>-<index>.tar`.
+"""Stage `shapeassembly`: from ShapeAssembly programs to the shards `<dataset>-<split>-<index>.tar`.
 
-Its first shards extract programs from part hierarchies, if there are any. Then one reads all programs, those of stage
-`program_sampling` among them, refuses what is no program, and gives each of the others its split and shard.
-A sample carries no
-meshes: its text is the canonical program, and `stages.shapeassembly.shape.shape_of_text` executes it.
+The first shards extract programs from part hierarchies, if there are any. The assignment reads all programs, those of
+stage `program_sampling` included, rejects invalid ones, and gives each a split and shard. A sample has no meshes: its
+text is the canonical program, executed by `stages.shapeassembly.shape.shape_of_text`.
 """
 
 from __future__ import annotations
@@ -33,14 +32,14 @@ BYTES_PER_PROGRAM = 12_000
 
 
 def planned_shards(plan: Plan) -> list[Shard]:
-    """The extraction; when it is made, the assignment; when that is made, the shards of the collection."""
+    """Plan the extraction, then the assignment, then the shards of the collection, as far as records exist."""
     config = plan.config.section(ShapeAssemblyConfig)
     if not config.has_sources:
         return []
     extraction = extraction_shards(plan.config.name, config.hierarchies)
     if any(plan.summary("shapeassembly", shard.name) is None for shard in extraction):
         return extraction
-    digests = [source_digest(each.path) for each in config.programs]
+    digests = [source_digest(files.path) for files in config.programs]
     made = [("shapeassembly", shard.name) for shard in extraction]
     inputs = tuple(
         f"{stage}/{shard}"
@@ -55,7 +54,7 @@ def planned_shards(plan: Plan) -> list[Shard]:
 
 
 def run_shard(task: Task) -> Outcome:
-    """A shard of the extraction, the assignment, or a shard of the collection."""
+    """Run a shard of the extraction, the assignment, or a shard of the collection."""
     if task.shard.params["job"] == "extraction":
         config = task.config.section(ShapeAssemblyConfig)
         return run_extraction(task, config.hierarchies, config.extraction, config.cleaning)
@@ -63,21 +62,23 @@ def run_shard(task: Task) -> Outcome:
 
 
 def run_assignment(task: Task) -> Outcome:
-    """Read and check all programs, and share them out; programs of one signature stand in one split.
+    """Read and check all programs, and assign them to splits; programs of one signature share a split.
 
-    Writes a file for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line, and `.labels.json`,
-    the part labels of all programs of each category, sorted. Raises ShardFailed for no program, or too many labels.
+    Files of the shard:
+        `.<split>-<number>.jsonl`: the samples of each shard of the collection, one a line
+        `.labels.json`: the part labels of each category, sorted
+    Raises ShardFailed for no program, or too many labels.
     """
     config = task.config.section(ShapeAssemblyConfig)
-    refused: Counter[str] = Counter()
-    rows = list(accepted_rows(task, config, refused))
+    rejected: Counter[str] = Counter()
+    rows = list(accepted_rows(task, config, rejected))
     if not rows:
-        why = ", ".join(f"{count:,} {reason}" for reason, count in refused.most_common(3))
-        raise ShardFailed(f"no program was accepted; refused: {why or 'none'}")
-    found: dict[str, set[str]] = {}
+        reasons = ", ".join(f"{count:,} {reason}" for reason, count in rejected.most_common(3))
+        raise ShardFailed(f"no program was accepted; rejected: {reasons or 'none'}")
+    label_sets: dict[str, set[str]] = {}
     for row in rows:
-        found.setdefault(row["kit"], set()).update(row.pop("labels"))
-    labels = {kit: sorted(found[kit]) for kit in sorted(found)}
+        label_sets.setdefault(row["kit"], set()).update(row.pop("labels"))
+    labels = {kit: sorted(label_sets[kit]) for kit in sorted(label_sets)}
     try:
         Classes.of(ProgramDecoder(labels).sources)
     except ValueError as error:
@@ -98,7 +99,7 @@ def run_collection(task: Task) -> Outcome:
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """How many programs there are and of how many structures, and why the others were refused."""
+    """Report programs, structures, and reject counts."""
     name = assignment_name(plan.config.name)
     config = plan.config.section(ShapeAssemblyConfig)
     summary = plan.summary("shapeassembly", name) if config.has_sources else None
@@ -106,34 +107,37 @@ def report(plan: Plan) -> Sequence[str]:
         return []
     extraction = [shard.name for shard in extraction_shards(plan.config.name, config.hierarchies)]
     counts = ", ".join(f"{count:,} {kit}" for kit, count in summary["programs"].items())
-    refused: Counter[str] = Counter()
+    rejected: Counter[str] = Counter()
     for shard in (*extraction, name):
-        refused.update(plan.rejects("shapeassembly", shard))
-    why = ", ".join(f"{count:,} {reason}" for reason, count in refused.most_common())
-    asked = [f"warning: {sentence}" for sentence in missing_licenses(program_origins(plan))]
-    return [f"programs: {counts}; {summary['structures']:,} structures; refused: {why or 'none'}", *asked]
+        rejected.update(plan.rejects("shapeassembly", shard))
+    reasons = ", ".join(f"{count:,} {reason}" for reason, count in rejected.most_common())
+    warnings = [f"warning: {sentence}" for sentence in missing_licenses(program_origins(plan))]
+    return [f"programs: {counts}; {summary['structures']:,} structures; rejected: {reasons or 'none'}", *warnings]
 
 
 def estimate_bytes(plan: Plan) -> int:
-    """Bytes of all samples, as far as they are known."""
+    """Estimate the bytes of all samples, as far as they are known."""
     summary = plan.summary("shapeassembly", assignment_name(plan.config.name))
     return BYTES_PER_PROGRAM * sum(summary["programs"].values()) if summary else 0
 
 
-def asked(config: Config) -> Sequence[int]:
-    """The programs of each shard of the collection, if all are accepted."""
+def requested_samples(config: Config) -> Sequence[int]:
+    """Return the programs of each shard of the collection, if all are accepted."""
     section = config.section(ShapeAssemblyConfig)
-    total = sum((1 + each.edits) * sum(1 for _ in program_texts(each.path, each.folder)) for each in section.programs)
-    total += sum(len(each.source) for each in section.hierarchies) + sum(each.samples for each in section.sampled)
+    total = sum(
+        (1 + files.edits) * sum(1 for _ in program_texts(files.path, files.folder)) for files in section.programs
+    )
+    total += sum(len(files.source) for files in section.hierarchies)
+    total += sum(model.samples for model in section.sampled)
     return section.splits.shard_sizes(total)
 
 
-def trial(config: Config) -> ShapeAssemblyConfig:
-    """The same programs in shards of few, of edits and of models' programs a few."""
+def trial_config(config: Config) -> ShapeAssemblyConfig:
+    """Return the same programs in small shards, with few edits and sampled programs."""
     section = config.section(ShapeAssemblyConfig)
-    written = tuple(each.model_copy(update={"samples": min(each.samples, 16)}) for each in section.sampled)
-    programs = tuple(each.model_copy(update={"edits": min(each.edits, 1)}) for each in section.programs)
-    update = {"splits": section.splits.for_trial(), "programs": programs, "sampled": written}
+    sampled = tuple(model.model_copy(update={"samples": min(model.samples, 16)}) for model in section.sampled)
+    programs = tuple(files.model_copy(update={"edits": min(files.edits, 1)}) for files in section.programs)
+    update = {"splits": section.splits.for_trial(), "programs": programs, "sampled": sampled}
     return section.model_copy(update=update)
 
 
@@ -146,6 +150,6 @@ STAGE = Stage(
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,
     report=report,
-    requested_samples=asked,
-    trial_config=trial,
+    requested_samples=requested_samples,
+    trial_config=trial_config,
 )

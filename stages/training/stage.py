@@ -91,12 +91,12 @@ def check(config: Config) -> None:
             known = _categories(config, model) if model.learns_from == "programs" else kits
             unknown = [kit for kit in model.kits if kit not in known]
             if unknown or not known:
-                which = f"there is no kit {unknown[0]}" if unknown else "it learns from kits, and there are none"
+                which = f"there is no kit {unknown[0]}" if unknown else "the config has no kits"
                 raise ConfigError(f"{where}: {which}; kits are {', '.join(known)}")
             continue
         programs = _programs(config, model)
         if not programs:
-            raise ConfigError(f"{where}: it learns from programs, and there are none; set programs.program")
+            raise ConfigError(f"{where}: it learns from programs, but the config has no program; set programs.program")
         views = [view.name for view in config.section(SketchesConfig).views]
         unknown = [view for view in model.views if view not in views]
         if unknown:

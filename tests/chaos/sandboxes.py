@@ -130,7 +130,7 @@ ARENAS: dict[str, Datasets] = {
                         "sampled": [
                             {"name": "stool", "dataset": "read", "model": "tiny", "kit": "furniture", "samples": 12}
                         ],
-                        "overflow": 100,
+                        "max_overflow": 100,
                         "splits": {"shards": 1},
                     },
                 },

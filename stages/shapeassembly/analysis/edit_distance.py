@@ -1,4 +1,4 @@
-"""Edit distance of two sequences, compiled."""
+"""The compiled edit distance of two sequences."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 @numba.njit(cache=True)
 def edit_distance(a, b):
-    """Fewest insertions, deletions and changes of one item that make int64 (n,) into int64 (m,) (Levenshtein)."""
+    """Return the minimum number of insertions, deletions and changes from int64 (n,) to int64 (m,) (Levenshtein)."""
     row = np.arange(len(b) + 1)
     for i in range(len(a)):
         diagonal = row[0]

@@ -1,4 +1,4 @@
-"""What a set of programs is like: lines, macros, leaf parts (shapeassembly tables 3 and 5), clusters (figure 10)."""
+"""Statistics of programs: lines, macros, leaf parts (shapeassembly tables 3 and 5), clusters (figure 10)."""
 
 from __future__ import annotations
 
@@ -16,8 +16,12 @@ from stages.shapeassembly.syntax.program import AssemblyProgram, Reflect, Squeez
 
 @dataclass(frozen=True)
 class ProgramStatistics:
-    """Means over programs. Lines are counted with those of the bounding boxes, without heads and braces; macros are
-    shares of all lines, not means of shares; leaf_parts counts the cuboids of the executed programs."""
+    """Means over programs.
+
+    lines: with those of the bounding boxes, without heads and braces.
+    reflects, translates, squeezes: shares of all lines, not means of shares.
+    leaf_parts: cuboids of the executed program.
+    """
 
     programs: int
     lines: float
@@ -28,12 +32,12 @@ class ProgramStatistics:
 
     @property
     def macros(self) -> float:
-        """Macros a line, all kinds."""
+        """Macros of all kinds, as a share of all lines."""
         return self.reflects + self.translates + self.squeezes
 
 
 def program_statistics(programs: Sequence[AssemblyProgram]) -> ProgramStatistics:
-    """Raises ProgramError where a program cannot be executed, ValueError where there is none."""
+    """Compute the statistics. Raises ProgramError where a program cannot be executed, ValueError for no programs."""
     if not programs:
         raise ValueError("no programs")
     kinds = Counter(type(line) for program in programs for block in program.blocks for line in block.lines)
@@ -50,13 +54,13 @@ def program_statistics(programs: Sequence[AssemblyProgram]) -> ProgramStatistics
 
 
 def cluster_curve(signatures: Iterable[str]) -> FloatArray:
-    """Share of all items that the 1, 2, 3, ... most frequent structures have between them, float64 (structures,)."""
+    """Return the share of all items that have the 1, 2, 3, ... most frequent structures, float64 (structures,)."""
     counts = np.array(sorted(Counter(signatures).values(), reverse=True), dtype=np.float64)
     curve: FloatArray = np.cumsum(counts) / max(counts.sum(), 1)
     return curve
 
 
 def cluster_curves(programs: Sequence[AssemblyProgram]) -> tuple[FloatArray, FloatArray]:
-    """`cluster_curve` of whole programs, and of their assemblies by themselves."""
+    """Return `cluster_curve` of whole programs, and of single assemblies."""
     whole = cluster_curve(signature(program) for program in programs)
-    return whole, cluster_curve(each for program in programs for each in block_signatures(program))
+    return whole, cluster_curve(block for program in programs for block in block_signatures(program))

@@ -1,6 +1,6 @@
-"""What is left of a program without its continuous parameters: tokens, signatures, distances (shapeassembly §7.1).
+"""The structure of a program without its continuous parameters: tokens, signatures, distances (shapeassembly §7.1).
 
-Names mean nothing: cuboids are counted within their assembly, and an assembly stands where its cuboid is declared.
+Names are ignored: cuboids are counted within their assembly, and an assembly is inserted where its cuboid is declared.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from stages.shapeassembly.syntax.program import BBOX, AssemblyProgram, Attach, B
 
 
 def tokens(program: AssemblyProgram) -> list[str]:
-    """The program as words: commands, numbers of cuboids, flags, faces, axes, counts; no continuous parameter.
+    """Return the program as words: commands, cuboid numbers, flags, faces, axes, counts.
 
     Programs with equal tokens are the same up to continuous parameters (shapeassembly §7.1.4).
-    Raises ProgramError where assemblies stand in a circle, or the words are too many.
+    Raises ProgramError where assemblies contain themselves, or there are too many words.
     """
     words: list[str] = []
     _add(program.root, program, words, 1)
@@ -30,58 +30,58 @@ def tokens(program: AssemblyProgram) -> list[str]:
 def _add(block: Block, program: AssemblyProgram | None, words: list[str], depth: int) -> None:
     """Append the words of one assembly, with those of its cuboids if `program` is given."""
     if depth > MAX_DEPTH:
-        raise ProgramError("too deep", f"assemblies stand more than {MAX_DEPTH} deep within each other, or in a circle")
+        raise ProgramError("too deep", f"assemblies are nested more than {MAX_DEPTH} deep, or in a circle")
     if len(words) > MAX_TEXT_CHARACTERS:
         raise ProgramError("too long", f"expanded it has more than {MAX_TEXT_CHARACTERS} words")
-    places = {BBOX: 0}
+    slots = {BBOX: 0}
     words.append("{")
     for line in block.lines:
         if isinstance(line, Cuboid):
-            places[line.name] = len(places)
+            slots[line.name] = len(slots)
             words += ["Cuboid", str(line.aligned)]
             below = program.named.get(line.name) if program else None
             if below is not None:
                 _add(below, program, words, depth + 1)
         elif isinstance(line, Attach):
-            words += ["attach", _number(places, line.moved), _number(places, line.target)]
+            words += ["attach", _number(slots, line.moved), _number(slots, line.target)]
         elif isinstance(line, Squeeze):
-            words += ["squeeze", *(_number(places, name) for name in (line.moved, line.first, line.second)), line.face]
+            words += ["squeeze", *(_number(slots, name) for name in (line.moved, line.first, line.second)), line.face]
         else:
             copies = 1 if isinstance(line, Reflect) else line.copies
             for _ in range(copies):
-                places[next_copy_name(places)] = len(places)
+                slots[next_copy_name(slots)] = len(slots)
             kind = ["reflect"] if isinstance(line, Reflect) else ["translate", str(copies)]
-            words += [*kind, _number(places, line.moved), line.axis]
+            words += [*kind, _number(slots, line.moved), line.axis]
     words.append("}")
 
 
-def _number(places: dict[str, int], name: str) -> str:
-    return str(places.get(name, name))
+def _number(slots: dict[str, int], name: str) -> str:
+    return str(slots.get(name, name))
 
 
 def signature(program: AssemblyProgram) -> str:
-    """Hex sha256 of the program's tokens: equal exactly for programs that are the same up to continuous parameters."""
+    """Return the hex sha256 of the tokens: equal for programs that are the same up to continuous parameters."""
     return _digest(tokens(program))
 
 
 def block_signatures(program: AssemblyProgram) -> tuple[str, ...]:
-    """Hex sha256 of the tokens of each assembly by itself, which cuboids are expanded being part of it."""
+    """Return the hex sha256 of the tokens of each assembly by itself, with the set of its expanded cuboids."""
     digests = []
     for block in program.blocks:
         words: list[str] = []
         _add(block, None, words, 1)
-        expanded = [str(index) for index, each in enumerate(block.cuboids) if each.name in program.named]
+        expanded = [str(index) for index, cuboid in enumerate(block.cuboids) if cuboid.name in program.named]
         digests.append(_digest([*words, "|", *expanded]))
     return tuple(digests)
 
 
 def program_distance(a: AssemblyProgram, b: AssemblyProgram) -> int:
-    """How many words must be put in, taken out or changed to make the tokens of one program those of the other."""
+    """Return the edit distance of the tokens of two programs."""
     return token_distance(tokens(a), tokens(b))
 
 
 def token_distance(first: Sequence[str], second: Sequence[str]) -> int:
-    """The same of their tokens."""
+    """Return the edit distance of tokens."""
     from stages.shapeassembly.analysis.edit_distance import edit_distance
 
     codes = {word: index for index, word in enumerate(dict.fromkeys([*first, *second]))}

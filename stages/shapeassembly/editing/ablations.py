@@ -1,5 +1,4 @@
-"""Programs of the same shapes in other words, for models that learn without a part of the language (shapeassembly §7.1,
-the ablations of Table 2)."""
+"""Rewrite programs of the same shapes without a part of the language (shapeassembly §7.1, ablations of Table 2)."""
 
 from __future__ import annotations
 
@@ -8,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.execution.attachment_points import squeeze_attachments
+from stages.shapeassembly.execution.attachment_points import box_point, squeeze_attachments, upright_row
 from stages.shapeassembly.execution.interpreter import execute_block
 from stages.shapeassembly.execution.tables import next_copy_name
 from stages.shapeassembly.syntax.program import (
@@ -27,35 +26,37 @@ from stages.shapeassembly.syntax.program import (
 
 
 def without_alignment(program: AssemblyProgram) -> AssemblyProgram:
-    """The program in which no cuboid but the bounding boxes is aligned: some turn that did not."""
+    """Return the program with no aligned cuboid but the bounding boxes; some then turn."""
     return program.with_lines(
         lambda line: replace(line, aligned=False) if isinstance(line, Cuboid) and line.name != BBOX else line
     )
 
 
 def without_order(program: AssemblyProgram, rng: np.random.Generator) -> AssemblyProgram:
-    """The program with its cuboids, its attachments and its macros each in random order: attachments still grounded,
-    those that move one cuboid still one after another."""
-    return AssemblyProgram(tuple(_unordered(block, rng) for block in program.blocks))
+    """Return the program with cuboids, attachments and macros each in random order.
+
+    Attachments stay grounded, and those of one cuboid keep their order.
+    """
+    return AssemblyProgram(tuple(_shuffled(block, rng) for block in program.blocks))
 
 
-def _unordered(block: Block, rng: np.random.Generator) -> Block:
-    cuboids = [block.cuboids[place] for place in rng.permutation(len(block.cuboids)).tolist()]
+def _shuffled(block: Block, rng: np.random.Generator) -> Block:
+    cuboids = [block.cuboids[index] for index in rng.permutation(len(block.cuboids)).tolist()]
     joints = [line for line in block.lines if isinstance(line, Attach | Squeeze)]
     macros = [line for line in block.lines if isinstance(line, Reflect | Translate)]
-    copied = {each.moved for each in macros} - {each.name for each in block.cuboids}
+    copied = {macro.moved for macro in macros} - {cuboid.name for cuboid in block.cuboids}
     if not copied:
-        macros = [macros[place] for place in rng.permutation(len(macros)).tolist()]
-    grounded, chosen = {BBOX}, list[Line]()
+        macros = [macros[index] for index in rng.permutation(len(macros)).tolist()]
+    grounded, shuffled = {BBOX}, list[Line]()
     while joints:
-        firsts = {each.moved: each for each in reversed(joints)}
-        ready = [each for each in joints if firsts[each.moved] is each and _targets(each) <= grounded]
-        # What its authors have not grounded stays in its order.
-        line = ready[int(rng.integers(len(ready)))] if ready else joints[0]
-        joints.remove(line)
-        grounded.add(line.moved)
-        chosen.append(line)
-    return replace(block, lines=(*cuboids, *chosen, *macros))
+        first_of = {joint.moved: joint for joint in reversed(joints)}
+        ready = [joint for joint in joints if first_of[joint.moved] is joint and _targets(joint) <= grounded]
+        # Lines that are not grounded in the original keep their order.
+        joint = ready[int(rng.integers(len(ready)))] if ready else joints[0]
+        joints.remove(joint)
+        grounded.add(joint.moved)
+        shuffled.append(joint)
+    return replace(block, lines=(*cuboids, *shuffled, *macros))
 
 
 def _targets(line: Attach | Squeeze) -> set[str]:
@@ -63,27 +64,27 @@ def _targets(line: Attach | Squeeze) -> set[str]:
 
 
 def without_macros(program: AssemblyProgram) -> AssemblyProgram:
-    """The program with cuboids and attachments alone: each copy is declared and attached as the macro would, and has a
-    sub-program of its own, mirrored where it is a mirror image.
+    """Return the program with cuboids and attachments only.
 
-    Raises ProgramError where the program cannot be executed.
+    Each copy is declared and attached as the macro would, with a sub-program of its own, mirrored where it is a mirror
+    image. Raises ProgramError where the program cannot be executed.
     """
-    ahead = [_expanded(program.root, program)]
+    queue = [_expanded(program.root, program)]
     blocks: list[Block] = []
-    while len(blocks) < len(ahead):
-        tree = ahead[len(blocks)]
-        called = {}
+    while len(blocks) < len(queue):
+        tree = queue[len(blocks)]
+        names = {}
         for name, below in tree.below.items():
-            called[name] = f"Program_{len(ahead)}"
-            ahead.append(below)
+            names[name] = f"Program_{len(queue)}"
+            queue.append(below)
         lines: tuple[Cuboid | Attach, ...] = (*tree.cuboids, *tree.joints)
-        blocks.append(Block(f"Program_{len(blocks)}", tree.bbox, tuple(_renamed(line, called) for line in lines)))
+        blocks.append(Block(f"Program_{len(blocks)}", tree.bbox, tuple(_renamed(line, names) for line in lines)))
     return AssemblyProgram(tuple(blocks))
 
 
 @dataclass(frozen=True)
 class _Tree:
-    """An assembly of cuboids and attachments alone, and what expands its cuboids, by name."""
+    """An assembly of cuboids and attachments, and the assemblies that expand its cuboids, by name."""
 
     bbox: Cuboid
     cuboids: tuple[Cuboid, ...]
@@ -91,33 +92,33 @@ class _Tree:
     below: dict[str, _Tree]
 
     def mirrored(self, axis: int) -> _Tree:
-        """The mirror image across the middle of the bounding box."""
+        """Return the mirror image across the middle of the bounding box."""
         joints = tuple(
-            replace(each, source=_flipped(each.source, axis), goal=_flipped(each.goal, axis)) for each in self.joints
+            replace(item, source=_flipped(item.source, axis), goal=_flipped(item.goal, axis)) for item in self.joints
         )
-        return replace(self, joints=joints, below={name: each.mirrored(axis) for name, each in self.below.items()})
+        return replace(self, joints=joints, below={name: item.mirrored(axis) for name, item in self.below.items()})
 
 
 def _expanded(block: Block, program: AssemblyProgram) -> _Tree:
-    cuboids = {each.name: each for each in block.cuboids}
+    cuboids = {joint.name: joint for joint in block.cuboids}
     below = {name: _expanded(program.named[name], program) for name in cuboids if name in program.named}
     joints: list[Attach] = []
-    places = [BBOX, *cuboids]
+    names = [BBOX, *cuboids]
     for number, line in enumerate(block.lines):
         if isinstance(line, Attach):
             joints.append(line)
         elif isinstance(line, Squeeze):
             joints += squeeze_attachments(line)
         elif isinstance(line, Reflect | Translate):
-            made = execute_block(replace(block, lines=block.lines[:number]))
-            boxes = {BBOX: _upright(block.bbox), **dict(zip(*made, strict=True))}
+            executed = execute_block(replace(block, lines=block.lines[:number]))
+            boxes = {BBOX: upright_row(block.bbox), **dict(zip(*executed, strict=True))}
             for copy in range(1, 1 + (line.copies if isinstance(line, Translate) else 1)):
-                name = next_copy_name(dict.fromkeys(places, 0))
-                places.append(name)
+                name = next_copy_name(dict.fromkeys(names, 0))
+                names.append(name)
                 x, y, z = boxes[line.moved][3:6].tolist()
                 cuboids[name] = Cuboid(name, (x, y, z), cuboids[line.moved].aligned)
-                own = [each for each in joints if each.moved == line.moved]
-                joints += [_copied(each, line, copy, name, boxes) for each in own]
+                own = [joint for joint in joints if joint.moved == line.moved]
+                joints += [_copied(joint, line, copy, name, boxes) for joint in own]
                 if line.moved in below:
                     original = below[line.moved]
                     mirror = isinstance(line, Reflect)
@@ -126,29 +127,25 @@ def _expanded(block: Block, program: AssemblyProgram) -> _Tree:
 
 
 def _copied(joint: Attach, line: Reflect | Translate, copy: int, name: str, boxes: dict[str, FloatArray]) -> Attach:
-    """An attachment of a copy: where the original really is attached, mirrored or moved."""
+    """Return an attachment of a copy: the actual point of the original, mirrored or shifted."""
     axis = AXES.index(line.axis)
     moved, target = boxes[joint.moved], boxes[joint.target]
-    place = moved[:3] + ((np.array(joint.source) - 0.5) * moved[3:6]) @ moved[6:].reshape(3, 3)
+    point = box_point(moved, joint.source)
     if isinstance(line, Reflect):
-        place[axis] = -place[axis]
+        point[axis] = -point[axis]
     else:
-        place[axis] += line.distance * copy / line.copies * boxes[BBOX][3 + axis]
-    x, y, z = np.clip(target[6:].reshape(3, 3) @ (place - target[:3]) / target[3:6] + 0.5, 0, 1).tolist()
+        point[axis] += line.distance * copy / line.copies * boxes[BBOX][3 + axis]
+    x, y, z = np.clip(target[6:].reshape(3, 3) @ (point - target[:3]) / target[3:6] + 0.5, 0, 1).tolist()
     source = _flipped(joint.source, axis) if isinstance(line, Reflect) else joint.source
     return Attach(name, joint.target, source, (x, y, z))
 
 
-def _upright(bbox: Cuboid) -> FloatArray:
-    return np.array([0.0, 0.0, 0.0, *bbox.dims, *np.eye(3).ravel()])
-
-
 def _flipped(point: Point, axis: int) -> Point:
-    x, y, z = (1 - each if place == axis else each for place, each in enumerate(point))
+    x, y, z = (1 - coordinate if index == axis else coordinate for index, coordinate in enumerate(point))
     return (x, y, z)
 
 
-def _renamed(line: Cuboid | Attach, called: dict[str, str]) -> Line:
+def _renamed(line: Cuboid | Attach, names: dict[str, str]) -> Line:
     if isinstance(line, Cuboid):
-        return replace(line, name=called.get(line.name, line.name))
-    return replace(line, moved=called.get(line.moved, line.moved), target=called.get(line.target, line.target))
+        return replace(line, name=names.get(line.name, line.name))
+    return replace(line, moved=names.get(line.moved, line.moved), target=names.get(line.target, line.target))

@@ -15,14 +15,14 @@ from stages.shapeassembly.syntax.limits import MAX_PARTS
 from stages.shapeassembly.syntax.program import AssemblyProgram
 
 FIT_ONLY_GATES = Gates(min_leaves=1, max_leaves=MAX_PARTS)
-"""The fit that an extracted program must have, and nothing about its size."""
+"""The gates of an extracted program without those on its size."""
 
 
 WITHOUT_POOLING = Cleaning(pool=False)
 
 
 def without_hierarchy(program: AssemblyProgram) -> AssemblyProgram:
-    """A program of about the same shape with one assembly, its parts attached to each other as they touch.
+    """Return a program of about the same shape with one assembly, whose parts are attached where they touch.
 
     Raises Rejected as `extract`, above all for more than ten cuboids, and ProgramError where the program cannot be
     executed.

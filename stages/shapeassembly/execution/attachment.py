@@ -1,8 +1,8 @@
-"""What one attachment does to a cuboid, compiled (shapeassembly App. A).
+"""The compiled effect of one attachment on a cuboid (shapeassembly App. A).
 
-A cuboid is a row of 15 numbers: centre 3, sizes 3, then its x, y and z axes as unit vectors. Where the appendix and the
-programs' authors differ, it does as the authors do, because the published programs were made to be executed so.
-Each rule writes what it decided, so that the differentiable interpreter follows it.
+A cuboid is a row of 15 numbers: centre, sizes, and its x, y and z axes as unit vectors. Where the appendix and the
+authors' code differ, this follows the code, with which the published programs were made. Each rule records its decision
+for the differentiable interpreter.
 """
 
 from __future__ import annotations
@@ -11,17 +11,18 @@ import numba
 import numpy as np
 
 MOVE, STAY, GROW, HINGE, SWING = range(5)
-"""What an attachment did: nothing was attached before; an aligned cuboid was near enough; it grew; one prior
-attachment; two or more."""
+"""The rule of an attachment: the first of its cuboid; an aligned cuboid that is near enough; one that grew; the second
+attachment; a later one.
+"""
 
-ADD, SCALE = 3, 4
-"""In place of an axis: all sizes are changed by one amount, or by one factor."""
+ADD_ALL, SCALE_ALL = 3, 4
+"""In place of an axis: all sizes changed by one amount, or by one factor."""
 
-_GRID = 10
-_NEAR = 0.05  # a gap below this share of the largest size of both cuboids is none
-_FACING = 0.9  # cosine between a face's normal and the way to the goal, above which the face is moved
-_AGREE = 0.01  # by how much prior attachments may be moved apart
-_TINY = 1e-9
+_GRID_POINTS = 10
+_NEAR_SHARE = 0.05  # smaller gaps count as none, as a share of the largest size of both cuboids
+_FACING_COSINE = 0.9  # minimum cosine between a face's normal and the direction to the goal for the face to move
+_MAX_PRIOR_SHIFT = 0.01  # maximum shift of prior attachments
+_MIN_LENGTH = 1e-9
 
 
 @numba.njit(cache=True)
@@ -41,7 +42,7 @@ def _cross(a, b, out):
 
 @numba.njit(cache=True)
 def point(box, p, out):
-    """The point of a cuboid with local coordinates `p`."""
+    """Write the point of a cuboid with local coordinates `p`."""
     a, b, c = (p[0] - 0.5) * box[3], (p[1] - 0.5) * box[4], (p[2] - 0.5) * box[5]
     for k in range(3):
         out[k] = box[k] + a * box[6 + k] + b * box[9 + k] + c * box[12 + k]
@@ -49,7 +50,7 @@ def point(box, p, out):
 
 @numba.njit(cache=True)
 def local(box, point, out):
-    """The local coordinates of a point."""
+    """Write the local coordinates of a point."""
     x, y, z = point[0] - box[0], point[1] - box[1], point[2] - box[2]
     for k in range(3):
         along = x * box[6 + 3 * k] + y * box[7 + 3 * k] + z * box[8 + 3 * k]
@@ -58,47 +59,49 @@ def local(box, point, out):
 
 @numba.njit(cache=True)
 def _has_corner(box, other):
-    """Whether a corner of `other` lies in `box`."""
+    """Return whether a corner of `other` is in `box`."""
     p, q, g = np.empty(3), np.empty(3), np.empty(3)
     for corner in range(8):
         p[0], p[1], p[2] = corner >> 2, (corner >> 1) & 1, corner & 1
         point(other, p, g)
         local(box, g, q)
-        if min(q[0], q[1], q[2]) >= -_TINY and max(q[0], q[1], q[2]) <= 1.0 + _TINY:
+        if min(q[0], q[1], q[2]) >= -_MIN_LENGTH and max(q[0], q[1], q[2]) <= 1.0 + _MIN_LENGTH:
             return True
     return False
 
 
 @numba.njit(cache=True)
 def _nearest_straight(box, target, near, far, gap):
-    """The nearest grid points of two upright cuboids: each axis by itself."""
+    """Find the nearest grid points of two upright cuboids, axis by axis."""
     for k in range(3):
         low, other = box[k] - box[3 + k] / 2, target[k] - target[3 + k] / 2
         best = np.inf
-        for i in range(_GRID):
-            own = low + box[3 + k] * i / (_GRID - 1)
-            for j in range(_GRID):
-                way = other + target[3 + k] * j / (_GRID - 1) - own
-                if abs(way) < best - _TINY:
-                    best, near[k], far[k], gap[k] = abs(way), i / (_GRID - 1), j / (_GRID - 1), way
+        for i in range(_GRID_POINTS):
+            own = low + box[3 + k] * i / (_GRID_POINTS - 1)
+            for j in range(_GRID_POINTS):
+                way = other + target[3 + k] * j / (_GRID_POINTS - 1) - own
+                if abs(way) < best - _MIN_LENGTH:
+                    best, near[k], far[k], gap[k] = abs(way), i / (_GRID_POINTS - 1), j / (_GRID_POINTS - 1), way
 
 
 @numba.njit(cache=True)
 def _nearest_tilted(box, target, near, far, gap):
-    """The nearest grid points of two cuboids of which `box` is upright: the target's is found by rounding."""
+    """Find the nearest grid points of an upright `box` and any target, whose point is found by rounding."""
     p, g, q, h = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     best = np.finfo(np.float64).max
-    for i in range(_GRID**3):
-        p[0], p[1], p[2] = i // _GRID**2, i // _GRID % _GRID, i % _GRID
-        p /= _GRID - 1
+    for i in range(_GRID_POINTS**3):
+        p[0], p[1], p[2] = i // _GRID_POINTS**2, i // _GRID_POINTS % _GRID_POINTS, i % _GRID_POINTS
+        p /= _GRID_POINTS - 1
         point(box, p, g)
         local(target, g, q)
         for k in range(3):
-            q[k] = min(max(np.ceil(q[k] * (_GRID - 1) - 0.5 - _TINY), 0.0), _GRID - 1.0) / (_GRID - 1)
+            q[k] = min(max(np.ceil(q[k] * (_GRID_POINTS - 1) - 0.5 - _MIN_LENGTH), 0.0), _GRID_POINTS - 1.0) / (
+                _GRID_POINTS - 1
+            )
         point(target, q, h)
         h -= g
         distance = _dot(h, h)
-        if distance < best * (1 - 1e-12) - _TINY * _TINY:
+        if distance < best * (1 - 1e-12) - _MIN_LENGTH * _MIN_LENGTH:
             best = distance
             near[:] = p
             far[:] = q
@@ -107,7 +110,7 @@ def _nearest_tilted(box, target, near, far, gap):
 
 @numba.njit(cache=True)
 def grow(box, target, decision):
-    """A further attachment of an aligned cuboid, whatever its points: grow towards `target` if it is away."""
+    """Attach an aligned cuboid again, whatever its points: grow towards `target` if it is away."""
     decision[0] = STAY
     if _has_corner(target, box) or _has_corner(box, target):
         return
@@ -117,11 +120,11 @@ def grow(box, target, decision):
     else:
         _nearest_tilted(box, target, near, far, gap)
     largest = max(max(box[3], box[4], box[5]), max(target[3], target[4], target[5]))
-    if _norm(gap) < _NEAR * largest:
+    if _norm(gap) < _NEAR_SHARE * largest:
         return
     decision[0] = GROW
     for k in range(3):
-        # The point opposite `near` stays where it is.
+        # The point opposite `near` stays fixed.
         more = gap[k] / (2 * near[k] - 1)
         if more > 0:
             box[3 + k] += more
@@ -147,15 +150,15 @@ def _rotate_about(box, pivot, u, cosine, sine):
 
 @numba.njit(cache=True)
 def _rotate_onto(box, pivot, source, goal):
-    """Rotate a cuboid about `pivot` so that `source` comes to lie towards `goal`, by the smallest angle.
+    """Rotate a cuboid about `pivot` by the smallest angle, so that `source` points towards `goal`.
 
-    Whether that was half a turn, which is about any axis across (`across` of the arm).
+    Returns whether it was half a turn, whose axis is `across` of the arm.
     """
     a, b, u = source - pivot, goal - pivot, np.empty(3)
     _cross(a, b, u)
     lengths = _norm(a) * _norm(b)
     sine, cosine = _norm(u) / lengths, _dot(a, b) / lengths
-    if sine >= _TINY:
+    if sine >= _MIN_LENGTH:
         u /= sine * lengths
         _rotate_about(box, pivot, u, cosine, sine)
         return False
@@ -168,7 +171,7 @@ def _rotate_onto(box, pivot, source, goal):
 
 @numba.njit(cache=True)
 def across(a, u):
-    """A unit vector at right angles to `a`: across `a` and the coordinate axis that is least like it."""
+    """Write a unit vector perpendicular to `a` and to the coordinate axis that is least parallel to it."""
     k = 0
     for j in range(1, 3):
         if abs(a[j]) < abs(a[k]):
@@ -180,21 +183,20 @@ def across(a, u):
 
 @numba.njit(cache=True)
 def hinge(box, prior, p, goal, decision):
-    """A second attachment: one size, or all where none can, is changed so that the distance is right; then the cuboid
-    turns."""
+    """Attach a second time: change one size, or all if none suffices, to the right distance; then turn the cuboid."""
     decision[0], decision[1] = HINGE, -1
     pivot, source = np.empty(3), np.empty(3)
     point(box, prior, pivot)
     way, arm = goal - pivot, (p - prior) * box[3:6]
     wanted, has = _dot(way, way), _dot(arm, arm)
-    if wanted < _TINY * _TINY or has < _TINY * _TINY:
+    if wanted < _MIN_LENGTH * _MIN_LENGTH or has < _MIN_LENGTH * _MIN_LENGTH:
         return
     best = np.inf
     for k in range(3):
-        if abs(arm[k]) < _TINY:
+        if abs(arm[k]) < _MIN_LENGTH:
             continue
         square = 1 + (wanted - has) / arm[k] ** 2
-        if square > 1e-12 and abs(np.sqrt(square) - 1) * box[3 + k] < best - _TINY:
+        if square > 1e-12 and abs(np.sqrt(square) - 1) * box[3 + k] < best - _MIN_LENGTH:
             best = abs(np.sqrt(square) - 1) * box[3 + k]
             decision[1] = k
     if decision[1] < 0:
@@ -209,18 +211,18 @@ def hinge(box, prior, p, goal, decision):
 
 @numba.njit(cache=True)
 def _change_all(box, reach, wanted, has, decision):
-    """Bring the squared length of the arm from `has` to `wanted` by adding one amount to all sizes, the smaller of two.
+    """Change the squared length of the arm from `has` to `wanted` by adding one amount to each size.
 
-    Where no amount leaves a box, by a common factor.
+    Where no amount leaves a box, they are scaled by a common factor.
     """
     square, linear = _dot(reach, reach), _dot(reach * reach, box[3:6])
     under = linear * linear - square * (has - wanted)
     amount = (np.sqrt(max(under, 0.0)) - linear) / square
-    if under >= 0 and min(box[3], box[4], box[5]) + amount > _TINY:
-        decision[1] = ADD
+    if under >= 0 and min(box[3], box[4], box[5]) + amount > _MIN_LENGTH:
+        decision[1] = ADD_ALL
         box[3:6] += amount
     else:
-        decision[1] = SCALE
+        decision[1] = SCALE_ALL
         box[3:6] *= np.sqrt(wanted / has)
 
 
@@ -235,7 +237,7 @@ def hold(box, p, place):
 
 @numba.njit(cache=True)
 def _face_of(p):
-    """The face that a local point lies on, or is nearest to: its axis, and 1 or -1."""
+    """Return axis and side, 1 or -1, of the face that is nearest to a local point."""
     axis, side, best = 0, 1.0, np.inf
     for k in range(3):
         if abs(1 - p[k]) < best:
@@ -247,7 +249,7 @@ def _face_of(p):
 
 @numba.njit(cache=True)
 def swing(box, priors, p, goal, decision):
-    """A further attachment after two or more: turn about their line, if they have one, then move the face nearer."""
+    """Attach after two or more attachments: turn about their line, if they have one, then move the face nearer."""
     decision[0], decision[1], decision[2] = SWING, -1, 0
     pivot, other, source, u, normal = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     point(box, priors[0], pivot)
@@ -262,16 +264,16 @@ def swing(box, priors, p, goal, decision):
             u[2] * other[0] - u[0] * other[2],
             u[0] * other[1] - u[1] * other[0],
         )
-        straight = straight and x * x + y * y + z * z < _AGREE * _AGREE
+        straight = straight and x * x + y * y + z * z < _MAX_PRIOR_SHIFT * _MAX_PRIOR_SHIFT
     length = _norm(u)
-    if straight and length > _TINY:
+    if straight and length > _MIN_LENGTH:
         u /= length
         point(box, p, source)
         s, t = source - pivot, goal - pivot
         s -= u * _dot(u, s)
         t -= u * _dot(u, t)
         lengths = _norm(s) * _norm(t)
-        if lengths > _TINY:
+        if lengths > _MIN_LENGTH:
             _cross(s, t, normal)
             _rotate_about(box, pivot, u, _dot(s, t) / lengths, _dot(u, normal) / lengths)
             decision[2] = 1
@@ -281,15 +283,15 @@ def swing(box, priors, p, goal, decision):
 
 @numba.njit(cache=True)
 def _push(box, priors, p, way, decision):
-    """Move the face of point `p` along `way` where it faces there and no prior attachment is torn."""
+    """Move the face of point `p` along `way` if it faces there and no prior attachment shifts too far."""
     axis, side = _face_of(p)
     along, distance = side * _dot(way, box[6 + 3 * axis : 9 + 3 * axis]), _norm(way)
     apart = side * (p[axis] - priors[0][axis])
-    if distance < _TINY or along <= _FACING * distance or apart < 1e-6:
+    if distance < _MIN_LENGTH or along <= _FACING_COSINE * distance or apart < 1e-6:
         return
     more = along / apart
     for n in range(1, len(priors)):
-        if abs(priors[n][axis] - priors[0][axis]) * more > _AGREE:
+        if abs(priors[n][axis] - priors[0][axis]) * more > _MAX_PRIOR_SHIFT:
             return
     decision[1] = axis
     place = np.empty(3)

@@ -1,8 +1,8 @@
 """The differentiable interpreter: corners as functions of continuous parameters, in torch (shapeassembly §4).
 
-What an attachment does depends on the parameters in steps: grow or stay, which axis is scaled, which grid points are
-nearest. The fast interpreter takes these decisions at the given parameters, and the arithmetic that follows them is
-done here, so that both have one meaning and the gradients are those of the branch that was taken.
+The decisions of an attachment, such as grow or stay, the axis to scale and the nearest grid points, are discontinuous.
+The fast interpreter takes them at the given parameters, and this one repeats the arithmetic. So both have one meaning,
+and gradients are those of the branch taken.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.execution.attachment import ADD, GROW, HINGE, MOVE, SCALE, STAY, across
+from stages.shapeassembly.execution.attachment import ADD_ALL, GROW, HINGE, MOVE, SCALE_ALL, STAY, across
 from stages.shapeassembly.execution.interpreter import check_executed
 from stages.shapeassembly.execution.kernels import ExecutedTables, run
 from stages.shapeassembly.execution.parameters import parameter_places
@@ -27,7 +27,11 @@ _UPRIGHT = torch.eye(3, dtype=torch.float64)
 
 @dataclass(slots=True)
 class _Box:
-    """A cuboid as it stands: centre (3,), sizes (3,), frame (3, 3) with its axes as columns, None while upright."""
+    """A cuboid of an assembly.
+
+    centre, sizes: (3,).
+    frame: (3, 3), axes as columns; None while upright.
+    """
 
     centre: Tensor
     sizes: Tensor
@@ -37,7 +41,7 @@ class _Box:
     mirror: Tensor | None
 
     def arm(self, p: Tensor) -> Tensor:
-        """From the centre to local point `p`."""
+        """Return the vector from the centre to local point `p`."""
         arm = (p - 0.5) * self.sizes
         return arm if self.frame is None else self.frame @ arm
 
@@ -50,7 +54,7 @@ class _Box:
 
 
 class DifferentiableProgram:
-    """A program whose corners can be asked for, and differentiated, at any parameters."""
+    """A program whose corners can be differentiated at any parameters."""
 
     def __init__(self, program: AssemblyProgram) -> None:
         self._flat = program_tables([program])
@@ -58,15 +62,16 @@ class DifferentiableProgram:
         self._rows: list[list[int]] = np.nan_to_num(self._flat.rows[:, :5]).astype(int).tolist()
 
     def corners(self, values: Tensor) -> Tensor:
-        """float64 (n, 8, 3), as `execute` orders them, at `values`, float64 (k,), as `parameters` orders them.
+        """Return the corners, float64 (n, 8, 3), as `execute` orders them.
 
-        Raises ProgramError where the program with these parameters cannot be executed.
+        values: float64 (k,), as `parameters` orders them.
+        Raises ProgramError where the program cannot be executed with these parameters.
         """
         rows, flat = self._flat.rows.copy(), self._flat
         rows[self._places[:, 0], self._places[:, 1]] = values.detach().numpy()
-        done: ExecutedTables
-        done, starts, decisions = run(rows, flat.block_rows, flat.block_parts, flat.program_blocks)
-        check_executed(done)
+        executed: ExecutedTables
+        executed, starts, decisions = run(rows, flat.block_rows, flat.block_parts, flat.program_blocks)
+        check_executed(executed)
         table = torch.zeros(len(rows), 6, dtype=torch.float64)
         triples = table.index_put(
             (torch.from_numpy(self._places[:, 0]), torch.from_numpy(self._places[:, 1] - 4)), values
@@ -76,15 +81,15 @@ class DifferentiableProgram:
             self._execute(int(low), int(high), points, decisions[starts[index] : starts[index + 1]])
             for index, (low, high) in enumerate(zip(flat.block_rows[:-1], flat.block_rows[1:], strict=True))
         ]
-        return _placed(blocks, done.node)
+        return _placed(blocks, executed.node)
 
     def _execute(self, low: int, high: int, points: tuple[Tensor, ...], decisions: FloatArray) -> list[_Box]:
-        """The cuboids of one assembly in its own coordinates."""
+        """Return the cuboids of one assembly in its own coordinates."""
         boxes: list[_Box] = []
         events: list[tuple[int, int, Tensor, Tensor]] = []
 
         def attach(moved: int, target: int, p: Tensor, q: Tensor) -> None:
-            priors = [each[2] if each[0] == moved else each[3] for each in events if moved in each[:2]]
+            priors = [event[2] if event[0] == moved else event[3] for event in events if moved in event[:2]]
             _attach(boxes[moved], boxes[target], p, q, priors, decisions[len(events)])
             events.append((moved, target, p, q))
 
@@ -110,13 +115,13 @@ class DifferentiableProgram:
                         mirror = sign if mirror is None else mirror * sign
                     boxes.append(_Box(torch.zeros_like(box.sizes), box.sizes, None, box.aligned, box.child, mirror))
                     for _, target, p, _ in moves:
-                        place = box.point(p)
+                        actual = box.point(p)
                         if kind == REFLECT:
                             p = torch.where(sign < 0, 1 - p, p)
-                            place = place * sign
+                            actual = actual * sign
                         else:
-                            place = place + boxes[0].sizes * (sign < 0) * (first[0] * (number / copies))
-                        attach(len(boxes) - 1, target, p, boxes[target].local(place).clamp(0, 1))
+                            actual = actual + boxes[0].sizes * (sign < 0) * (first[0] * (number / copies))
+                        attach(len(boxes) - 1, target, p, boxes[target].local(actual).clamp(0, 1))
         return boxes
 
 
@@ -127,11 +132,11 @@ def _face_centre(face: int) -> Tensor:
 
 
 def _on_face(face: int, uv: Tensor) -> Tensor:
-    """The point (u, v) of a face, where `uv` holds u and v behind a place for the face."""
+    """Return the point (u, v) of a face; `uv` holds u and v behind a placeholder for the face."""
     side = uv.new_tensor(1 - face % 2)
-    place = [uv[1], uv[2]]
-    place.insert(face // 2, side)
-    return torch.stack(place)
+    point = [uv[1], uv[2]]
+    point.insert(face // 2, side)
+    return torch.stack(point)
 
 
 def _attach(box: _Box, target: _Box, p: Tensor, q: Tensor, priors: list[Tensor], decision: FloatArray) -> None:
@@ -162,10 +167,10 @@ def _hinge(box: _Box, prior: Tensor, p: Tensor, goal: Tensor, axis: int, half_tu
     pivot = box.point(prior)
     way, arm = goal - pivot, (p - prior) * box.sizes
     wanted, has = way @ way, arm @ arm
-    if axis == ADD:
+    if axis == ADD_ALL:
         square, linear = (p - prior) @ (p - prior), (p - prior) @ arm
         box.sizes = box.sizes + ((linear**2 - square * (has - wanted)).sqrt() - linear) / square
-    elif axis == SCALE:
+    elif axis == SCALE_ALL:
         box.sizes = box.sizes * (wanted / has).sqrt()
     else:
         _scale(box, axis, box.sizes * (1 + (wanted - has) / arm[axis] ** 2).sqrt())
@@ -194,7 +199,7 @@ def _swing(box: _Box, priors: list[Tensor], p: Tensor, goal: Tensor, axis: int, 
         _rotate(box, pivot, cosine * _UPRIGHT + sine * _skew(u) + (1 - cosine) * torch.outer(u, u))
     if axis >= 0:
         face = _UPRIGHT[axis] if box.frame is None else box.frame[:, axis]
-        # Towards either side: both signs cancel.
+        # Both signs cancel for either side.
         more = (goal - box.point(p)) @ face / (p[axis] - priors[0][axis])
         place = box.point(priors[0])
         _scale(box, axis, box.sizes + more)
@@ -202,7 +207,7 @@ def _swing(box: _Box, priors: list[Tensor], p: Tensor, goal: Tensor, axis: int, 
 
 
 def _skew(u: Tensor) -> Tensor:
-    """The matrix of the cross product with `u`."""
+    """Return the matrix of the cross product with `u`."""
     matrix: Tensor = torch.linalg.cross(u.expand(3, 3), _UPRIGHT).T
     return matrix
 
@@ -213,7 +218,7 @@ def _rotate(box: _Box, pivot: Tensor, rotation: Tensor) -> None:
 
 
 def _placed(blocks: list[list[_Box]], node: np.ndarray) -> Tensor:
-    """The corners of all leaves, assemblies put within each other breadth first."""
+    """Return the corners of all leaves, with assemblies placed within each other breadth first."""
     placed: list[tuple[Tensor, Tensor, Tensor, float]] = []
     corners = []
     for index, (block, parent, part) in enumerate(node.tolist()):

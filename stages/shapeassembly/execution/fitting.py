@@ -1,4 +1,4 @@
-"""Fit the continuous parameters of a program, or cuboids without one, to a point cloud (shapeassembly §7.3)."""
+"""Fit the continuous parameters of a program, or free cuboids, to a point cloud (shapeassembly §7.3)."""
 
 from __future__ import annotations
 
@@ -22,13 +22,15 @@ from stages.shapeassembly.syntax.program import AssemblyProgram
 _SIGNS = torch.tensor([[x, y, z] for x in (0.5, -0.5) for y in (0.5, -0.5) for z in (0.5, -0.5)], dtype=torch.float64)
 
 STEPS_PER_RESAMPLING = 20
-"""Steps for which the same points of the cuboids are followed."""
+"""Steps between new samples of surface points."""
 
 
 @dataclass(frozen=True)
 class FitResult:
-    """A fitted program. before, after: Chamfer distance to the points, in their unit, on other points of the surface
-    than the fit has seen."""
+    """A fitted program.
+
+    before, after: Chamfer distance to the points, measured at other surface points than the fit has used.
+    """
 
     program: AssemblyProgram
     before: float
@@ -43,22 +45,22 @@ def fit(
     rate: float = 0.01,
     samples: int = 2000,
 ) -> FitResult:
-    """Move the parameters of `program` so that its surface comes near `points`, float64 (n, 3), and they near it.
+    """Move the parameters of a program so that its surface approximates points, float64 (n, 3).
 
-    Adam on the mean squared distances both ways to the nearest point, `samples` points of the surface at a time;
-    the rate falls to a tenth. Every parameter stays in its range (`parameter_ranges`). The best step is kept; where a
-    step leads to a program that cannot be executed, the fit ends with what it has.
-    Raises ProgramError if the program itself cannot be executed, ValueError if there are no points, or it has no parts.
+    Adam minimises the mean squared distances both ways to the nearest point, for `samples` surface points at a time;
+    the rate falls to a tenth. Parameters stay in their ranges. The best step is kept; the fit ends at a step whose
+    program cannot be executed. Raises ProgramError if the program itself cannot be executed, ValueError if there are no
+    points or no parts.
     """
-    own = DifferentiableProgram(program)
+    differentiable = DifferentiableProgram(program)
     low, high = parameter_ranges(program)
     fitted = with_parameters(
-        program, _descended(own.corners, parameters(program), low, high, points, rng, steps, rate, samples)
+        program, _descended(differentiable.corners, parameters(program), low, high, points, rng, steps, rate, samples)
     )
     states = rng.spawn(2)
     before, after = (
-        chamfer_l1(surface_points(execute(each), samples, state), points)
-        for each, state in zip((program, fitted), states, strict=True)
+        chamfer_l1(surface_points(execute(candidate), samples, state), points)
+        for candidate, state in zip((program, fitted), states, strict=True)
     )
     return FitResult(fitted, before, after)
 
@@ -71,9 +73,10 @@ def fit_cuboids(
     rate: float = 0.01,
     samples: int = 2000,
 ) -> list[Box]:
-    """Move, stretch and turn each of some cuboids by itself so that their surface comes near `points`, float64 (n, 3),
-    as `fit` does with a program: what was attached need not stay so (§7.3, "Opt Cuboids"). Raises ValueError if there
-    are no points, or no cuboids."""
+    """Move, stretch and turn cuboids independently, as `fit` does with a program (§7.3, "Opt Cuboids").
+
+    Raises ValueError if there are no points or no cuboids.
+    """
     if not boxes:
         raise ValueError("there are no cuboids to fit")
     start = np.stack([np.concatenate([box.center, box.size, np.zeros(3)]) for box in boxes])
@@ -82,7 +85,7 @@ def fit_cuboids(
     low[:, 3:6] = np.minimum(start[:, 3:6], MIN_CUBOID_SIZE)
 
     def placed(values: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Centres (n, 3), sizes (n, 3) and axes (n, 3, 3), in rows."""
+        """Return centres (n, 3), sizes (n, 3) and axes (n, 3, 3) as rows."""
         centres, sizes, turns = values.view(-1, 3, 3).unbind(1)
         skew = torch.linalg.cross(turns[:, None], torch.eye(3, dtype=torch.float64)[None], dim=-1)
         return centres, sizes, axes @ torch.linalg.matrix_exp(skew)
@@ -92,8 +95,8 @@ def fit_cuboids(
         return centres[:, None] + (_SIGNS * sizes[:, None]) @ turned
 
     best = _descended(corners, start.ravel(), low.ravel(), np.inf, points, rng, steps, rate, samples)
-    found = (each.numpy() for each in placed(torch.from_numpy(best)))
-    return [Box(*each) for each in zip(*found, strict=True)]
+    centres, sizes, turned = (tensor.numpy() for tensor in placed(torch.from_numpy(best)))
+    return [Box(*box) for box in zip(centres, sizes, turned, strict=True)]
 
 
 def _descended(
@@ -107,17 +110,19 @@ def _descended(
     rate: float,
     samples: int,
 ) -> FloatArray:
-    """The values, (k,), between `low` and `high`, at which the cuboids with corners `corners_of` them, (n, 8, 3), were
-    nearest to the points on the way down from `start`."""
+    """Return the values, (k,), with the smallest distance to the points during the descent from `start`.
+
+    corners_of: the corners of the cuboids, (n, 8, 3), at some values.
+    """
     if not len(points):
         raise ValueError("there are no points to fit to")
     target = cKDTree(points)
     values = torch.tensor(start, requires_grad=True)
     optimiser = torch.optim.Adam([values], lr=rate)
     falling = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps, eta_min=rate / 10)
-    seen = torch.from_numpy(np.asarray(points, dtype=np.float64))
+    cloud = torch.from_numpy(np.asarray(points, dtype=np.float64))
     best, best_values = np.inf, values.detach().clone()
-    which, weights = np.empty(0, np.int64), torch.empty(0, 8)
+    cuboids, weights = np.empty(0, np.int64), torch.empty(0, 8)
     for step in range(steps):
         try:
             corners = corners_of(values)
@@ -126,9 +131,9 @@ def _descended(
                 raise
             break
         if step % STEPS_PER_RESAMPLING == 0:
-            which, weights = _chosen_points(corners.detach().numpy(), samples, rng)
-        surface = (corners[which] * weights[:, :, None]).sum(dim=1)
-        loss, distance = _squared_chamfer(surface, seen, target)
+            cuboids, weights = _chosen_points(corners.detach().numpy(), samples, rng)
+        surface = (corners[cuboids] * weights[:, :, None]).sum(dim=1)
+        loss, distance = _squared_chamfer(surface, cloud, target)
         if distance < best:
             best, best_values = distance, values.detach().clone()
         optimiser.zero_grad()
@@ -147,15 +152,17 @@ def _bound(values: FloatArray | float) -> Tensor:
 
 
 def surface_points(execution: Execution, count: int, rng: np.random.Generator) -> FloatArray:
-    """Random points on the surfaces of all leaf cuboids, evenly by area, float64 (count, 3)."""
-    which, weights = _chosen_points(execution.corners, count, rng)
-    points: FloatArray = (execution.corners[which] * weights.numpy()[:, :, None]).sum(axis=1)
+    """Sample the surfaces of all leaf cuboids uniformly by area, float64 (count, 3)."""
+    cuboids, weights = _chosen_points(execution.corners, count, rng)
+    points: FloatArray = (execution.corners[cuboids] * weights.numpy()[:, :, None]).sum(axis=1)
     return points
 
 
 def _chosen_points(corners: FloatArray, count: int, rng: np.random.Generator) -> tuple[np.ndarray, Tensor]:
-    """Points on the surfaces of cuboids, evenly by area: the cuboid of each, int64 (count,), and how much of each of
-    its corners is in it, float64 (count, 8)."""
+    """Sample surface points uniformly by area:
+
+    the cuboid of each, int64 (count,), and weights of its corners, float64 (count, 8).
+    """
     if not len(corners):
         raise ValueError("the program has no parts")
     sizes = np.linalg.norm(corners[:, [4, 2, 1]] - corners[:, :1], axis=2)
@@ -169,8 +176,10 @@ def _chosen_points(corners: FloatArray, count: int, rng: np.random.Generator) ->
 
 
 def _squared_chamfer(surface: Tensor, points: Tensor, target: cKDTree) -> tuple[Tensor, float]:
-    """Mean squared nearest distances both ways, to differentiate; and the Chamfer distance. Who is nearest is looked up
-    in trees, and does not change with the parameters to first order."""
+    """Return the mean squared nearest distances both ways, differentiable, and the Chamfer distance.
+
+    Nearest points are looked up in trees: to first order they do not depend on the parameters.
+    """
     here = surface.detach().numpy()
     there, nearest = target.query(here)
     back, back_nearest = cKDTree(here).query(target.data)

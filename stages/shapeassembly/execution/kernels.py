@@ -1,4 +1,4 @@
-"""The interpreter, compiled: lines to cuboids, and assemblies put within each other (shapeassembly §4, App. B)."""
+"""The compiled interpreter: lines to cuboids, and assemblies placed within each other (shapeassembly §4, App. B)."""
 
 from __future__ import annotations
 
@@ -15,13 +15,17 @@ OK, TOO_MANY_PARTS, TOO_DEEP, TOO_MANY_EVENTS, TOO_FAR = range(5)
 
 
 class ExecutedTables(NamedTuple):
-    """All leaf cuboids of all programs, in the order of the assemblies, breadth first.
+    """All leaf cuboids of all programs, by assembly breadth first.
 
-    status int64 (p,): OK, or why the program was not executed; program_leaves int64 (p + 1,): where each program's
-    leaves start; leaves float64 (n, 15); corners float64 (n, 8, 3); leaf_node int64 (n,): the assembly, counted within
-    the program; leaf_part int64 (n,): the cuboid within its assembly;
-    program_nodes int64 (p + 1,); node int64 (m, 3): assembly of the text, parent node, cuboid in the parent's assembly;
-    boxes float64 (parts, 15): every cuboid in the coordinates of its own assembly.
+    status: int64 (p,), OK, or why the program was not executed.
+    program_leaves: int64 (p + 1,), where each program's leaves start.
+    leaves: float64 (n, 15).
+    corners: float64 (n, 8, 3).
+    leaf_node: int64 (n,), the assembly, counted within the program.
+    leaf_part: int64 (n,), the cuboid within its assembly.
+    program_nodes: int64 (p + 1,), where each program's assemblies start.
+    node: int64 (m, 3), assembly of the text, parent node, cuboid in the parent's assembly.
+    boxes: float64 (parts, 15), every cuboid in the coordinates of its own assembly.
     """
 
     status: np.ndarray
@@ -36,7 +40,11 @@ class ExecutedTables(NamedTuple):
 
 
 class _Events(NamedTuple):
-    """The attachments of one assembly in order: moved and target int64 (e, 2), local points float64 (e, 2, 3)."""
+    """The attachments of one assembly in order.
+
+    who: int64 (e, 2), moved and target.
+    where: float64 (e, 2, 3), local points.
+    """
 
     who: np.ndarray
     where: np.ndarray
@@ -75,21 +83,21 @@ def _attach(boxes, aligned, events, count, decision):
 
 @numba.njit(cache=True)
 def _count_events(rows, parts):
-    """How many attachments the lines of one assembly come to; -1 if too many."""
+    """Return the number of attachments of one assembly, copies included; -1 if too many."""
     moves = np.zeros(parts, np.int64)
-    made, total = 0, 0
+    declared, total = 0, 0
     for row in rows:
         kind, a = int(row[0]), int(row[1])
         more = 0
         if kind == DECLARE:
-            made += 1
+            declared += 1
         elif kind in (ATTACH, SQUEEZE):
             more = 1 if kind == ATTACH else 2
             moves[a] += more
         else:
             copies = 1 if kind == REFLECT else int(row[3])
-            moves[made : made + copies] = moves[a]
-            made += copies
+            moves[declared : declared + copies] = moves[a]
+            declared += copies
             more = moves[a] * copies
         total += more
         if total > MAX_BLOCK_ATTACHMENTS:
@@ -99,7 +107,7 @@ def _count_events(rows, parts):
 
 @numba.njit(cache=True)
 def _face_point(face, u, v, out):
-    """The point (u, v) of a face; faces are counted as in `FACES`."""
+    """Write the point (u, v) of a face; faces are numbered as in `FACES`."""
     axis = face // 2
     out[axis] = 1.0 - face % 2
     out[(0 if axis else 1)] = u
@@ -110,23 +118,25 @@ def _face_point(face, u, v, out):
 def _execute(rows, boxes, child, mirrored, decisions):
     """Execute the lines of one assembly in its own coordinates.
 
-    boxes (parts, 15), child (parts,): the assembly that expands each cuboid, or -1; mirrored (parts,): a bit for each
-    axis that it is mirrored along; decisions (events, 8): what each attachment did, the axis whose size changed
-    (ADD, SCALE: all), then GROW: the near points of both cuboids; HINGE: whether it was half a turn; SWING: whether it
-    turned.
+    boxes: (parts, 15).
+    child: (parts,), the assembly that expands each cuboid, or -1.
+    mirrored: (parts,), a bit for each axis along which the cuboid is mirrored.
+    decisions: (events, 8), for each attachment its rule and the axis whose size changed (ADD_ALL, SCALE_ALL: all
+        three); then for
+        GROW the near points of both cuboids, for HINGE whether it was half a turn, for SWING whether it turned.
     """
     events = _Events(np.empty((len(decisions), 2), np.int64), np.empty((len(decisions), 2, 3)))
     aligned = np.empty(len(boxes), np.bool_)
-    # Not plain zeros: constants have a type of their own, for which all that is called would be compiled once more.
-    made, count = np.int64(0), np.int64(0)
+    # Typed zeros: literal constants have types of their own, for which callees would be compiled again.
+    declared, count = np.int64(0), np.int64(0)
     for row in rows:
         kind, a, b, c = int(row[0]), int(row[1]), int(row[2]), int(row[3])
         if kind == DECLARE:
-            boxes[made] = 0.0
-            boxes[made, 3:6] = row[4:7]
-            boxes[made, 6] = boxes[made, 10] = boxes[made, 14] = 1.0
-            child[made], aligned[made], mirrored[made] = a, b != 0, 0
-            made += 1
+            boxes[declared] = 0.0
+            boxes[declared, 3:6] = row[4:7]
+            boxes[declared, 6] = boxes[declared, 10] = boxes[declared, 14] = 1.0
+            child[declared], aligned[declared], mirrored[declared] = a, b != 0, 0
+            declared += 1
         elif kind == ATTACH:
             events.who[count, 0], events.who[count, 1] = a, b
             events.where[count, 0], events.where[count, 1] = row[4:7], row[7:10]
@@ -135,7 +145,7 @@ def _execute(rows, boxes, child, mirrored, decisions):
         elif kind == SQUEEZE:
             face = int(row[4])
             for n in range(2):
-                # An opposite face meets a cuboid, the same face meets the bounding box, which is around it.
+                # Opposite faces of two cuboids meet; the bounding box is met by its own face from inside.
                 own = face if n == 0 else face ^ 1
                 target = b if n == 0 else c
                 events.who[count, 0], events.who[count, 1] = a, target
@@ -147,34 +157,34 @@ def _execute(rows, boxes, child, mirrored, decisions):
             copies = 1 if kind == REFLECT else c
             sizes, before = boxes[a, 3:6].copy(), count
             for n in range(1, copies + 1):
-                boxes[made] = 0.0
-                boxes[made, 3:6] = sizes
-                boxes[made, 6] = boxes[made, 10] = boxes[made, 14] = 1.0
-                child[made], aligned[made], mirrored[made] = child[a], aligned[a], mirrored[a]
+                boxes[declared] = 0.0
+                boxes[declared, 3:6] = sizes
+                boxes[declared, 6] = boxes[declared, 10] = boxes[declared, 14] = 1.0
+                child[declared], aligned[declared], mirrored[declared] = child[a], aligned[a], mirrored[a]
                 if kind == REFLECT:
-                    mirrored[made] ^= 1 << b
+                    mirrored[declared] ^= 1 << b
                 for k in range(before):
                     if events.who[k, 0] == a:
-                        _copy_event(boxes, events, k, made, count, b, kind == REFLECT, row[4] * n / copies)
+                        _copy_event(boxes, events, k, declared, count, b, kind == REFLECT, row[4] * n / copies)
                         _attach(boxes, aligned, events, count, decisions[count])
                         count += 1
-                made += 1
+                declared += 1
 
 
 @numba.njit(cache=True)
 def _copy_event(boxes, events, original, copy, count, axis, mirror, share):
-    """Attachment `original` for a copy: its actual place mirrored, or moved by a share of the bounding box."""
+    """Copy attachment `original`: its actual point is mirrored, or shifted by a share of the bounding box."""
     moved, target = events.who[original]
     p, q = events.where[count]
     p[:] = events.where[original, 0]
-    place = np.empty(3)
-    point(boxes[moved], p, place)
+    actual = np.empty(3)
+    point(boxes[moved], p, actual)
     if mirror:
         p[axis] = 1.0 - p[axis]
-        place[axis] = -place[axis]
+        actual[axis] = -actual[axis]
     else:
-        place[axis] += share * boxes[0, 3 + axis]
-    local(boxes[target], place, q)
+        actual[axis] += share * boxes[0, 3 + axis]
+    local(boxes[target], actual, q)
     for k in range(3):
         q[k] = min(max(q[k], 0.0), 1.0)
     events.who[count, 0], events.who[count, 1] = copy, target
@@ -182,7 +192,7 @@ def _copy_event(boxes, events, original, copy, count, axis, mirror, share):
 
 @numba.njit(cache=True)
 def _count_nodes(child, block_parts):
-    """How many assemblies and leaves one program has when expanded: status, nodes, leaves."""
+    """Return the status, and the number of assemblies and leaves, of one expanded program."""
     blocks = len(block_parts) - 1
     inner, outer = np.zeros(blocks, np.int64), np.zeros(blocks, np.int64)
     first = block_parts[0]
@@ -208,12 +218,12 @@ def _count_nodes(child, block_parts):
 
 @numba.njit(cache=True)
 def _place(boxes, child, mirrored, block_parts, node, leaves, corners, leaf_node, leaf_part):
-    """Put the assemblies of one program within each other, breadth first: OK or TOO_FAR."""
+    """Place the assemblies of one program within each other, breadth first. Returns OK or TOO_FAR."""
     rotations, translations, scales = np.empty((len(node), 3, 3)), np.zeros((len(node), 3)), np.ones((len(node), 3))
     rotations[0] = np.eye(3)
     first = block_parts[0]
     node[0, 0], node[0, 1], node[0, 2] = 0, -1, 0
-    nodes, found = 1, 0
+    nodes, leaf = 1, 0
     world, rotation = np.empty(15), np.empty((3, 3))
     for current in range(len(node)):
         block = node[current, 0]
@@ -224,7 +234,7 @@ def _place(boxes, child, mirrored, block_parts, node, leaves, corners, leaf_node
             box = boxes[part]
             for k in range(3):
                 world[k] = translations[current, k] + m[k, 0] * box[0] + m[k, 1] * box[1] + m[k, 2] * box[2]
-                # Sizes follow the size that the assembly really has, places do not.
+                # Sizes scale with the actual size of the assembly, positions do not.
                 world[3 + k] = box[3 + k] * scales[current, k]
                 for j in range(3):
                     rotation[k, j] = m[k, 0] * box[6 + 3 * j] + m[k, 1] * box[7 + 3 * j] + m[k, 2] * box[8 + 3 * j]
@@ -240,13 +250,13 @@ def _place(boxes, child, mirrored, block_parts, node, leaves, corners, leaf_node
                 continue
             for j in range(3):
                 world[6 + 3 * j : 9 + 3 * j] = rotation[:, j] if handed else -rotation[:, j]
-            leaves[found] = world
+            leaves[leaf] = world
             p = np.empty(3)
             for corner in range(8):
                 p[0], p[1], p[2] = 1 - (corner >> 2), 1 - ((corner >> 1) & 1), 1 - (corner & 1)
-                point(world, p, corners[found, corner])
-            leaf_node[found], leaf_part[found] = current, part - start
-            found += 1
+                point(world, p, corners[leaf, corner])
+            leaf_node[leaf], leaf_part[leaf] = current, part - start
+            leaf += 1
             if not np.abs(world).max() <= MAX_REACH:
                 return TOO_FAR
     return OK
@@ -254,8 +264,11 @@ def _place(boxes, child, mirrored, block_parts, node, leaves, corners, leaf_node
 
 @numba.njit(cache=True)
 def run(rows, block_rows, block_parts, program_blocks):
-    """Execute all programs of a Flat: an Executed, and the decisions of all attachments, float64
-    (events, 8), with the starts of each assembly's, int64 (b + 1,)."""
+    """Execute all programs of some tables.
+
+    Returns the executed tables, where the decisions of each assembly start, int64 (b + 1,), and the decisions of all
+    attachments, float64 (events, 8).
+    """
     programs = len(program_blocks) - 1
     boxes = np.empty((block_parts[-1], 15))
     child, mirrored = np.empty(block_parts[-1], np.int64), np.empty(block_parts[-1], np.int64)

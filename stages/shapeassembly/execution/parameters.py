@@ -12,20 +12,22 @@ from stages.shapeassembly.execution.tables import ATTACH, DECLARE, REFLECT, SQUE
 from stages.shapeassembly.syntax.program import AssemblyProgram, Attach, Block, Cuboid, Line, Reflect, Squeeze
 
 MIN_CUBOID_SIZE = 0.01
-"""Smallest size of a cuboid that a model or a fit may choose (shapeassembly App. D)."""
+"""Minimum size of a cuboid that a model or a fit may choose (shapeassembly App. D)."""
 
 _FIRST = {DECLARE: 4, ATTACH: 4, SQUEEZE: 5, TRANSLATE: 4, REFLECT: 4}
 _COUNT = {DECLARE: 3, ATTACH: 6, SQUEEZE: 2, TRANSLATE: 1, REFLECT: 0}
 
 
 def parameters(program: AssemblyProgram) -> FloatArray:
-    """All continuous parameters in the order of the text, float64 (k,): three a cuboid, bounding boxes included, six an
-    attach, two a squeeze, one a translate."""
+    """Return all continuous parameters in the order of the text, float64 (k,).
+
+    A cuboid, bounding boxes included, has three, an attach six, a squeeze two, a translate one.
+    """
     return np.array([number for block in program.blocks for line in _lines(block) for number in _numbers(line)])
 
 
 def with_parameters(program: AssemblyProgram, values: FloatArray) -> AssemblyProgram:
-    """The program with other parameters, in the order of `parameters`. Raises ValueError for a wrong count."""
+    """Return the program with other parameters, ordered as `parameters`. Raises ValueError for a wrong count."""
     rest = iter(np.asarray(values, dtype=np.float64).tolist())
     changed = program.with_lines(lambda line: _with_numbers(line, rest))
     if next(rest, None) is not None:
@@ -36,28 +38,28 @@ def with_parameters(program: AssemblyProgram, values: FloatArray) -> AssemblyPro
 
 
 def parameter_ranges(program: AssemblyProgram) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest value of each parameter, float64 (k,) each; the program's own values lie between.
+    """Return minimum and maximum of each parameter, float64 (k,) each; they include the program's own values.
 
-    Coordinates and distances lie in [0, 1]; a size is from SMALLEST to that of the root's bounding box, which itself
-    stays as it is, since it says how large the whole is.
+    Coordinates and distances are in [0, 1]; sizes from MIN_CUBOID_SIZE to those of the root's bounding box, which is
+    fixed, since it defines the scale.
     """
     whole = program.root.bbox
     low, high = [], []
     for block in program.blocks:
         for line in _lines(block):
             numbers = _numbers(line)
-            least, most = [0.0] * len(numbers), [1.0] * len(numbers)
+            lower, upper = [0.0] * len(numbers), [1.0] * len(numbers)
             if isinstance(line, Cuboid):
-                least, most = [MIN_CUBOID_SIZE] * 3, list(whole.dims)
+                lower, upper = [MIN_CUBOID_SIZE] * 3, list(whole.dims)
             if line is whole:
-                least = most = numbers
-            low += [min(bound, number) for bound, number in zip(least, numbers, strict=True)]
-            high += [max(bound, number) for bound, number in zip(most, numbers, strict=True)]
+                lower = upper = numbers
+            low += [min(bound, number) for bound, number in zip(lower, numbers, strict=True)]
+            high += [max(bound, number) for bound, number in zip(upper, numbers, strict=True)]
     return np.array(low), np.array(high)
 
 
 def parameter_places(rows: FloatArray) -> IndexArray:
-    """Where the parameters stand in the rows of a Flat, int64 (k, 2)."""
+    """Return the row and column of each parameter in ProgramTables, int64 (k, 2)."""
     places = [
         (row, column)
         for row, kind in enumerate(rows[:, 0].astype(int).tolist())

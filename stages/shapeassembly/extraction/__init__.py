@@ -1,1 +1,1 @@
-"""From part hierarchies to ShapeAssembly programs (shapeassembly §5, App. C)."""
+"""Extract ShapeAssembly programs from part hierarchies (shapeassembly §5, App. C)."""

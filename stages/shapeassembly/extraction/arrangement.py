@@ -1,4 +1,4 @@
-"""Arranges a part hierarchy for a program: semantic flattening and collapsing, and the frame of every part."""
+"""Arrange a part hierarchy for a program: semantic flattening and collapsing, and the frame of every part."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from stages.shapeassembly.extraction.category_rules import CategoryRules
 from stages.shapeassembly.extraction.hierarchy import Box, PartNode
 
 ALIGNED_DEGREES = 5.0
-"""A part turned by less against its parent is aligned with it (shapeassembly §5.1)."""
+"""A part that is turned by less against its parent is aligned (shapeassembly §5.1)."""
 
 
 def leaf_corners(part: PartNode) -> FloatArray:
-    """The corners of all leaves of `part`, float64 (8 n, 3)."""
+    """Return the corners of all leaves of a part, float64 (8 n, 3)."""
     return np.concatenate([box_corners(leaf.box) for leaf in part.leaves()])
 
 
 def arrange_parts(root: PartNode, rules: CategoryRules) -> PartNode:
-    """The tree flattened, collapsed and regrouped by `rules` (shapeassembly App. C).
+    """Flatten, collapse and regroup the tree by the rules of its category (shapeassembly App. C).
 
-    A node with one child is that child, under the node's label: it says nothing that its child does not.
+    A node with one child is replaced by it, under the node's label.
     """
     kept, moved = _gathered(root, rules, inside_frame=False)
     if moved:
@@ -45,31 +45,31 @@ def _arranged(part: PartNode, rules: CategoryRules) -> PartNode:
 
 
 def _leaves(part: PartNode, rules: CategoryRules) -> list[PartNode]:
-    """The leaves below a node; what collapses counts as a leaf."""
-    found: list[PartNode] = []
+    """Return the leaves below a node; collapsed parts count as leaves."""
+    leaves: list[PartNode] = []
     for child in part.children:
         if not child.children or child.label in rules.collapse:
-            found.append(replace(child, children=()))
+            leaves.append(replace(child, children=()))
         else:
-            found += _leaves(child, rules)
-    return found
+            leaves += _leaves(child, rules)
+    return leaves
 
 
 def _gathered(part: PartNode, rules: CategoryRules, *, inside_frame: bool) -> tuple[PartNode | None, list[PartNode]]:
-    """`part` without the nodes that move, and those nodes."""
+    """Return the part without the nodes that move, and those nodes."""
     if part.label in rules.gather and not inside_frame:
         return None, [part]
     inside_frame |= part.label == rules.gather_into
-    found = [_gathered(child, rules, inside_frame=inside_frame) for child in part.children]
-    children = tuple(child for child, _ in found if child is not None)
-    moved = [each for _, parts in found for each in parts]
+    results = [_gathered(child, rules, inside_frame=inside_frame) for child in part.children]
+    children = tuple(child for child, _ in results if child is not None)
+    moved = [node for _, parts in results for node in parts]
     if part.children and not children:
         return None, moved
     return replace(part, children=children), moved
 
 
 def _given(part: PartNode, moved: tuple[PartNode, ...], label: str) -> PartNode:
-    """`part` with `moved` below its first node labelled `label`, or as a new child of that label."""
+    """Add parts below the first node with a label, or below a new child with that label."""
 
     def place(node: PartNode) -> PartNode | None:
         if node.label == label:
@@ -85,10 +85,10 @@ def _given(part: PartNode, moved: tuple[PartNode, ...], label: str) -> PartNode:
 
 
 def frame_parts(root: PartNode) -> PartNode:
-    """The tree with every part in the frame that the program gives it.
+    """Give every part the frame that it has in the program.
 
-    The root stands upright. Sides are renamed so that a part is turned as little as can be against its parent, and
-    an aligned part is turned to it. The box of a part with children is the smallest around its leaves in its frame.
+    The root is upright. Sides are renamed for the smallest rotation against the parent, and an aligned part is turned
+    to it. The box of a part with children is the smallest around its leaves in its frame.
     """
     return _framed(root, np.eye(3), root_of_all=True)
 
@@ -107,7 +107,7 @@ def _framed(part: PartNode, frame: FloatArray, *, root_of_all: bool = False) -> 
 
 
 def _prefers(part: PartNode, frame: FloatArray, box: Box) -> bool:
-    """Whether more leaves of `part` stand along `frame` than along its own box."""
+    """Return whether more leaves of a part are aligned with `frame` than with its own box."""
 
     def aligned(axes: FloatArray) -> int:
         angles = [angle_between(nearest_axes(leaf.box, axes).axes, axes) for leaf in part.leaves()]

@@ -1,6 +1,6 @@
-"""What the extraction knows of shape categories: which nodes are flattened, collapsed and moved, and their order.
+"""Knowledge of shape categories: nodes to flatten, collapse and move, and the order of parts.
 
-The facts are those of shapeassembly App. C; the names are PartNet's (StructureNet uses the same).
+The facts are those of shapeassembly App. C, the labels PartNet's, which StructureNet shares.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from dataclasses import dataclass
 class CategoryRules:
     """The rules of one category; every string is a node's label.
 
-    flatten: below these the leaves become children; collapse: these become leaves. gather: nodes with these labels
-    move below a sibling (or new child of the root) labelled `gather_into`. order: semantic order of labels, for the
-    order of lines; a label that is not here comes with the nearest part above it that is, or last.
+    flatten: the leaves below these become children.
+    collapse: these become leaves.
+    gather, gather_into: nodes labelled `gather` move below a sibling, or new child of the root, labelled `gather_into`.
+    order: order of labels for the order of lines; another label follows its nearest listed ancestor, or comes last.
     """
 
     flatten: frozenset[str] = frozenset()
@@ -44,4 +45,4 @@ CATEGORY_RULES: dict[str, CategoryRules] = {
         order=("cabinet_base", "cabinet_frame", "countertop", "shelf", "drawer", "cabinet_door", "mirror"),
     ),
 }
-"""The rules by category; `any` has none and keeps the hierarchy as it is."""
+"""The rules by category; `any` keeps the hierarchy as it is."""

@@ -1,4 +1,4 @@
-"""Where boxes touch: attachment points by intersected volumes, face centres preferred (shapeassembly App. C)."""
+"""Contacts of boxes: attachment points from the shared volume, face centres preferred (shapeassembly App. C)."""
 
 from __future__ import annotations
 
@@ -12,18 +12,21 @@ from stages.shapeassembly.extraction.boxes import box_corners, box_gap, inside, 
 from stages.shapeassembly.extraction.hierarchy import Box
 
 END_BAND_SHARE = 0.05
-"""Share of the height of a bounding box within which a part reaches its bottom or its top."""
+"""Share of the height within which a part reaches the bottom or top of a bounding box."""
 
 _GRID = np.array(list(product(np.linspace(0.0, 1.0, 15), repeat=3)))
 
 _FACE_CENTERS = np.array([[0, 0.5, 0.5], [1, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 1, 0.5], [0.5, 0.5, 0], [0.5, 0.5, 1]])
-"""Centres of left, right, bottom, top, back and front in a box's own coordinates."""
+"""Local coordinates of the centres of left, right, bottom, top, back and front."""
 
 
 @dataclass(frozen=True)
 class Contact:
-    """Two boxes in contact. first, second: the attachment point (3,) on each, the same but where a gap was bridged.
-    region: float64 (n, 3), points of the volume in which both are."""
+    """Two boxes in contact.
+
+    first, second: (3,), the attachment point on each; they differ only across a gap.
+    region: float64 (n, 3), points of the shared volume.
+    """
 
     first: FloatArray
     second: FloatArray
@@ -31,10 +34,10 @@ class Contact:
 
 
 def contact_of(first: Box, second: Box, tolerance: float) -> Contact | None:
-    """How two boxes touch, or None if they are more than `tolerance` apart.
+    """Return the contact of two boxes, or None if they are more than `tolerance` apart.
 
-    Where a face of one lies against the other, the centre of the smaller such face is the attachment point if both
-    boxes reach it; then any face centre of one within the other; else the mean of the volume that both fill.
+    The attachment point is the centre of the smaller of two opposite faces if both boxes reach it, else any face centre
+    of one within the other, else the mean of the shared volume.
     """
     reach = (np.linalg.norm(first.size) + np.linalg.norm(second.size)) / 2 + tolerance
     if np.linalg.norm(first.center - second.center) > reach:
@@ -52,43 +55,43 @@ def contact_of(first: Box, second: Box, tolerance: float) -> Contact | None:
 
 
 def bottom_or_top(box: Box, bbox: Box, *, top: bool) -> FloatArray | None:
-    """The point (3,) at which `box` reaches the bottom or the top of `bbox`, a box that stands along its axes.
+    """Return the point (3,) at which a box reaches the bottom or top of `bbox`, or None where it does not.
 
-    None if nothing of it lies within a twentieth of the height. The centre of the face that looks there is preferred.
+    The centre of the face in that direction is preferred.
     """
     edge = 1.0 if top else 0.0
     heights = local_points(bbox, box_corners(box))[:, 1]
     if np.abs(heights - edge).min() > END_BAND_SHARE:
         return None
     centers = world_points(box, _FACE_CENTERS)
-    away = np.abs(local_points(bbox, centers)[:, 1] - edge)
-    if away.min() <= END_BAND_SHARE:
-        found: FloatArray = centers[int(away.argmin())]
-        return found
+    offset = np.abs(local_points(bbox, centers)[:, 1] - edge)
+    if offset.min() <= END_BAND_SHARE:
+        center: FloatArray = centers[int(offset.argmin())]
+        return center
     points = world_points(box, _GRID)
-    near = np.abs(local_points(bbox, points)[:, 1] - edge) <= END_BAND_SHARE
-    if not near.any():
-        points, near = box_corners(box), np.abs(heights - edge) <= END_BAND_SHARE
-    mean: FloatArray = points[near].mean(axis=0)
+    reaching = np.abs(local_points(bbox, points)[:, 1] - edge) <= END_BAND_SHARE
+    if not reaching.any():
+        points, reaching = box_corners(box), np.abs(heights - edge) <= END_BAND_SHARE
+    mean: FloatArray = points[reaching].mean(axis=0)
     return mean
 
 
 def _shared(first: Box, second: Box, tolerance: float) -> FloatArray:
-    """Points that lie in both boxes, float64 (n, 3), from a grid over the overlap in the frame of either."""
-    found = []
+    """Return points in both boxes, float64 (n, 3), from a grid over the overlap in the frame of either."""
+    points_by_frame = []
     for own, other in ((first, second), (second, first)):
         corners = (box_corners(other) - own.center) @ own.axes.T
         half = own.size / 2
         low = np.clip(corners.min(axis=0) - tolerance, -half, half)
         high = np.clip(corners.max(axis=0) + tolerance, -half, half)
         points = own.center + (low + _GRID * (high - low)) @ own.axes
-        found.append(points[inside(other, points, tolerance)])
-    more: FloatArray = found[0] if len(found[0]) >= len(found[1]) else found[1]
-    return more
+        points_by_frame.append(points[inside(other, points, tolerance)])
+    most: FloatArray = points_by_frame[0] if len(points_by_frame[0]) >= len(points_by_frame[1]) else points_by_frame[1]
+    return most
 
 
 def _face_center(first: Box, second: Box, tolerance: float) -> FloatArray | None:
-    """The face centre at which to attach, or None if no face centre of one box lies in the other."""
+    """Return the face centre at which to attach, or None if no face centre of one box is in the other."""
     best: FloatArray | None = None
     best_rank = (2, np.inf)
     for own, other in ((first, second), (second, first)):
@@ -103,7 +106,7 @@ def _face_center(first: Box, second: Box, tolerance: float) -> FloatArray | None
 
 
 def _faces(own: Box, other: Box, index: int, tolerance: float) -> bool:
-    """Whether face `index` of `own` looks against a face of `other` that lies within `tolerance` of its centre."""
+    """Return whether face `index` of `own` is opposite a face of `other` within `tolerance` of its centre."""
     outward = own.axes[index // 2] * (1.0 if index % 2 else -1.0)
     local = other.axes @ (world_points(own, _FACE_CENTERS[index]) - other.center)
     facing = -(other.axes @ outward)
@@ -114,5 +117,5 @@ def _faces(own: Box, other: Box, index: int, tolerance: float) -> bool:
 
 
 def _onto(box: Box, point: FloatArray) -> FloatArray:
-    """The point of the box nearest to `point`."""
+    """Return the point of the box nearest to a point."""
     return world_points(box, np.clip(local_points(box, point), 0.0, 1.0))

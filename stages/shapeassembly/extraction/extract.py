@@ -1,4 +1,4 @@
-"""Extracts a ShapeAssembly program from a part hierarchy, and checks it (shapeassembly §5, App. C)."""
+"""Extract a ShapeAssembly program from a part hierarchy, and check it (shapeassembly §5, App. C)."""
 
 from __future__ import annotations
 
@@ -22,19 +22,22 @@ from stages.shapeassembly.syntax.printer import rounded
 from stages.shapeassembly.syntax.program import AssemblyProgram
 
 KEPT_DIAGONALS = (1.0, 4.0)
-"""Of the bounding boxes of PartNet's shapes, which lie about the unit sphere: a shape of such size keeps it."""
+"""Shapes with a bounding box of such a diagonal keep their size; PartNet's have the size of the unit sphere."""
 
 TARGET_DIAGONAL = 2.0
-"""Of the bounding box to which other shapes are scaled."""
+"""Diagonal to which other shapes are scaled."""
 
 
 @dataclass(frozen=True)
 class ExtractedProgram:
-    """A program that passed every gate. program: with numbers to three decimals, centred at the origin.
+    """A program that passed every gate.
 
-    f_score: 0 to 100, against the leaf boxes of the input; overflow: share of the bounding box by which parts reach
-    beyond it; leaves: cuboids declared that are not expanded; center (3,), scale: a point p of the program is
-    center + scale * p in the input; wanted, made: the input's leaf boxes and the executed ones, in the program's frame.
+    program: centred at the origin, with numbers to three decimals.
+    f_score: 0 to 100, against the leaf boxes of the input.
+    overflow: excess of parts over the bounding box, as a share of its size.
+    leaves: declared cuboids that are not expanded.
+    center, scale: (3,) and a number; point p of the program is `center + scale * p` in the input.
+    input_boxes, boxes: leaf boxes of the input and of the executed program, in the program's frame.
     """
 
     program: AssemblyProgram
@@ -43,14 +46,14 @@ class ExtractedProgram:
     leaves: int
     center: FloatArray
     scale: float
-    wanted: tuple[Box, ...]
-    made: tuple[Box, ...]
+    input_boxes: tuple[Box, ...]
+    boxes: tuple[Box, ...]
 
 
 def extract(
     hierarchy: PartHierarchy, rules: CategoryRules, gates: Gates, cleaning: Cleaning = EVERY_STEP
 ) -> ExtractedProgram:
-    """The canonical program of a part hierarchy.
+    """Return the canonical program of a part hierarchy.
 
     Raises Rejected with one of these reasons: "too few parts", "too many parts", "flat shape", "parts not connected",
     "breaks a rule of the language", "poor fit", "overflows its box", "not rooted".
@@ -76,7 +79,7 @@ def extract(
 
 @dataclass(frozen=True)
 class _Steps:
-    """Which steps an attempt takes."""
+    """The steps of an attempt."""
 
     shorten: bool
     arrange: bool
@@ -85,22 +88,30 @@ class _Steps:
 
 
 def _attempts(cleaning: Cleaning) -> list[_Steps]:
-    """The steps that are wanted, then what is tried on a shape whose program fails by them: groups of parts attached to
-    a common part, for more are made by macros; without shortening, for sunk ends may be what holds a shape together;
-    without groups, for a part between two that a group makes of one may have nothing to stand on."""
-    asked = _Steps(cleaning.shorten, cleaning.arrange, cleaning.pool, "alike" if cleaning.group else "none")
+    """Return the configured steps, then fallbacks for a shape whose program fails.
+
+    - Groups of parts with a common attachment only: more parts are made by macros.
+    - No shortening: sunk ends may be what connects a shape.
+    - No groups: a part between two members of a group may have nothing to attach to.
+    """
+    configured = _Steps(cleaning.shorten, cleaning.arrange, cleaning.pool, "alike" if cleaning.group else "none")
     if not cleaning.group:
-        return [asked]
-    fewer = [replace(asked, groups="common"), replace(asked, groups="none")]
-    return [asked, fewer[0], *([replace(fewer[0], shorten=False)] if cleaning.shorten else []), fewer[1]]
+        return [configured]
+    fallbacks = [replace(configured, groups="common"), replace(configured, groups="none")]
+    return [
+        configured,
+        fallbacks[0],
+        *([replace(fallbacks[0], shorten=False)] if cleaning.shorten else []),
+        fallbacks[1],
+    ]
 
 
 @dataclass(frozen=True)
 class _Shape:
-    """What an attempt is measured against: see Extraction."""
+    """The input of an attempt, see ExtractedProgram."""
 
     name: str
-    wanted: tuple[Box, ...]
+    input_boxes: tuple[Box, ...]
     center: FloatArray
     scale: float
 
@@ -122,7 +133,7 @@ def _attempt(shape: _Shape, root: PartNode, rules: CategoryRules, gates: Gates, 
 
 
 def canonical_order(rules: CategoryRules) -> PartOrder:
-    """The canonical order: by semantic label, then by place: bottom to top, left to right, back to front."""
+    """Return the sort key of parts: semantic label, then bottom to top, left to right, back to front."""
     ranks = {label: rank for rank, label in enumerate(rules.order)}
 
     def key(part: PartNode) -> tuple[object, ...]:
@@ -134,22 +145,22 @@ def canonical_order(rules: CategoryRules) -> PartOrder:
 
 
 def _checked(shape: _Shape, program: AssemblyProgram, leaves: int, gates: Gates) -> ExtractedProgram:
-    # A tilted part may be longer than the bounding box is wide, as in the published programs.
-    broken = [each for each in violations(program) if each.rule != "size"]
+    # As in the published programs, a tilted part may be longer than the bounding box is wide.
+    broken = [violation for violation in violations(program) if violation.rule != "size"]
     if broken:
         raise Rejected("breaks a rule of the language", f"{shape.name}: {broken[0]}")
     execution = execute(program)
-    made = tuple(execution_boxes(execution))
+    boxes = tuple(execution_boxes(execution))
     diagonal = float(np.linalg.norm(program.root.bbox.dims))
-    score = f_score(made, shape.wanted, gates.distance * diagonal)
-    if not score >= gates.f_score:
-        raise Rejected("poor fit", f"{shape.name} has F-score {score:.1f}, at least {gates.f_score:g} is wanted")
-    beyond = overflow(program, execution)
-    if beyond >= gates.overflow:
-        raise Rejected("overflows its box", f"{shape.name} by {beyond:.1%}, less than {gates.overflow:.0%} is wanted")
-    if not is_rooted(made):
+    score = f_score(boxes, shape.input_boxes, gates.distance * diagonal)
+    if not score >= gates.min_f_score:
+        raise Rejected("poor fit", f"{shape.name} has F-score {score:.1f}, at least {gates.min_f_score:g} is wanted")
+    excess = overflow(program, execution)
+    if excess >= gates.max_overflow:
+        raise Rejected("overflows its box", f"{shape.name} by {excess:.1%}, at most {gates.max_overflow:.0%}")
+    if not is_rooted(boxes):
         raise Rejected("not rooted", f"{shape.name} has a part without a way to the ground")
-    return ExtractedProgram(program, score, beyond, leaves, shape.center, shape.scale, shape.wanted, made)
+    return ExtractedProgram(program, score, excess, leaves, shape.center, shape.scale, shape.input_boxes, boxes)
 
 
 def _rescaled(part: PartNode, center: FloatArray, scale: float) -> PartNode:

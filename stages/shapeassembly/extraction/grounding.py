@@ -1,4 +1,4 @@
-"""Orders attachments: each part is attached to what stands already (shapeassembly §5.2, App. C)."""
+"""Order attachments so that each part is attached to grounded ones (shapeassembly §5.2, App. C)."""
 
 from __future__ import annotations
 
@@ -22,13 +22,17 @@ from stages.shapeassembly.extraction.node_layout import BBOX_INDEX, NodeLayout
 from stages.shapeassembly.syntax.program import Squeeze
 
 MAX_GOOD_COST = 0.01
-"""Cost up to which a tilted part takes its place in canonical order; others wait for what they may be attached to."""
+"""Cost up to which a tilted part is placed in canonical order; others wait for more parts to attach to."""
 
 
 @dataclass(frozen=True)
 class TiltedPlacement:
-    """The lines that ground a tilted part, the box that they make of it, and their cost: mean misplacement of its
-    corners as a share of the bounding box's diagonal, and a little for each line."""
+    """The placement of a tilted part.
+
+    lines: the lines that ground it.
+    box: the resulting box.
+    cost: mean misplacement of its corners as a share of the bounding box's diagonal, plus a penalty for each line.
+    """
 
     lines: tuple[Joint, ...]
     box: Box
@@ -36,31 +40,34 @@ class TiltedPlacement:
 
 
 TiltedPlacer = Callable[[int, list[Joint], PlacedBoxes], TiltedPlacement | None]
-"""Places a tilted part: given its index, the lines so far and what stands; None if it touches nothing that stands."""
+"""Places a tilted part:
+
+given its index, the lines so far and the placed boxes. Returns None if it touches no placed part.
+"""
 
 
 MAX_JOINTS = 2
-"""Attachments of one aligned part, as in the published programs; the first places it, the second keeps it joined."""
+"""Attachments of one aligned part, as in the published programs: one to place it, one to keep it joined."""
 
 
 def ground_parts(layout: NodeLayout, place_tilted: TiltedPlacer) -> list[Joint] | None:
-    """The attach and squeeze lines of a node in grounded order, or None if some part has no way to the box.
+    """Return the attach and squeeze lines of a node in grounded order, or None if a part has no path to the box.
 
-    Aligned parts at the bounding box come first, then in turns the aligned parts that touch what stands, in canonical
-    order; a part that can be squeezed waits for both its partners, a tilted one for all aligned parts that can stand
-    without it. A second contact of an aligned part is written too: it keeps parts together when numbers change.
+    Aligned parts at the bounding box come first, then in turns aligned parts that touch placed ones, in canonical
+    order. A part that can be squeezed waits for both partners, a tilted one for all aligned parts that can be placed
+    without it. A second contact of an aligned part keeps parts together when numbers change.
     """
     return _Grounding(layout, place_tilted).run()
 
 
 class _Grounding:
-    """Lines so far, the boxes that stand, and the pairs of parts that a line has joined."""
+    """The lines so far, the placed boxes, and the pairs of parts that a line has joined."""
 
     def __init__(self, layout: NodeLayout, place_tilted: TiltedPlacer) -> None:
         self.layout = layout
         self.place_tilted = place_tilted
         self.lines: list[Joint] = []
-        self.standing: dict[int, Box] = {BBOX_INDEX: layout.bbox}
+        self.placed: dict[int, Box] = {BBOX_INDEX: layout.bbox}
         self.joined: set[tuple[int, int]] = set()
         self.joints = [0] * len(layout.parts)
 
@@ -68,24 +75,24 @@ class _Grounding:
         steps = (self._ground_at_box, self._turn, self._ground_waiting, self._ground_tilted)
         while any(step() for step in steps):
             pass
-        return self.lines if len(self.standing) > len(self.layout.parts) else None
+        return self.lines if len(self.placed) > len(self.layout.parts) else None
 
     def _ground_at_box(self) -> bool:
-        """Grounds aligned parts at the bounding box until all that are left there wait for a partner."""
-        moved = False
-        again = True
-        while again:
-            again = False
+        """Ground aligned parts at the bounding box until all that are left there wait for a partner."""
+        changed = False
+        progress = True
+        while progress:
+            progress = False
             for part in self._loose(aligned=True):
-                again |= self._ground_one_at_box(part)
-            moved |= again
-        return moved
+                progress |= self._ground_one_at_box(part)
+            changed |= progress
+        return changed
 
     def _ground_one_at_box(self, part: int) -> bool:
         bottom, top = self.layout.bottoms[part], self.layout.tops[part]
         if bottom is not None and top is not None:
-            line = squeeze(self.layout, self.standing, part, (BBOX_INDEX, BBOX_INDEX), TOP)
-            return self._stand(part, [line or self._at_box(part, bottom)])
+            line = squeeze(self.layout, self.placed, part, (BBOX_INDEX, BBOX_INDEX), TOP)
+            return self._place(part, [line or self._at_box(part, bottom)])
         point = bottom if bottom is not None else top
         if point is None:
             return False
@@ -94,51 +101,52 @@ class _Grounding:
         for other in self.layout.neighbours(part):
             if not self.layout.may_attach(part, other):
                 continue
-            between = squeeze(self.layout, self.standing, part, (BBOX_INDEX, other), face)
-            if between is not None and other in self.standing:
-                return self._stand(part, [between], other)
+            between = squeeze(self.layout, self.placed, part, (BBOX_INDEX, other), face)
+            if between is not None and other in self.placed:
+                return self._place(part, [between], other)
             waits |= between is not None
-        return not waits and self._stand(part, [self._at_box(part, point)])
+        return not waits and self._place(part, [self._at_box(part, point)])
 
     def _turn(self) -> bool:
-        """One turn over the aligned parts: what touches what stands is grounded or joined once more."""
-        moved = False
+        """Ground, or join again, each aligned part that touches a placed one."""
+        changed = False
         for part in range(len(self.layout.parts)):
             others = self._targets(part)
             if not others or not self.layout.aligned(part):
                 continue
-            if part in self.standing:
-                moved |= self._join(part, others[: MAX_JOINTS - self.joints[part]])
+            if part in self.placed:
+                changed |= self._join(part, others[: MAX_JOINTS - self.joints[part]])
             elif self.layout.bottoms[part] is None and self.layout.tops[part] is None:
-                moved |= self._ground_between(part, others)
-        return moved
+                changed |= self._ground_between(part, others)
+        return changed
 
     def _targets(self, part: int) -> list[int]:
-        """What a part may be attached to next: standing neighbours, those first that the centre of a face touches."""
-        others = [each for each in self.layout.neighbours(part) if each in self.standing]
+        """Return the placed neighbours that a part may attach to, those at the centre of a face first."""
         others = [
-            each for each in others if self.layout.may_attach(part, each) and _pair(part, each) not in self.joined
+            other
+            for other in self.layout.neighbours(part)
+            if other in self.placed and self.layout.may_attach(part, other) and _pair(part, other) not in self.joined
         ]
-        return sorted(others, key=lambda each: (not self.layout.at_face_center(part, each), each))
+        return sorted(others, key=lambda other: (not self.layout.at_face_center(part, other), other))
 
     def _ground_between(self, part: int, others: list[int]) -> bool:
-        """Grounds a part at its neighbours: by a squeeze, if two of them hold it at opposite faces."""
+        """Ground a part at its neighbours: by a squeeze, if two of them hold opposite faces."""
         for face in (LEFT, BOTTOM, BACK):
             for first in others:
                 for second in others:
-                    line = squeeze(self.layout, self.standing, part, (first, second), face) if first != second else None
+                    line = squeeze(self.layout, self.placed, part, (first, second), face) if first != second else None
                     if line is not None:
-                        return self._stand(part, [line], first, second)
+                        return self._place(part, [line], first, second)
         return self._join(part, others[:MAX_JOINTS])
 
     def _join(self, part: int, others: list[int]) -> bool:
-        return self._stand(part, [attach_contact(self.layout, self.standing, part, each) for each in others], *others)
+        return self._place(part, [attach_contact(self.layout, self.placed, part, other) for other in others], *others)
 
     def _ground_tilted(self) -> bool:
-        """Grounds the first tilted part that can be placed well, or else the one that can be placed best."""
+        """Ground the first tilted part with a good placement, or else the one with the best."""
         best: tuple[int, TiltedPlacement] | None = None
         for part in self._loose(aligned=False):
-            placing = self.place_tilted(part, self.lines, self.standing)
+            placing = self.place_tilted(part, self.lines, self.placed)
             if placing is not None and (best is None or placing.cost < best[1].cost):
                 best = (part, placing)
                 if placing.cost <= MAX_GOOD_COST:
@@ -146,29 +154,29 @@ class _Grounding:
         if best is None:
             return False
         part, placing = best
-        self._stand(part, placing.lines, *(each for each in self.layout.neighbours(part) if each in self.standing))
-        self.standing[part] = placing.box
+        self._place(part, placing.lines, *(other for other in self.layout.neighbours(part) if other in self.placed))
+        self.placed[part] = placing.box
         return True
 
     def _ground_waiting(self) -> bool:
-        """Grounds the first part that waits at the bounding box for a partner that cannot stand before it."""
+        """Ground the first part at the bounding box that waits for a partner in vain."""
         for part in self._loose(aligned=True):
             for point in (self.layout.bottoms[part], self.layout.tops[part]):
                 if point is not None:
-                    return self._stand(part, [self._at_box(part, point)])
+                    return self._place(part, [self._at_box(part, point)])
         return False
 
     def _loose(self, *, aligned: bool) -> list[int]:
         parts = range(len(self.layout.parts))
-        return [part for part in parts if part not in self.standing and self.layout.aligned(part) == aligned]
+        return [part for part in parts if part not in self.placed and self.layout.aligned(part) == aligned]
 
     def _at_box(self, part: int, point: FloatArray) -> Joint:
-        return attach(self.layout, self.standing, part, BBOX_INDEX, point, point)
+        return attach(self.layout, self.placed, part, BBOX_INDEX, point, point)
 
-    def _stand(self, part: int, lines: Sequence[Joint], *others: int) -> bool:
-        """Writes lines that ground or further join a part; whether there were any."""
+    def _place(self, part: int, lines: Sequence[Joint], *others: int) -> bool:
+        """Add lines that ground or join a part. Returns whether there were any."""
         if lines:
-            self.standing.setdefault(part, self.layout.parts[part].box)
+            self.placed.setdefault(part, self.layout.parts[part].box)
             self.lines += lines
             self.joints[part] += sum(2 if isinstance(line, Squeeze) else 1 for line in lines)
             self.joined |= {_pair(part, other) for other in others}

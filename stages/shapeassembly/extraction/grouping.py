@@ -1,4 +1,4 @@
-"""Forms symmetry groups in a node: one part stands for all that a macro makes of it (shapeassembly App. C)."""
+"""Form symmetry groups in a node: one part represents all that a macro makes of it (shapeassembly App. C)."""
 
 from __future__ import annotations
 
@@ -29,8 +29,11 @@ REFLECTION_AXES = (0, 2, 1)
 
 @dataclass(frozen=True)
 class SymmetryMacro:
-    """A macro on one part. copies: parts beside the first; distance: of the last copy, as a share of the box along
-    `axis`, for a translation; None for a reflection."""
+    """A macro on one part.
+
+    copies: parts besides the first.
+    distance: of the last copy, as a share of the box along `axis`; None for a reflection.
+    """
 
     axis: int
     copies: int
@@ -39,7 +42,12 @@ class SymmetryMacro:
 
 @dataclass(frozen=True)
 class _Formed:
-    """A group: the part that stands for it, its macro, and the parts and ends of the box to which it is anchored."""
+    """A group.
+
+    part: the part that represents it.
+    anchors: the parts that all members are attached to.
+    ends: the ends of the bounding box that all members reach.
+    """
 
     part: PartNode
     symmetry: SymmetryMacro
@@ -50,24 +58,27 @@ class _Formed:
 def form_groups(
     layout: NodeLayout, order: Callable[[PartNode], Any], *, strict: bool, pool: bool
 ) -> tuple[NodeLayout, list[SymmetryMacro | None]]:
-    """The layout of the parts that remain when groups are formed, and for each the macro that makes the others.
+    """Return the layout without the parts that macros make, and the macro of each remaining part.
 
-    With `pool` connected components that repeat become one sub-part each, before groups of single parts are formed.
-    `order` is the key of the canonical order of parts; `strict`: the members of a group must be attached alike. A part
-    with a macro is anchored where its copies are attached too.
+    order: sort key of parts.
+    strict: members of a group must be attached alike.
+    pool: first merge repeated connected components into one sub-part each.
+    A part with a macro is anchored to what all its copies are attached to.
     """
     formed: list[_Formed] = []
-    while pool and (pooled := _pool_components(layout, {id(each.part) for each in formed}, strict)) is not None:
-        parts, each = pooled
-        formed.append(each)
+    while pool and (pooled := _pool_components(layout, {id(group.part) for group in formed}, strict)) is not None:
+        parts, merged = pooled
+        formed.append(merged)
         layout = layout_parts(sorted(parts, key=order), layout.bbox.size)
-    fixed = {id(each.part) for each in formed}
+    fixed = {id(group.part) for group in formed}
     bodies = _bodies(layout, [(i,) for i, part in enumerate(layout.parts) if id(part) not in fixed])
     groups = _single_groups(bodies, layout.diagonal, strict)
     while True:
         members = [tuple(bodies[i].members[0] for i in group.bodies) for group in groups]
         gone = {part for _, *copies in members for part in copies}
-        singles = [_formed(group, layout, layout.parts[each[0]]) for group, each in zip(groups, members, strict=True)]
+        singles = [
+            _formed(group, layout, layout.parts[of_group[0]]) for group, of_group in zip(groups, members, strict=True)
+        ]
         kept = [i for i in range(len(layout.parts)) if i not in gone]
         reduced, macros = _reduced(layout, kept, [*formed, *singles])
         loose = {kept[i] for i in reduced.ungroundable()}
@@ -77,9 +88,12 @@ def form_groups(
 
 
 def _at_fault(layout: NodeLayout, members: Sequence[tuple[int, ...]], loose: set[int]) -> int:
-    """The group to give up so that loose parts can stand: the last that is loose, or touches what is loose."""
-    beside = loose | {other for part in loose for other in layout.neighbours(part)}
-    for wanted in (loose, beside):
+    """Return the group to dissolve so that loose parts can be grounded:
+
+    the last one that is loose, or touches a loose part.
+    """
+    affected = loose | {other for part in loose for other in layout.neighbours(part)}
+    for wanted in (loose, affected):
         for index in reversed(range(len(members))):
             if wanted & set(members[index]):
                 return index
@@ -87,17 +101,20 @@ def _at_fault(layout: NodeLayout, members: Sequence[tuple[int, ...]], loose: set
 
 
 def _searches(
-    diagonal: float, rows_of: int, strict: bool
+    diagonal: float, min_length: int, strict: bool
 ) -> list[Callable[[Sequence[SymmetryBody]], list[SymmetryGroup]]]:
-    """Searches for groups: mirrored pairs, then rows of at least `rows_of`, along each axis."""
+    """Return searches for groups along each axis: mirrored pairs, then rows of at least `min_length`."""
     return [
         *(partial(reflections, axis=axis, diagonal=diagonal, strict=strict) for axis in REFLECTION_AXES),
-        *(partial(translations, axis=axis, diagonal=diagonal, fewest=rows_of, strict=strict) for axis in range(3)),
+        *(
+            partial(translations, axis=axis, diagonal=diagonal, min_length=min_length, strict=strict)
+            for axis in range(3)
+        ),
     ]
 
 
 def _single_groups(bodies: Sequence[SymmetryBody], diagonal: float, strict: bool) -> list[SymmetryGroup]:
-    """Groups of single parts: rows of three or more, then mirrored pairs, then rows of two."""
+    """Return groups of single parts: rows of three or more, then mirrored pairs, then rows of two."""
     long_rows = _searches(diagonal, 3, strict)[len(REFLECTION_AXES) :]
     groups: list[SymmetryGroup] = []
     taken: set[int] = set()
@@ -111,16 +128,16 @@ def _single_groups(bodies: Sequence[SymmetryBody], diagonal: float, strict: bool
 
 
 def _pool_components(layout: NodeLayout, fixed: set[int], strict: bool) -> tuple[list[PartNode], _Formed] | None:
-    """The parts after one group of connected components has become one sub-part, and that group.
+    """Merge one group of connected components into a sub-part. Returns the remaining parts, and the group.
 
-    fixed: identities of the parts that are already groups.
+    fixed: identities of the parts that are groups already.
     """
     free = [i for i, part in enumerate(layout.parts) if id(part) not in fixed]
     bodies = _bodies(layout, [(i,) for i in free])
     unattached = [replace(body, joints=((BOTTOM_END, body.center), (TOP_END, body.center))) for body in bodies]
     for find in _searches(layout.diagonal, 2, strict):
         moving = sorted({free[i] for group in find(unattached) for i in group.bodies})
-        bodies = _bodies(layout, [each for each in _components(layout, moving) if len(each) > 1])
+        bodies = _bodies(layout, [component for component in _components(layout, moving) if len(component) > 1])
         groups = find(bodies)
         if groups:
             first, *others = (bodies[i].members for i in groups[0].bodies)
@@ -132,7 +149,7 @@ def _pool_components(layout: NodeLayout, fixed: set[int], strict: bool) -> tuple
 
 
 def _pool(parts: Sequence[PartNode]) -> PartNode:
-    """One part that is made of `parts`, in a box along the node's frame."""
+    """Return one part that is made of `parts`, in a box along the node's frame."""
     corners = np.concatenate([leaf_corners(part) for part in parts])
     return PartNode(parts[0].label, bounding_box(corners, np.eye(3)), tuple(parts))
 
@@ -146,16 +163,18 @@ def _formed(group: SymmetryGroup, layout: NodeLayout, part: PartNode) -> _Formed
 
 
 def _bodies(layout: NodeLayout, members: Sequence[Sequence[int]]) -> list[SymmetryBody]:
-    """The given sets of parts as bodies."""
+    """Return the given sets of parts as bodies."""
     bodies = []
-    for each in members:
-        boxes: tuple[FloatArray, ...] = tuple(box_corners(leaf.box) for i in each for leaf in layout.parts[i].leaves())
-        bodies.append(SymmetryBody(tuple(each), boxes, tuple(_joints(layout, each))))
+    for indices in members:
+        boxes: tuple[FloatArray, ...] = tuple(
+            box_corners(leaf.box) for i in indices for leaf in layout.parts[i].leaves()
+        )
+        bodies.append(SymmetryBody(tuple(indices), boxes, tuple(_joints(layout, indices))))
     return bodies
 
 
 def _joints(layout: NodeLayout, members: Sequence[int]) -> Iterator[tuple[int, FloatArray]]:
-    """What a set of parts is attached to beside each other, and where."""
+    """Yield the attachments of a set of parts to other parts, with their points."""
     for i in members:
         for j in layout.neighbours(i):
             if j not in members:
@@ -166,7 +185,7 @@ def _joints(layout: NodeLayout, members: Sequence[int]) -> Iterator[tuple[int, F
 
 
 def _components(layout: NodeLayout, parts: Sequence[int]) -> list[list[int]]:
-    """The sets of `parts` that hang together through contacts, each ascending."""
+    """Return the connected components of `parts`, each ascending."""
     left, components = set(parts), []
     for seed in parts:
         if seed not in left:
@@ -185,20 +204,20 @@ def _components(layout: NodeLayout, parts: Sequence[int]) -> list[list[int]]:
 def _reduced(
     layout: NodeLayout, kept: Sequence[int], formed: Sequence[_Formed]
 ) -> tuple[NodeLayout, list[SymmetryMacro | None]]:
-    """The layout of the parts `kept`, ascending, those of groups anchored, and the macro of each."""
+    """Return the layout of the parts `kept`, ascending, with groups anchored, and the macro of each."""
     place = {part: index for index, part in enumerate(kept)}
     named = {id(layout.parts[part]): index for part, index in place.items()}
-    groups = {named[id(each.part)]: each for each in formed}
+    groups = {named[id(group.part)]: group for group in formed}
     anchors: list[frozenset[int] | None] = [None] * len(kept)
     bottoms, tops = [layout.bottoms[i] for i in kept], [layout.tops[i] for i in kept]
-    for index, each in groups.items():
-        anchors[index] = frozenset(named[id(part)] for part in each.anchors if id(part) in named)
-        bottoms[index] = bottoms[index] if BOTTOM_END in each.ends else None
-        tops[index] = tops[index] if TOP_END in each.ends else None
+    for index, group in groups.items():
+        anchors[index] = frozenset(named[id(part)] for part in group.anchors if id(part) in named)
+        bottoms[index] = bottoms[index] if BOTTOM_END in group.ends else None
+        tops[index] = tops[index] if TOP_END in group.ends else None
     reduced = NodeLayout(
         layout.bbox,
         tuple(layout.parts[i] for i in kept),
-        {(place[i], place[j]): each for (i, j), each in layout.contacts.items() if i in place and j in place},
+        {(place[i], place[j]): contact for (i, j), contact in layout.contacts.items() if i in place and j in place},
         tuple(bottoms),
         tuple(tops),
         tuple(anchors),

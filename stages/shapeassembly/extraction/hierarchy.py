@@ -1,4 +1,4 @@
-"""What programs are extracted from: a tree of named parts with oriented boxes, whatever file it came from."""
+"""Part hierarchies: trees of named parts with oriented boxes, whatever file they come from."""
 
 from __future__ import annotations
 
@@ -11,19 +11,23 @@ from pipeline.errors import Rejected
 from stages.shape.arrays import FloatArray
 
 UNREADABLE = "unreadable hierarchy"
-"""The reason with which readers refuse a file."""
+"""The reason with which readers reject a file."""
 
 MAX_HIERARCHY_PARTS = 2000
-"""Nodes that a hierarchy may have; the largest of PartNet has some hundreds."""
+"""Nodes of a hierarchy; the largest of PartNet has some hundreds."""
 
 MAX_HIERARCHY_DEPTH = 32
-"""Levels that a hierarchy may have; the deepest of PartNet has nine."""
+"""Levels of a hierarchy; the deepest of PartNet has nine."""
 
 
 @dataclass(frozen=True)
 class Box:
-    """An oriented box. center: float64 (3,); size: float64 (3,), full lengths; axes: float64 (3, 3), unit rows
-    right, top and front, right-handed."""
+    """An oriented box.
+
+    center: float64 (3,).
+    size: float64 (3,), full lengths.
+    axes: float64 (3, 3), unit rows right, top and front, right-handed.
+    """
 
     center: FloatArray
     size: FloatArray
@@ -32,14 +36,14 @@ class Box:
 
 @dataclass(frozen=True)
 class PartNode:
-    """A node: its semantic label, its box, and the parts that it is made of (none for a leaf)."""
+    """A node: its semantic label, its box, and its parts (none for a leaf)."""
 
     label: str
     box: Box
     children: tuple[PartNode, ...] = ()
 
     def leaves(self) -> Iterator[PartNode]:
-        """The parts at the end of every branch below this one, in order; itself if it has no children."""
+        """Yield the leaves below this node in order, or the node itself."""
         if not self.children:
             yield self
         for child in self.children:
@@ -48,14 +52,14 @@ class PartNode:
 
 @dataclass(frozen=True)
 class PartHierarchy:
-    """A shape as a part hierarchy, y up. name: what the file calls it."""
+    """A shape as a part hierarchy, y up, with the name from its file."""
 
     name: str
     root: PartNode
 
 
 def check_limits(root: PartNode, source: str) -> PartNode:
-    """`root` itself. Raises Rejected if it has more parts or levels than a hierarchy may have."""
+    """Return the root. Raises Rejected if it has too many parts or levels."""
     level, depth, count = [root], 0, 0
     while level:
         depth, count = depth + 1, count + len(level)
@@ -69,10 +73,10 @@ def check_limits(root: PartNode, source: str) -> PartNode:
 
 
 def box_from_numbers(numbers: FloatArray, place: str) -> Box:
-    """A box from twelve numbers: its centre, its lengths, and the directions of the first two lengths.
+    """Return a box from twelve numbers: centre, lengths, and the directions of the first two lengths.
 
-    The axes are made unit and orthogonal: files give them to a few digits. Raises Rejected, naming `place`, for
-    numbers that are not finite, negative sizes and axes that are no axes.
+    Axes are orthonormalised, since files give few digits. Raises Rejected, naming `place`, for numbers that are not
+    finite, negative sizes and degenerate axes.
     """
     rows = numbers.reshape(4, 3)
     if not np.isfinite(rows).all() or np.abs(rows).max() > 1e9:

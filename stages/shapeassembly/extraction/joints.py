@@ -1,4 +1,4 @@
-"""Attach and squeeze lines between the parts of a layout: places in boxes that stand, and what counts as a squeeze."""
+"""Attach and squeeze lines between the parts of a layout."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from stages.shapeassembly.syntax.program import Attach, Face, Point, Squeeze
 Joint = Attach | Squeeze
 
 PlacedBoxes = Mapping[int, Box]
-"""The boxes of grounded parts as the program puts them, by index; BBOX for the bounding box."""
+"""The boxes of grounded parts in the program, by index; BBOX_INDEX for the bounding box."""
 
 LEFT, BOTTOM, TOP, BACK = (0, 0), (1, 0), (1, 1), (2, 0)
 """Faces as axis and end; the opposite face is the other end."""
@@ -24,66 +24,66 @@ LEFT, BOTTOM, TOP, BACK = (0, 0), (1, 0), (1, 1), (2, 0)
 _NAMES: dict[tuple[int, int], Face] = {LEFT: "left", BOTTOM: "bot", TOP: "top", BACK: "back"}
 
 FLUSH_TOLERANCE = 0.005
-"""How far from a side, as a share of the bounding box's diagonal, a point may be that a squeeze puts on it."""
+"""Maximum distance from a side of a point that a squeeze moves onto it, as a share of the bounding box's diagonal."""
 
 SAME_PLACE_TOLERANCE = 0.02
-"""How far apart, as shares of a face, the two places of a squeeze may be for a part that turns with them."""
+"""Maximum difference of both points of a squeeze for a part that turns with them, as a share of a face."""
 
 
 def part_name(part: int) -> str:
-    """What a part of a layout is called in its lines."""
+    """Return the name of a part in its lines."""
     return BBOX_NAME if part == BBOX_INDEX else f"cube{part}"
 
 
 def attach(
-    layout: NodeLayout, standing: PlacedBoxes, part: int, target: int, own: FloatArray, goal: FloatArray
+    layout: NodeLayout, placed: PlacedBoxes, part: int, target: int, own: FloatArray, goal: FloatArray
 ) -> Attach:
-    """The line that brings point `own` (3,) of a part to point `goal` (3,) of what stands, in the node's frame."""
+    """Return the line that moves point `own` (3,) of a part onto point `goal` (3,) of a target, in the node's frame."""
     return Attach(
         part_name(part),
         part_name(target),
         _place(layout.parts[part].box, own),
-        _place(standing[target], goal),
+        _place(placed[target], goal),
     )
 
 
-def attach_contact(layout: NodeLayout, standing: PlacedBoxes, part: int, other: int) -> Attach:
-    """The line that attaches a part to a standing neighbour at the point of their contact."""
+def attach_contact(layout: NodeLayout, placed: PlacedBoxes, part: int, other: int) -> Attach:
+    """Return the line that attaches a part to a placed neighbour at their contact."""
     own, goal = layout.points(part, other)
-    return attach(layout, standing, part, other, own, goal)
+    return attach(layout, placed, part, other, own, goal)
 
 
 def squeeze(
-    layout: NodeLayout, standing: PlacedBoxes, part: int, targets: tuple[int, int], face: tuple[int, int]
+    layout: NodeLayout, placed: PlacedBoxes, part: int, targets: tuple[int, int], face: tuple[int, int]
 ) -> Squeeze | None:
-    """The line that puts `face` of a part on the first target and its opposite face on the second; None if the part
-    does not stand so (shapeassembly App. B).
+    """Return the line that puts `face` of a part on the first target and its opposite face on the second (shapeassembly
+    App. B).
 
-    A target that does not stand yet is taken where the layout has it. An aligned part is placed by the first target;
-    from the second it may stay as far away as the interpreter leaves it.
+    Returns None if the part is not so placed. A target that is not placed yet is taken from the layout. An aligned part
+    is placed by the first target; from the second it may be as far away as the interpreter leaves it.
     """
     axis, end = face
     box = layout.parts[part].box
     flush = FLUSH_TOLERANCE * layout.diagonal
-    places = []
+    local_places = []
     for target, side in zip(targets, (end, 1 - end), strict=True):
         center = np.full(3, 0.5)
         center[axis] = side
         point = world_points(box, center)
-        target_box = standing[target] if target in standing else layout.parts[target].box
-        place = local_points(target_box, point)
+        target_box = placed[target] if target in placed else layout.parts[target].box
+        local = local_points(target_box, point)
         wanted = side if target == BBOX_INDEX else 1 - side
         near = (
             CONTACT_TOLERANCES[-1] * max(*box.size, *target_box.size) if side != end and layout.aligned(part) else flush
         )
-        if abs(place[axis] - wanted) * target_box.size[axis] > near:
+        if abs(local[axis] - wanted) * target_box.size[axis] > near:
             return None
-        places.append(np.delete(place, axis))
-    if min(map(np.min, places)) < -1e-3 or max(map(np.max, places)) > 1 + 1e-3:
+        local_places.append(np.delete(local, axis))
+    if min(map(np.min, local_places)) < -1e-3 or max(map(np.max, local_places)) > 1 + 1e-3:
         return None
-    if np.abs(places[0] - places[1]).max() > SAME_PLACE_TOLERANCE and not layout.aligned(part):
+    if np.abs(local_places[0] - local_places[1]).max() > SAME_PLACE_TOLERANCE and not layout.aligned(part):
         return None
-    u, v = np.clip(places[0], 0.0, 1.0).tolist()
+    u, v = np.clip(local_places[0], 0.0, 1.0).tolist()
     return Squeeze(part_name(part), part_name(targets[0]), part_name(targets[1]), _NAMES[face], u, v)
 
 

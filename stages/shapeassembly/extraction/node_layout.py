@@ -1,4 +1,4 @@
-"""One node of an arranged hierarchy as the program sees it: its parts in its frame, and what touches what."""
+"""One node of an arranged hierarchy: its parts in its frame, and their contacts."""
 
 from __future__ import annotations
 
@@ -13,19 +13,23 @@ from stages.shapeassembly.extraction.contacts import Contact, bottom_or_top, con
 from stages.shapeassembly.extraction.hierarchy import Box, PartNode
 
 BBOX_INDEX = -1
-"""The bounding box, where parts are meant by their index."""
+"""The bounding box among indices of parts."""
 
 CONTACT_TOLERANCES = (0.02, 0.05)
-"""How far apart parts in contact may be, as shares of the largest side of the two: the first with which every part
-hangs together. The second is what the interpreter takes for touching."""
+"""Maximum gaps of parts in contact, as shares of the largest side of both: the first that connects every part is used.
+The interpreter accepts the second as touching.
+"""
 
 
 @dataclass(frozen=True)
 class NodeLayout:
-    """parts: in canonical order, their boxes in the node's frame, whose origin is the centre of `bbox`.
-    contacts: by pairs i < j; bottoms, tops: where each part reaches the bottom and the top of the bounding box.
-    anchors: for each part the parts to which alone it may be attached, because its copies touch them too; None where
-    it may be attached to any that it touches."""
+    """The parts of a node.
+
+    parts: in canonical order, with boxes in the node's frame, whose origin is the centre of `bbox`.
+    contacts: by pairs i < j.
+    bottoms, tops: the point where each part reaches the bottom and the top of the bounding box.
+    anchors: for each part the only parts it may attach to, since its copies touch them too; None for all neighbours.
+    """
 
     bbox: Box
     parts: tuple[PartNode, ...]
@@ -36,34 +40,34 @@ class NodeLayout:
 
     @property
     def diagonal(self) -> float:
-        """Of the bounding box."""
+        """Diagonal of the bounding box."""
         return float(np.linalg.norm(self.bbox.size))
 
     def aligned(self, part: int) -> bool:
-        """Whether a part stands along the node's frame."""
+        """Return whether a part is parallel to the node's frame."""
         return angle_between(self.parts[part].box.axes, np.eye(3)) < 1e-3
 
     def neighbours(self, part: int) -> list[int]:
-        """The parts that touch `part`, ascending."""
+        """Return the parts that touch a part, ascending."""
         return sorted({i + j - part for i, j in self.contacts if part in (i, j)})
 
     def may_attach(self, mover: int, target: int) -> bool:
-        """Whether a part may be attached to a neighbour."""
+        """Return whether a part may be attached to a neighbour."""
         anchors = self.anchors[mover]
         return anchors is None or target in anchors
 
     def points(self, mover: int, target: int) -> tuple[FloatArray, FloatArray]:
-        """The attachment point of a contact, (3,) on the mover and (3,) on the target."""
+        """Return the attachment points of a contact: (3,) on the mover and (3,) on the target."""
         contact = self.contacts[min(mover, target), max(mover, target)]
         return (contact.first, contact.second) if mover < target else (contact.second, contact.first)
 
     def at_face_center(self, mover: int, target: int) -> bool:
-        """Whether the attachment point of a contact is the centre of a face of the mover."""
+        """Return whether the attachment point of a contact is the centre of a face of the mover."""
         place = local_points(self.parts[mover].box, self.points(mover, target)[0])
         return bool((np.abs(place - 0.5) < 1e-3).sum() >= 2)
 
     def ungroundable(self) -> list[int]:
-        """The parts that no chain of permitted attachments joins to the bounding box, ascending."""
+        """Return the parts that no chain of permitted attachments joins to the bounding box, ascending."""
         left = set(range(len(self.parts)))
         fresh = {i for i in left if self.bottoms[i] is not None or self.tops[i] is not None}
         while fresh:
@@ -73,7 +77,7 @@ class NodeLayout:
 
 
 def layout_parts(parts: Sequence[PartNode], size: FloatArray) -> NodeLayout:
-    """The layout of parts, in canonical order and in the node's frame, in a bounding box of `size` (3,)."""
+    """Return the layout of parts, in canonical order and in the node's frame, in a bounding box of `size` (3,)."""
     bbox = Box(np.zeros(3), size, np.eye(3))
     for reach in CONTACT_TOLERANCES:
         contacts = {}
@@ -92,6 +96,6 @@ def layout_parts(parts: Sequence[PartNode], size: FloatArray) -> NodeLayout:
 
 
 def in_frame(part: PartNode, frame: Box) -> PartNode:
-    """`part` and all below it in the coordinates of `frame`, whose centre becomes the origin."""
+    """Return a part and all below it in the coordinates of a box, whose centre becomes the origin."""
     box = Box(frame.axes @ (part.box.center - frame.center), part.box.size, part.box.axes @ frame.axes.T)
     return PartNode(part.label, box, tuple(in_frame(child, frame) for child in part.children))

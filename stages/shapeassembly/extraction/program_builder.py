@@ -1,4 +1,4 @@
-"""From layouts to a program: the lines of every node, and the names of its assemblies."""
+"""Build a program from layouts: the lines of every node, and the names of its assemblies."""
 
 from __future__ import annotations
 
@@ -32,37 +32,38 @@ from stages.shapeassembly.syntax.program import (
 )
 
 MAX_CHILDREN = 100
-"""Parts of one node before groups are formed: all pairs of them are looked at, and a program declares ten at most."""
+"""Parts of one node before groups are formed; all pairs of them are compared."""
 
 PartOrder = Callable[[PartNode], tuple[Any, ...]]
-"""The key of the canonical order of the parts of one node, in the node's frame."""
+"""Sort key of the parts of one node, in the node's frame."""
 
 
 GroupMode = Literal["alike", "common", "none"]
-"""Which parts that repeat make a group: those attached alike to the same parts (shapeassembly App. C), those attached
-to a common part, or none."""
+"""Which repeated parts form a group: those attached alike to the same parts (shapeassembly App. C), those attached to a
+common part, or none.
+"""
 
 
 @dataclass(frozen=True)
 class _Node:
-    """The block of a node, with parts called by their place in it, and what is to be expanded: by name, the part."""
+    """The block of a node, whose parts are named by index, and the parts to expand, by name."""
 
     block: Block
     expanded: dict[str, PartNode]
 
 
 def build_program(root: PartNode, order: PartOrder, groups: GroupMode, pool: bool) -> AssemblyProgram:
-    """The program of an arranged hierarchy, root first, assemblies numbered in breadth-first order.
+    """Return the program of an arranged hierarchy, root first, assemblies numbered breadth first.
 
-    groups: which parts that repeat are made by macros; pool: whether of what repeats together an assembly is made.
-
-    Raises Rejected where the parts of a node do not hang together, or are too many.
+    groups: which repeated parts are made by macros.
+    pool: whether parts that repeat together are merged into an assembly.
+    Raises Rejected where the parts of a node are not connected, or too many.
     """
     blocks: list[Block] = []
     waiting = deque([root])
     count = 0
     while waiting:
-        node = _write_node(waiting.popleft(), order, groups, pool)
+        node = _build_node(waiting.popleft(), order, groups, pool)
         names = {}
         for name, part in node.expanded.items():
             count += 1
@@ -73,7 +74,7 @@ def build_program(root: PartNode, order: PartOrder, groups: GroupMode, pool: boo
     return AssemblyProgram(tuple(blocks))
 
 
-def _write_node(part: PartNode, order: PartOrder, groups: GroupMode, pool: bool) -> _Node:
+def _build_node(part: PartNode, order: PartOrder, groups: GroupMode, pool: bool) -> _Node:
     children = sorted((in_frame(child, part.box) for child in part.children), key=order)
     if len(children) > MAX_CHILDREN:
         raise Rejected("too many parts", f"{len(children)} below {part.label!r}, at most {MAX_CHILDREN} are looked at")
@@ -89,7 +90,7 @@ def _write_node(part: PartNode, order: PartOrder, groups: GroupMode, pool: bool)
     if joints is None:
         raise Rejected("parts not connected", f"below {part.label!r}")
     indices = range(len(layout.parts))
-    macros = [_macro(index, each) for index, each in enumerate(symmetries) if each is not None]
+    macros = [_macro(index, symmetry) for index, symmetry in enumerate(symmetries) if symmetry is not None]
     lines = (*(declaration_of(layout, index) for index in indices), *joints, *macros)
     x, y, z = np.maximum(part.box.size, MIN_CUBOID_SIZE).tolist()
     block = Block("", Cuboid(BBOX, (x, y, z), True), lines)

@@ -1,4 +1,4 @@
-"""What a config says of programs that are extracted from part hierarchies."""
+"""The config of programs that are extracted from part hierarchies."""
 
 from __future__ import annotations
 
@@ -22,38 +22,36 @@ def _existing(path: Path) -> Path:
 
 
 class NamedFiles(StrictModel):
-    """Files of one kind of shape."""
+    """Files of one category of shapes."""
 
     name: str = Field(
         pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$",
         max_length=64,
-        description="What the shapes are, such as chair; the keys of the samples begin with it.",
+        description="Category of the shapes, such as chair; it starts the keys of their samples.",
     )
-    # excluded from what the stage's fingerprint sees, as the credit of exemplars is
+    # excluded from the fingerprint of the stage, like the credit of exemplars
     credit: Credit = Field(
-        default_factory=Credit, exclude=True, description="Whose they are; card and manifest say it."
+        default_factory=Credit, exclude=True, description="Authors and licence, stated in card and manifest."
     )
 
 
 class HierarchyFiles(NamedFiles):
-    """Part hierarchies of one kind of shape."""
+    """Part hierarchies of one category of shapes."""
 
-    path: Annotated[Path, AfterValidator(_existing)] = Field(
-        description="A folder, searched with all below it, or one file."
-    )
+    path: Annotated[Path, AfterValidator(_existing)] = Field(description="A folder, searched recursively, or one file.")
     kind: HierarchyKind = Field(
-        description="structurenet: .json files; partnet: result_after_merging.json files with objs/ beside them; "
+        description="structurenet: .json files; partnet: result_after_merging.json files and objs/ in one folder; "
         "grass: one .npz file; glb: .glb files, whose scene graph is the hierarchy."
     )
     category: Category = Field(
         "any",
-        description="Whose rules flatten, collapse and order parts by their PartNet labels; any: the hierarchy stays.",
+        description="Category whose rules flatten, collapse and order parts by PartNet labels; any: no rules.",
     )
     up: Literal["y", "z"] = Field("y", description="The axis that points up in glb files; the others are y up.")
 
     @property
     def source(self) -> HierarchySource:
-        """What reads the files."""
+        """The reader of the files."""
         return HierarchySource(self.path, self.kind, self.up)
 
     @property
@@ -63,30 +61,28 @@ class HierarchyFiles(NamedFiles):
 
 
 class Gates(StrictModel):
-    """What an extracted program must pass (shapeassembly §5.3 and the published training set)."""
+    """The quality gates of an extracted program (shapeassembly §5.3 and the published training set)."""
 
-    f_score: float = Field(75.0, ge=0, le=100, description="Least F-score against the boxes of the input, percent.")
-    distance: float = Field(
-        0.02, gt=0, lt=1, description="Up to which surfaces agree, as a share of the diagonal of the shape."
+    min_f_score: float = Field(
+        75.0, ge=0, le=100, description="Minimum F-score against the boxes of the input; unit: percent."
     )
-    min_leaves: int = Field(3, ge=1, description="Fewest cuboids that the program declares and does not expand.")
-    max_leaves: int = Field(12, ge=1, description="Most cuboids that the program declares and does not expand.")
-    overflow: float = Field(
-        0.05, gt=0, description="How far parts may reach out of the bounding box, as a share of its size; less passes."
+    distance: float = Field(
+        0.02, gt=0, lt=1, description="Distance within which surfaces agree, as a share of the diagonal of the shape."
+    )
+    min_leaves: int = Field(3, ge=1, description="Minimum number of declared cuboids that are not expanded.")
+    max_leaves: int = Field(12, ge=1, description="Maximum number of declared cuboids that are not expanded.")
+    max_overflow: float = Field(
+        0.05, gt=0, description="Maximum excess of parts over the bounding box, as a share of its size."
     )
 
 
 class Cleaning(StrictModel):
-    """Which steps make hierarchies tidier before a program is written (shapeassembly §5.1, App. C)."""
+    """Steps that clean hierarchies before a program is extracted (shapeassembly §5.1, App. C)."""
 
-    shorten: bool = Field(True, description="Leaves sunk into others are cut back to where they can be seen.")
-    arrange: bool = Field(
-        True, description="Nodes are flattened, collapsed and gathered by the rules of their category."
-    )
-    group: bool = Field(True, description="Parts that repeat are made by reflect and translate.")
-    pool: bool = Field(
-        True, description="Of parts that hang together and repeat together, one assembly is made before, and repeated."
-    )
+    shorten: bool = Field(True, description="Cut leaves back to their visible part where they are sunk into others.")
+    arrange: bool = Field(True, description="Flatten, collapse and gather nodes by the rules of their category.")
+    group: bool = Field(True, description="Make repeated parts by reflect and translate.")
+    pool: bool = Field(True, description="First merge connected parts that repeat together into one assembly.")
 
 
 EVERY_STEP = Cleaning()

@@ -1,4 +1,4 @@
-"""Extraction as shards of the stage: each reads some hundred hierarchies and writes their programs."""
+"""The shards of the extraction: each reads many hierarchies and writes their programs."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ HIERARCHIES_PER_SHARD = 1000
 
 @dataclass(frozen=True)
 class ProgramText:
-    """A program that a shard has made. kind: the name of its source in the config; name: its own in the source."""
+    """A program from a shard: the name of its source in the config, its own in the source, its text."""
 
-    kind: str
+    kit: str
     name: str
     text: str
 
 
 def extraction_shards(dataset: str, hierarchies: Sequence[HierarchyFiles]) -> list[Shard]:
-    """The shards `<dataset>-extraction-<number>`, of one source each, in the order of the config."""
+    """Return the shards `<dataset>-extraction-<number>`, of one source each, in the order of the config."""
     shards: list[Shard] = []
     for index, files in enumerate(hierarchies):
         source = files.source
@@ -42,12 +42,12 @@ def extraction_shards(dataset: str, hierarchies: Sequence[HierarchyFiles]) -> li
 
 
 def run_extraction(task: Task, hierarchies: Sequence[HierarchyFiles], gates: Gates, cleaning: Cleaning) -> Outcome:
-    """Extract the programs of one shard into `.jsonl`, one a line; the others are refused, by reason."""
+    """Extract the programs of one shard into `.jsonl`, one a line; others are rejected by reason."""
     params = task.shard.params
     files = hierarchies[params["source"]]
     rows, scores = [], []
-    for place, (name, hierarchy) in enumerate(files.source.read(params["first"], params["last"])):
-        task.progress(place, params["last"] - params["first"])
+    for done, (name, hierarchy) in enumerate(files.source.read(params["first"], params["last"])):
+        task.progress(done, params["last"] - params["first"])
         try:
             if isinstance(hierarchy, Rejected):
                 raise hierarchy
@@ -55,7 +55,7 @@ def run_extraction(task: Task, hierarchies: Sequence[HierarchyFiles], gates: Gat
         except Rejected as error:
             task.reject(f"{files.name}/{name}", error.reason, error.detail)
             continue
-        rows.append({"kind": files.name, "name": name, "text": print_program(extraction.program)})
+        rows.append({"kit": files.name, "name": name, "text": print_program(extraction.program)})
         scores.append(extraction.f_score)
     with task.output(f"{task.shard.name}.jsonl") as stream:
         stream.writelines(json_bytes(row) for row in rows)
@@ -63,7 +63,7 @@ def run_extraction(task: Task, hierarchies: Sequence[HierarchyFiles], gates: Gat
 
 
 def read_program_texts(task: Task) -> Iterator[ProgramText]:
-    """The programs of all shards among the inputs of a task that extract or write some, in order."""
+    """Yield the programs of all shards among the inputs of a task, in order."""
     for record in task.shard.inputs:
         stage, shard = record.split("/")
         for line in task.input(stage, f"{shard}.jsonl").read_text().splitlines():

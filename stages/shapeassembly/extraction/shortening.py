@@ -1,4 +1,4 @@
-"""Part shortening: a leaf whose end is sunk into another leaf is cut back to where it can be seen."""
+"""Part shortening: a leaf whose end is sunk into another leaf is cut back to its visible part."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import UNIT_CORNERS, box_corners, inside
 from stages.shapeassembly.extraction.hierarchy import Box, PartNode
 
-_KEPT = 0.05
-"""A part is never cut to less than this share of its length: a part hidden in another is left as it is."""
+_MIN_KEPT_SHARE = 0.05
+"""A part is never cut to less of its length: a part hidden in another stays."""
 
 
 def shorten_parts(root: PartNode) -> PartNode:
-    """The tree with every leaf cut back that can be without changing what is seen (shapeassembly App. C).
+    """Cut back every leaf where that does not change what is visible (shapeassembly App. C).
 
-    A leaf face that lies within another leaf moves inwards as long as what it leaves is inside that other leaf.
-    Smaller leaves first, so that the answer does not depend on the order of the file.
+    A leaf face within another leaf moves inwards while the removed part is inside that leaf. Smaller leaves come first,
+    so that the result does not depend on the order of the file.
     """
     leaves = list(root.leaves())
     boxes = [leaf.box for leaf in leaves]
@@ -37,14 +37,14 @@ def shorten_parts(root: PartNode) -> PartNode:
 
 
 def _with_boxes(part: PartNode, boxes: Iterator[Box]) -> PartNode:
-    """The tree with the leaves' boxes taken in order from `boxes`."""
+    """Return the tree with the leaves' boxes taken in order."""
     if not part.children:
         return replace(part, box=next(boxes))
     return replace(part, children=tuple(_with_boxes(child, boxes) for child in part.children))
 
 
 def _cut(box: Box, other: Box) -> Box:
-    """`box` without what of its ends lies inside `other`."""
+    """Return a box without its ends inside another."""
     corners = box_corners(box)
     within = inside(other, corners, 1e-9)
     if within.sum() < 4:
@@ -56,7 +56,7 @@ def _cut(box: Box, other: Box) -> Box:
                 continue
             inward = box.axes[axis] * (1.0 if side == 0.0 else -1.0)
             depth = min(_exit(other, corner, inward) for corner in corners[face])
-            if 1e-6 * box.size[axis] < depth < box.size[axis] * (1 - _KEPT):
+            if 1e-6 * box.size[axis] < depth < box.size[axis] * (1 - _MIN_KEPT_SHARE):
                 size = box.size.copy()
                 size[axis] -= depth
                 return _cut(Box(box.center + inward * depth / 2, size, box.axes), other)
@@ -64,7 +64,7 @@ def _cut(box: Box, other: Box) -> Box:
 
 
 def _exit(box: Box, start: FloatArray, direction: FloatArray) -> float:
-    """How far a ray from `start`, inside `box`, runs until it leaves it."""
+    """Return how far a ray from `start` in a box runs until it leaves it."""
     local, slope = box.axes @ (start - box.center), box.axes @ direction
     with np.errstate(divide="ignore", invalid="ignore"):
         lengths = (np.sign(slope) * box.size / 2 - local) / slope

@@ -16,17 +16,18 @@ BOTTOM_END, TOP_END = -1, -2
 """The ends of the bounding box, among indices of parts."""
 
 MATCH_TOLERANCE = 0.02
-"""How near corners must come to those of their counterpart, as a share of the diagonal of the bounding box; how far
-lengths may differ is half of it, or a tenth of the length."""
+"""Maximum distance of corresponding corners, as a share of the bounding box's diagonal. Lengths may differ by half of
+it, or by a tenth.
+"""
 
 
 @dataclass(frozen=True)
 class SymmetryBody:
-    """What symmetry moves: one part, or several that are connected.
+    """What symmetry moves: one part, or several connected ones.
 
-    members: indices of its parts; boxes: corners (8, 3) of each leaf in the node's frame, whose origin is the centre
-    of the bounding box; joints: its attachments, the part outside itself that each is to, BOTTOM and TOP
-    being the ends of the bounding box, and its point (3,) on the body.
+    members: indices of its parts.
+    boxes: corners (8, 3) of each leaf in the node's frame, whose origin is the centre of the bounding box.
+    joints: its attachments: the outside part, or end of the bounding box, and the point (3,) on the body.
     """
 
     members: tuple[int, ...]
@@ -43,9 +44,12 @@ class SymmetryBody:
 
 @dataclass(frozen=True)
 class SymmetryGroup:
-    """Bodies that one macro makes of the first. bodies: indices, the first at the low end of the axis.
-    anchors: what all of them are attached to, as the first is. distance: from the first to the last, in the node's
-    units (translate alone)."""
+    """Bodies that one macro makes of the first.
+
+    bodies: indices, the first at the low end of the axis.
+    anchors: what all of them are attached to.
+    distance: from the first to the last, in the node's units, for translations.
+    """
 
     kind: Literal["reflect", "translate"]
     axis: int
@@ -55,10 +59,11 @@ class SymmetryGroup:
 
 
 def reflections(bodies: Sequence[SymmetryBody], axis: int, diagonal: float, *, strict: bool) -> list[SymmetryGroup]:
-    """Pairs of bodies that are mirror images across the middle of the bounding box, and so are their attachments, which
-    are to the same parts; if not `strict`, it is enough that some are to one part.
+    """Return pairs of bodies that are mirror images across the middle of the bounding box, as are their attachments.
 
-    diagonal: of the bounding box. A body that is its own image is in no pair.
+    diagonal: of the bounding box.
+    strict: all attachments are to the same parts; otherwise one common part suffices.
+    A body that is its own image is in no pair.
     """
     tolerance = MATCH_TOLERANCE * diagonal
     origin = np.zeros(3)
@@ -73,12 +78,15 @@ def reflections(bodies: Sequence[SymmetryBody], axis: int, diagonal: float, *, s
                 continue
             if _alike(body.boxes, other.boxes, tolerance):
                 continue
-            own = frozenset((*body.members, *other.members))
-            seen, there = _mirrored_joints(_seen(body, own), axis), _seen(other, own)
-            common = _parts(seen) & _parts(there)
-            if common and (not strict or _attached_alike(seen, there, tolerance)):
+            members = frozenset((*body.members, *other.members))
+            mirrored_joints, joints = (
+                _mirrored_joints(_outer_joints(body, members), axis),
+                _outer_joints(other, members),
+            )
+            common = _parts(mirrored_joints) & _parts(joints)
+            if common and (not strict or _attached_alike(mirrored_joints, joints, tolerance)):
                 groups.append(
-                    SymmetryGroup("reflect", axis, (i, j), frozenset(_opposite(each, axis) for each in common))
+                    SymmetryGroup("reflect", axis, (i, j), frozenset(_opposite(part, axis) for part in common))
                 )
                 taken |= {i, j}
                 break
@@ -86,10 +94,12 @@ def reflections(bodies: Sequence[SymmetryBody], axis: int, diagonal: float, *, s
 
 
 def translations(
-    bodies: Sequence[SymmetryBody], axis: int, diagonal: float, fewest: int, *, strict: bool
+    bodies: Sequence[SymmetryBody], axis: int, diagonal: float, min_length: int, *, strict: bool
 ) -> list[SymmetryGroup]:
-    """Rows of at least `fewest` equal bodies at equal distances along `axis` that are attached alike to the same
-    parts; if not `strict`, it is enough that all are attached to one part."""
+    """Return rows of at least `min_length` equal bodies at equal distances along an axis.
+
+    strict: they are attached alike to the same parts; otherwise one common part suffices.
+    """
     tolerance = MATCH_TOLERANCE * diagonal
     left = sorted(range(len(bodies)), key=lambda i: (bodies[i].center[axis], i))
     groups: list[SymmetryGroup] = []
@@ -97,12 +107,12 @@ def translations(
         first = bodies[left[0]]
         row = [i for i in left if _alike_translated(first, bodies[i], axis, tolerance)]
         if strict:
-            own = frozenset(member for i in row for member in bodies[i].members)
-            row = [i for i in row if _attached_in_row(first, bodies[i], axis, own, tolerance)]
+            members = frozenset(member for i in row for member in bodies[i].members)
+            row = [i for i in row if _attached_in_row(first, bodies[i], axis, members, tolerance)]
         row = _evenly_spaced([i for i in row if i != left[0]], left[0], bodies, axis, tolerance)
-        own = frozenset(member for i in row for member in bodies[i].members)
-        anchors = frozenset.intersection(*(_parts(_seen(bodies[i], own)) for i in row))
-        if len(row) >= fewest and anchors:
+        members = frozenset(member for i in row for member in bodies[i].members)
+        anchors = frozenset.intersection(*(_parts(_outer_joints(bodies[i], members)) for i in row))
+        if len(row) >= min_length and anchors:
             span = float(bodies[row[-1]].center[axis] - first.center[axis])
             groups.append(SymmetryGroup("translate", axis, tuple(row), anchors, span))
             left = [i for i in left if i not in row]
@@ -114,9 +124,9 @@ def translations(
 _Joints = list[tuple[int, FloatArray]]
 
 
-def _seen(body: SymmetryBody, own: frozenset[int]) -> _Joints:
-    """The attachments of a body to what is not in its group."""
-    return [each for each in body.joints if each[0] not in own]
+def _outer_joints(body: SymmetryBody, own: frozenset[int]) -> _Joints:
+    """Return the attachments of a body to what is not in its group."""
+    return [joint for joint in body.joints if joint[0] not in own]
 
 
 def _parts(joints: _Joints) -> frozenset[int]:
@@ -124,8 +134,7 @@ def _parts(joints: _Joints) -> frozenset[int]:
 
 
 def _opposite(part: int, axis: int) -> int:
-    """What the mirror image of a body is attached to: across the level plane the ends of the bounding box change
-    places."""
+    """Return what the mirror image of a body is attached to: the ends of the bounding box swap along y."""
     return {BOTTOM_END: TOP_END, TOP_END: BOTTOM_END}.get(part, part) if axis == 1 else part
 
 
@@ -138,16 +147,18 @@ def _attached_in_row(
 ) -> bool:
     way = np.zeros(3)
     way[axis] = other.center[axis] - first.center[axis]
-    return _attached_alike([(part, point + way) for part, point in _seen(first, own)], _seen(other, own), tolerance)
+    return _attached_alike(
+        [(part, point + way) for part, point in _outer_joints(first, own)], _outer_joints(other, own), tolerance
+    )
 
 
-def _attached_alike(wanted: _Joints, found: _Joints, tolerance: float) -> bool:
-    """Whether attachments are to the same parts at the same points (shapeassembly App. C)."""
-    left = list(found)
-    for part, point in wanted:
-        for place, (other, there) in enumerate(left):
-            if part == other and np.abs(point - there).max() <= tolerance:
-                del left[place]
+def _attached_alike(first: _Joints, second: _Joints, tolerance: float) -> bool:
+    """Return whether attachments are to the same parts at the same points (shapeassembly App. C)."""
+    left = list(second)
+    for part, point in first:
+        for index, (other, other_point) in enumerate(left):
+            if part == other and np.abs(point - other_point).max() <= tolerance:
+                del left[index]
                 break
         else:
             return False
@@ -155,15 +166,15 @@ def _attached_alike(wanted: _Joints, found: _Joints, tolerance: float) -> bool:
 
 
 def _alike(first: Sequence[FloatArray], second: Sequence[FloatArray], tolerance: float) -> bool:
-    """Whether each box of one has its own counterpart in the other."""
+    """Return whether each box of one has its own counterpart in the other."""
     if len(first) != len(second):
         return False
     left = list(second)
     for corners in first:
-        for place, other in enumerate(left):
+        for index, other in enumerate(left):
             near = np.abs(corners.mean(axis=0) - other.mean(axis=0)).max() <= tolerance
             if near and _same_size(corners, other, tolerance / 2) and boxes_match(corners, other, tolerance):
-                del left[place]
+                del left[index]
                 break
         else:
             return False
@@ -171,8 +182,8 @@ def _alike(first: Sequence[FloatArray], second: Sequence[FloatArray], tolerance:
 
 
 def _same_size(first: FloatArray, second: FloatArray, tolerance: float) -> bool:
-    """Whether two boxes, corners (8, 3), have the same lengths in some order."""
-    one, two = (np.sort(np.linalg.norm(each[[4, 2, 1]] - each[0], axis=1)) for each in (first, second))
+    """Return whether two boxes, corners (8, 3), have the same lengths in some order."""
+    one, two = (np.sort(np.linalg.norm(box[[4, 2, 1]] - box[0], axis=1)) for box in (first, second))
     return bool((np.abs(one - two) <= np.maximum(0.1 * one, tolerance)).all())
 
 
@@ -188,18 +199,18 @@ def _alike_translated(first: SymmetryBody, second: SymmetryBody, axis: int, tole
 def _evenly_spaced(
     row: list[int], first: int, bodies: Sequence[SymmetryBody], axis: int, tolerance: float
 ) -> list[int]:
-    """The longest row that begins with `first` and goes on in equal steps, along ascending places."""
+    """Return the longest row that starts with `first` and continues in equal steps."""
     best = [first]
     start = bodies[first].center[axis]
     places = {i: float(bodies[i].center[axis] - start) for i in row}
     for step in sorted({place for place in places.values() if place > tolerance / 2}):
-        found = [first]
+        candidate = [first]
         while True:
-            wanted = step * len(found)
-            near = [i for i in row if i not in found and abs(places[i] - wanted) <= min(tolerance, step / 4)]
+            wanted = step * len(candidate)
+            near = [i for i in row if i not in candidate and abs(places[i] - wanted) <= min(tolerance, step / 4)]
             if not near:
                 break
-            found.append(min(near, key=lambda i: abs(places[i] - wanted)))
-        if len(found) > len(best):
-            best = found
+            candidate.append(min(near, key=lambda i: abs(places[i] - wanted)))
+        if len(candidate) > len(best):
+            best = candidate
     return best

@@ -1,4 +1,4 @@
-"""Places a tilted part: the attachments that turn it nearest to where it is (shapeassembly §5.2)."""
+"""Place a tilted part by the attachments that turn it nearest to its input (shapeassembly §5.2)."""
 
 from __future__ import annotations
 
@@ -31,43 +31,43 @@ from stages.shapeassembly.syntax.program import BBOX as BBOX_NAME
 from stages.shapeassembly.syntax.program import AssemblyProgram, Block, Cuboid
 
 MAX_ATTACHMENTS = 3
-"""A part that is held at three points is held."""
+"""Three points hold a part."""
 
 MAX_CONTACTS_TRIED = 5
-"""Contacts of one part that are tried, those in canonical order first: their sequences number 85."""
+"""Contacts of one part that are tried, in canonical order; they have 85 sequences."""
 
 LINE_COST = 0.002
-"""Misplacement, as a share of the bounding box's diagonal, that is worth one line less."""
+"""Misplacement, as a share of the bounding box's diagonal, that one line less is worth."""
 
 
 def declaration_of(layout: NodeLayout, part: int) -> Cuboid:
-    """The declaration of a part."""
+    """Return the declaration of a part."""
     x, y, z = np.maximum(layout.parts[part].box.size, MIN_CUBOID_SIZE).tolist()
     return Cuboid(part_name(part), (x, y, z), layout.aligned(part))
 
 
 def tilted_placer(layout: NodeLayout) -> TiltedPlacer:
-    """Places tilted parts of `layout` by trying their attachments in every order and executing each.
+    """Return a placer that tries the attachments of a part in every order and executes each sequence.
 
-    What is best is what brings the corners nearest to where they are in the input; a line must be worth its while.
+    The best brings the corners nearest to the input, with a penalty for each line.
     """
 
     known: dict[tuple[int, ...], TiltedPlacement | None] = {}
 
-    def place(part: int, lines: list[Joint], standing: PlacedBoxes) -> TiltedPlacement | None:
-        about = (part, *(each for each in layout.neighbours(part) if each in standing))
+    def place(part: int, lines: list[Joint], placed: PlacedBoxes) -> TiltedPlacement | None:
+        about = (part, *(other for other in layout.neighbours(part) if other in placed))
         if about not in known:
-            known[about] = _best(layout, part, lines, standing)
+            known[about] = _best(layout, part, lines, placed)
         return known[about]
 
     return place
 
 
-def _best(layout: NodeLayout, part: int, lines: list[Joint], standing: PlacedBoxes) -> TiltedPlacement | None:
+def _best(layout: NodeLayout, part: int, lines: list[Joint], placed: PlacedBoxes) -> TiltedPlacement | None:
     wanted = box_corners(layout.parts[part].box)
-    candidates = list(_candidates(layout, part, standing))
+    candidates = list(_candidates(layout, part, placed))
     best: TiltedPlacement | None = None
-    for candidate, box in zip(candidates, _executed(layout, part, lines, candidates, standing), strict=True):
+    for candidate, box in zip(candidates, _executed(layout, part, lines, candidates, placed), strict=True):
         away = float(np.linalg.norm(box_corners(box) - wanted, axis=1).mean()) / layout.diagonal
         cost = away + LINE_COST * len(candidate)
         if best is None or cost < best.cost - 1e-6:
@@ -75,24 +75,24 @@ def _best(layout: NodeLayout, part: int, lines: list[Joint], standing: PlacedBox
     return best
 
 
-def _candidates(layout: NodeLayout, part: int, standing: PlacedBoxes) -> Iterator[list[Joint]]:
-    """Sequences of lines that could ground a part: squeezes, then attachments in every order."""
-    others = [other for other in layout.neighbours(part) if other in standing and layout.may_attach(part, other)]
+def _candidates(layout: NodeLayout, part: int, placed: PlacedBoxes) -> Iterator[list[Joint]]:
+    """Yield sequences of lines that could ground a part: squeezes, then attachments in every order."""
+    others = [other for other in layout.neighbours(part) if other in placed and layout.may_attach(part, other)]
     at_box = [(BBOX_INDEX, BBOX_INDEX), *((BBOX_INDEX, other) for other in others)]
     between = list(permutations(others, 2))
     for face, pairs in ((TOP, at_box), (BOTTOM, at_box[1:]), (LEFT, between), (BOTTOM, between), (BACK, between)):
         for first, second in pairs:
-            line = squeeze(layout, standing, part, (first, second), face)
+            line = squeeze(layout, placed, part, (first, second), face)
             if line is not None:
                 yield [line]
     ends = [point for point in (layout.bottoms[part], layout.tops[part]) if point is not None]
-    usual: list[Joint] = [attach(layout, standing, part, BBOX_INDEX, point, point) for point in ends]
+    usual: list[Joint] = [attach(layout, placed, part, BBOX_INDEX, point, point) for point in ends]
     turning: list[Joint] = list(usual)
     for other in others:
         own, goal = layout.points(part, other)
-        usual.append(attach(layout, standing, part, other, own, goal))
+        usual.append(attach(layout, placed, part, other, own, goal))
         point = _in_turning_plane(layout, part, other)
-        turning.append(attach(layout, standing, part, other, point, point))
+        turning.append(attach(layout, placed, part, other, point, point))
     yield from _sequences(usual)
     yield from _sequences(turning)
 
@@ -104,8 +104,10 @@ def _sequences(joints: Sequence[Joint]) -> Iterator[list[Joint]]:
 
 
 def _in_turning_plane(layout: NodeLayout, part: int, other: int) -> FloatArray:
-    """The point of a contact from which the part turns without rolling: nearest the plane through its centre that is
-    perpendicular to the axis about which it is tilted."""
+    """Return the point of a contact about which the part turns without rolling.
+
+    It is nearest to the plane through the part's centre perpendicular to the axis of its tilt.
+    """
     box = layout.parts[part].box
     region = layout.contacts[min(part, other), max(part, other)].region
     axes = box.axes
@@ -118,13 +120,15 @@ def _in_turning_plane(layout: NodeLayout, part: int, other: int) -> FloatArray:
 
 
 def _executed(
-    layout: NodeLayout, part: int, lines: list[Joint], candidates: Sequence[list[Joint]], standing: PlacedBoxes
+    layout: NodeLayout, part: int, lines: list[Joint], candidates: Sequence[list[Joint]], placed: PlacedBoxes
 ) -> list[Box]:
-    """The box that each candidate after `lines` makes of a part, with numbers as they will be printed."""
+    """Return the box that each candidate after `lines` makes of a part, with numbers as printed."""
     x, y, z = layout.bbox.size.tolist()
-    declared = sorted(each for each in (*standing, part) if each != BBOX_INDEX)
-    cuboids = [declaration_of(layout, each) for each in declared]
+    declared = sorted(index for index in (*placed, part) if index != BBOX_INDEX)
+    cuboids = [declaration_of(layout, index) for index in declared]
     bbox = Cuboid(BBOX_NAME, (x, y, z), True)
-    programs = [AssemblyProgram((Block("Program_0", bbox, (*cuboids, *lines, *each)),)) for each in candidates]
+    programs = [
+        AssemblyProgram((Block("Program_0", bbox, (*cuboids, *lines, *candidate)),)) for candidate in candidates
+    ]
     executions = execute_all([rounded(program) for program in programs])
     return [execution_boxes(execution)[declared.index(part)] for execution in executions]

@@ -1,4 +1,4 @@
-"""What a well-made program keeps to, beyond what can be executed (shapeassembly table 1, §6.2 and App. D)."""
+"""Rules of well-formed programs, beyond what can be executed (shapeassembly table 1, §6.2 and App. D)."""
 
 from __future__ import annotations
 
@@ -46,17 +46,20 @@ MAX_CUBOIDS = 10
 """Cuboids that an assembly declares (shapeassembly §6.1)."""
 
 BBOX_END_SHARE = 0.05
-"""How far from the top or bottom of the bounding box an attachment to it may be, as a share of its height."""
+"""Attachments to the bounding box are this close to its top or bottom, as a share of its height."""
 
 MAX_EXCESS_SHARE = 0.1
-"""By how much a cuboid may be larger than the bounding box, as a share."""
+"""Maximum excess of a cuboid over the bounding box."""
 
 _STEPS = {Cuboid: 0, Attach: 1, Squeeze: 1, Reflect: 2, Translate: 2}
 
 
 @dataclass(frozen=True)
 class Violation:
-    """A rule that a line breaks. number: of the line in the canonical text, from 1; 0 where it is no one line."""
+    """A rule that a line breaks.
+
+    number: of the line in the canonical text, from 1; 0 where it is no single line.
+    """
 
     rule: Rule
     number: int
@@ -67,17 +70,17 @@ class Violation:
 
 
 def violations(program: AssemblyProgram) -> list[Violation]:
-    """Every rule that the program breaks, in the order of its lines; empty for a well-made program."""
-    found: list[Violation] = []
+    """Return every broken rule in the order of the lines; empty for a well-formed program."""
+    broken: list[Violation] = []
     number = 1
     for block in program.blocks:
-        found += _Checker(block, number + 1).violations()
+        broken += _Checker(block, number + 1).violations()
         number += len(block.lines) + 3
-    return [*found, *_tree_violations(program)]
+    return [*broken, *_tree_violations(program)]
 
 
 def overflow(program: AssemblyProgram, execution: Execution) -> float:
-    """How far the executed cuboids reach out of the root's bounding box, as a share of its size along that axis."""
+    """Return the maximum excess of executed cuboids over the root's bounding box, as a share of its size."""
     if not len(execution):
         return 0.0
     reach = np.abs(execution.corners).max(axis=(0, 1)) / program.root.bbox.dims
@@ -85,32 +88,34 @@ def overflow(program: AssemblyProgram, execution: Execution) -> float:
 
 
 def protruding_parts(block: Block) -> list[str]:
-    """The cuboids and copies of one assembly that reach out of its bounding box by more than LARGER of its size along
-    an axis (shapeassembly App. D), by name, in the order of the lines. Raises ProgramError where the assembly by itself
-    cannot be executed."""
+    """Return the cuboids and copies of an assembly that reach out of its bounding box (shapeassembly App. D), by name.
+
+    The limit is MAX_EXCESS_SHARE of the size along an axis. Raises ProgramError where the assembly cannot be executed.
+    """
     names, boxes = execute_block(block)
     frames = boxes[:, 6:].reshape(-1, 3, 3)
     reach = np.abs(boxes[:, :3]) + np.einsum("nk,nkc->nc", boxes[:, 3:6] / 2, np.abs(frames))
-    beyond = (reach > (0.5 + MAX_EXCESS_SHARE) * np.array(block.bbox.dims) + 1e-9).any(axis=1)
-    return [names[place] for place in np.flatnonzero(beyond).tolist()]
+    protruding = (reach > (0.5 + MAX_EXCESS_SHARE) * np.array(block.bbox.dims) + 1e-9).any(axis=1)
+    return [names[index] for index in np.flatnonzero(protruding).tolist()]
 
 
 def _tree_violations(program: AssemblyProgram) -> Iterator[Violation]:
-    """Assemblies that no cuboid stands for, and those that stand within themselves."""
+    """Yield assemblies that no cuboid names, and those that contain themselves."""
     below = {
-        block.name: [each.name for each in block.cuboids if each.name in program.named] for block in program.blocks
+        block.name: [cuboid.name for cuboid in block.cuboids if cuboid.name in program.named]
+        for block in program.blocks
     }
-    reached, ahead = {program.root.name}, [program.root.name]
-    while ahead:
-        more = [name for name in below[ahead.pop()] if name not in reached]
+    reached, pending = {program.root.name}, [program.root.name]
+    while pending:
+        more = [name for name in below[pending.pop()] if name not in reached]
         reached.update(more)
-        ahead += more
+        pending += more
     for name in below:
         if name not in reached:
             yield Violation("assembly unused", 0, f"no cuboid of the program is named {name!r}")
-    # What is left when assemblies whose cuboids all end have been taken away stands in a circle.
+    # What remains after repeatedly removing assemblies without open children is a circle.
     left = dict(below)
-    while ending := [name for name, names in left.items() if not any(each in left for each in names)]:
+    while ending := [name for name, names in left.items() if not any(name in left for name in names)]:
         for name in ending:
             del left[name]
     if left:
@@ -118,15 +123,15 @@ def _tree_violations(program: AssemblyProgram) -> Iterator[Violation]:
 
 
 class _Checker:
-    """Goes through the lines of one assembly."""
+    """Checks the lines of one assembly."""
 
     def __init__(self, block: Block, number: int) -> None:
         self.block = block
         self.number = number
-        self.places = {BBOX: 0}
+        self.slots = {BBOX: 0}
         self.grounded = {BBOX}
         self.joined: set[tuple[str, str, str]] = set()
-        self.found: list[Violation] = []
+        self.broken: list[Violation] = []
 
     def violations(self) -> list[Violation]:
         block = self.block
@@ -150,15 +155,15 @@ class _Checker:
                 self.add("not grounded", cuboid, f"no line of {block.name} attaches it")
         if len(block.cuboids) > MAX_CUBOIDS:
             self.add("too many cuboids", block.bbox, f"{block.name} has {len(block.cuboids)}, of {MAX_CUBOIDS} at most")
-        return self.found
+        return self.broken
 
     def add(self, rule: Rule, line: Line, detail: str) -> None:
-        self.found.append(Violation(rule, self.number, f"{print_line(line)}: {detail}"))
+        self.broken.append(Violation(rule, self.number, f"{print_line(line)}: {detail}"))
 
     def cuboid(self, line: Cuboid) -> None:
-        if line.name in self.places:
+        if line.name in self.slots:
             self.add("name taken", line, f"{line.name!r} is there already")
-        self.places[line.name] = len(self.places)
+        self.slots[line.name] = len(self.slots)
         whole = self.block.bbox.dims
         if any(
             not MIN_CUBOID_SIZE <= size <= (1 + MAX_EXCESS_SHARE) * most
@@ -173,7 +178,7 @@ class _Checker:
         elif isinstance(line, Squeeze):
             names |= {line.first: None, line.second: None}
         for name in names:
-            if name not in self.places:
+            if name not in self.slots:
                 self.add("unknown name", line, f"no line before it makes {name!r}")
         if line.moved == BBOX:
             self.add("bounding box moved", line, "attach other cuboids to it instead")
@@ -199,9 +204,9 @@ class _Checker:
     def attached(self, line: Attach | Squeeze, target: str, side: str) -> None:
         if target == line.moved:
             self.add("attached to itself", line, "name two different cuboids")
-        if target not in self.grounded and target in self.places:
+        if target not in self.grounded and target in self.slots:
             self.add("not grounded", line, f"{target!r} must be attached itself before")
-        # To the bounding box a cuboid may be attached at its top and at its bottom.
+        # A cuboid may be attached to the top and to the bottom of the bounding box.
         joint = (line.moved, target, side if target == BBOX else "")
         if joint in self.joined:
             self.add("attached twice", line, f"{line.moved!r} is attached to {target!r} already")
@@ -209,11 +214,11 @@ class _Checker:
         self.grounded.add(line.moved)
 
     def copies(self, line: Reflect | Translate) -> None:
-        if line.moved not in self.grounded and line.moved in self.places:
+        if line.moved not in self.grounded and line.moved in self.slots:
             self.add("not grounded", line, f"{line.moved!r} must be attached before it is copied")
         if isinstance(line, Translate):
             self.in_range(line, line.distance)
         for _ in range(1 if isinstance(line, Reflect) else line.copies):
-            name = next_copy_name(self.places)
-            self.places[name] = len(self.places)
+            name = next_copy_name(self.slots)
+            self.slots[name] = len(self.slots)
             self.grounded.add(name)

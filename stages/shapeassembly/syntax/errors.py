@@ -1,4 +1,4 @@
-"""What is wrong with a program, said so that its author finds the place."""
+"""Errors of programs, with the place in the text."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from __future__ import annotations
 class ProgramError(ValueError):
     """A program that cannot be read or executed.
 
-    reason: a short phrase that stays the same from program to program (it is what gets counted);
-    detail: what was special here, and the mend; line and column: place in the text, from 1, where there is a text;
-    source: the line of the text, shown with a caret under the place.
+    reason: a short phrase that is the same for every program, and is counted.
+    detail: what was wrong here, and the mend.
+    line, column: place in the text, from 1, where there is a text.
+    source: the line of the text, shown with a caret.
     """
 
     def __init__(self, reason: str, detail: str = "", line: int = 0, column: int = 0, source: str = "") -> None:

@@ -1,4 +1,4 @@
-"""The tree of a ShapeAssembly program to its canonical text, and numbers to three decimals."""
+"""Print a program as canonical text, and round its numbers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ PRINTED_DECIMALS = 3
 
 
 def print_program(program: AssemblyProgram) -> str:
-    """The canonical text: one line a line, one tab of indent, the shortest digits that read back as the same number.
+    """Return the canonical text: one line a line, one tab of indent, the shortest digits that read back exactly.
 
     `parse(print_program(p)) == p` for every program.
     """
@@ -23,7 +23,7 @@ def _print_block(block: Block) -> str:
 
 
 def print_line(line: Line) -> str:
-    """One line of a program, without indent."""
+    """Return one line of a program, without indent."""
     if isinstance(line, Cuboid):
         return f"{line.name} = Cuboid({_numbers(line.dims)}, {line.aligned})"
     if isinstance(line, Attach):
@@ -36,7 +36,7 @@ def print_line(line: Line) -> str:
 
 
 def rounded(program: AssemblyProgram) -> AssemblyProgram:
-    """The program with every number to three decimals, as the published programs have them."""
+    """Round every number to three decimals, as in the published programs."""
     return program.with_lines(_rounded)
 
 

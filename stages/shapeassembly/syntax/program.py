@@ -1,7 +1,7 @@
 """The tree of a ShapeAssembly program (shapeassembly §4, table 1): assemblies of cuboids and the lines that join them.
 
-Points are in local coordinates of a cuboid: 0 to 1 along its x, y and z axes, (0.5, 0.0, 0.5) being the centre of its
-bottom. Lengths have no unit of their own. y points up.
+Points are in local coordinates of a cuboid: 0 to 1 along its x, y and z axes; (0.5, 0.0, 0.5) is the centre of its
+bottom. Lengths have no unit. y points up.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FACES: tuple[Face, ...] = get_args(Face)
 """In the order of table 1: for each axis the face at 1, then the face at 0."""
 
 BBOX = "bbox"
-"""The name of the bounding box of every assembly."""
+"""Name of the bounding box of every assembly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Cuboid:
 
 @dataclass(frozen=True, slots=True)
 class Attach:
-    """`attach(moved, target, x1, y1, z1, x2, y2, z2)`: bring point `source` of one onto point `goal` of the other."""
+    """`attach(moved, target, x1, y1, z1, x2, y2, z2)`: move point `source` of one onto point `goal` of the other."""
 
     moved: str
     target: str
@@ -44,7 +44,7 @@ class Attach:
 
 @dataclass(frozen=True, slots=True)
 class Squeeze:
-    """`squeeze(moved, first, second, face, u, v)`: stand between two cuboids, `face` towards the first."""
+    """`squeeze(moved, first, second, face, u, v)`: place a cuboid between two others, `face` towards the first."""
 
     moved: str
     first: str
@@ -56,7 +56,7 @@ class Squeeze:
 
 @dataclass(frozen=True, slots=True)
 class Reflect:
-    """`reflect(moved, axis)`: one more, mirrored about the middle of the bounding box."""
+    """`reflect(moved, axis)`: add a copy mirrored about the middle of the bounding box."""
 
     moved: str
     axis: Axis
@@ -64,7 +64,7 @@ class Reflect:
 
 @dataclass(frozen=True, slots=True)
 class Translate:
-    """`translate(moved, axis, copies, distance)`: more of them, the last at `distance` times the bounding box."""
+    """`translate(moved, axis, copies, distance)`: add shifted copies, the last by `distance` times the bounding box."""
 
     moved: str
     axis: Axis
@@ -91,7 +91,7 @@ class Block:
 
 @dataclass(frozen=True)
 class AssemblyProgram:
-    """Assemblies, the root first. A cuboid that has the name of an assembly is expanded by it."""
+    """Assemblies, the root first. A cuboid with the name of an assembly is expanded by it."""
 
     blocks: tuple[Block, ...]
 
@@ -105,7 +105,7 @@ class AssemblyProgram:
         return {block.name: block for block in self.blocks}
 
     def with_lines(self, change: Callable[[Line], Line]) -> AssemblyProgram:
-        """The program with `change` applied to every line, bounding boxes included."""
+        """Apply `change` to every line, bounding boxes included."""
         return AssemblyProgram(tuple(_changed(block, change) for block in self.blocks))
 
 

@@ -39,7 +39,7 @@ class PartialProgram:
     """A program up to some word.
 
     values: float64 (fields, NUMBER_STEPS + 1), the number of each step.
-    unit: length of which the root's sizes are shares.
+    unit: length that divides the root's sizes.
     """
 
     values: FloatArray

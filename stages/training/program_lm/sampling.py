@@ -82,7 +82,7 @@ def sample_programs(
 ) -> list[AssemblyProgram | None]:
     """Sample programs with numbers to three decimals, which keep every rule and whose cuboids stay within their boxes.
 
-    unit: length of which the sizes of a root are shares.
+    unit: length that divides the sizes of a root.
     Returns None for a program with too many failures, with more words than any training program, or beyond the limits
     of execution.
     """

@@ -58,15 +58,16 @@ COMMAND_FIELDS: dict[int, tuple[TokenField, ...]] = {
 NUMBER_STEPS = 64
 """Steps of a number from 0 to 1. Real chairs with numbers rounded to these steps stay rooted and stable."""
 
-_COMMANDS, _SLOTS, _BUILDS, _FACES, _AXES, _COPIES = 7, SLOT_COUNT, 4, len(FACES), len(AXES), MAX_COPIES
-_STARTS = np.cumsum([0, _COMMANDS, _SLOTS, _BUILDS, _FACES, _AXES, _COPIES, NUMBER_STEPS + 1]).tolist()
+_KIND_WORDS = (7, SLOT_COUNT, 4, len(FACES), len(AXES), MAX_COPIES, NUMBER_STEPS + 1)
+"""Words of each kind: commands, slots, build flags, faces, axes, copies, numbers."""
+_STARTS = np.cumsum([0, *_KIND_WORDS]).tolist()
 VOCABULARY_SIZE: int = _STARTS[-1]
 
 _KIND = {
     TokenField.COMMAND: 0, TokenField.MOVED: 1, TokenField.TARGET: 1, TokenField.FIRST: 1, TokenField.SECOND: 1,
     TokenField.BUILD: 2, TokenField.FACE: 3, TokenField.AXIS: 4, TokenField.COPIES: 5,
 }  # fmt: skip
-_NUMBER = 6
+_NUMBER_KIND = 6
 
 NUMBER_FIELDS = tuple(field for field in TokenField if field not in _KIND)
 
@@ -79,7 +80,7 @@ Word = tuple[TokenField, int, float]
 
 def first_word(field: TokenField) -> int:
     """Return the first word of a field; its other words follow."""
-    start: int = _STARTS[_KIND.get(field, _NUMBER)]
+    start: int = _STARTS[_KIND.get(field, _NUMBER_KIND)]
     return start
 
 
@@ -87,7 +88,7 @@ def field_words() -> BoolArray:
     """Return the words of each field, bool (fields, VOCABULARY_SIZE)."""
     words = np.zeros((len(TokenField), VOCABULARY_SIZE), np.bool_)
     for field in TokenField:
-        kind = _KIND.get(field, _NUMBER)
+        kind = _KIND.get(field, _NUMBER_KIND)
         words[field, _STARTS[kind] : _STARTS[kind + 1]] = True
     words[TokenField.COMMAND, START] = False
     return words
@@ -111,7 +112,7 @@ def number_of_step(field: TokenField, step: int) -> float:
 def program_words(program: AssemblyProgram, unit: float) -> list[Word]:
     """Return the words of a program.
 
-    unit: length of which the sizes of the root are shares.
+    unit: length that divides the sizes of the root.
     Raises ProgramError where an assembly has more than ten cuboids, names a cuboid that no line declares, such as a
     copy, is expanded twice, or copies too often.
     """

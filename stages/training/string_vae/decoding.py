@@ -16,7 +16,7 @@ from stages.training.string_vae.vocabulary import END_TOKEN
 
 STRINGS_PER_BATCH = 256
 MAX_DEAD_ENDS = 8
-"""After so many dead ends a string is finished without further cycles."""
+"""Dead ends before a string is finished without further cycles."""
 
 
 @dataclass
@@ -117,7 +117,7 @@ def _decode(
 
     device = next(module.parameters()).device
     points = points.to(device)
-    acceptor = None if rules is None else GrammarMask(rules, cycles, len(drafts), max_tokens)
+    mask = None if rules is None else GrammarMask(rules, cycles, len(drafts), max_tokens)
     state = module.start(points)
     before = torch.full((len(drafts),), END_TOKEN, device=device)
     ended, dead = np.zeros(len(drafts), np.bool_), np.zeros(len(drafts), np.bool_)
@@ -128,7 +128,7 @@ def _decode(
         scores = logits.double().cpu().numpy()
         if rng is not None:
             scores += temperature * rng.gumbel(size=scores.shape)
-        if acceptor is None:
+        if mask is None:
             tokens = scores.argmax(axis=1)
         else:
             kept = np.full(len(drafts), NO_TOKEN)
@@ -140,7 +140,7 @@ def _decode(
                     scores[row, list(draft.banned)] = -np.inf
                 if draft.acyclic:
                     scores[row, scores.shape[1] - cycles :] = -np.inf
-            tokens = acceptor.choose(scores, kept)
+            tokens = mask.choose(scores, kept)
             dead |= (tokens == NO_TOKEN) & ~ended
         tokens[dead | ended] = END_TOKEN
         for row in np.flatnonzero(~dead & ~ended).tolist():
@@ -149,7 +149,7 @@ def _decode(
         ended |= (tokens == END_TOKEN) & ~dead
         if (ended | dead).all():
             break
-        if acceptor is not None:
-            acceptor.take(tokens)
+        if mask is not None:
+            mask.take(tokens)
         before = torch.from_numpy(tokens).to(device)
     return list(ended)

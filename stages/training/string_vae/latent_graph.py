@@ -40,7 +40,7 @@ class PathFigures:
 
 
 def search_graph(points: npt.NDArray[np.float32], graphs: Sequence[str], histograms: Histograms) -> csr_matrix:
-    """Return the search graph: strings are joined to the nearest in latent space, and to all of the same graph.
+    """Return the search graph: strings are joined to the nearest in latent space, and to those of the same graph.
 
     points: float32 (n, latent).
     graphs: an identifier of each string's graph.
@@ -64,7 +64,7 @@ def path_figures(graph: csr_matrix) -> PathFigures:
 
 
 def interpolation(graph: csr_matrix, first: int, second: int) -> list[int]:
-    """Return the nodes of a shortest path with both ends, or an empty list where there is none."""
+    """Return the nodes of a shortest path with both ends, or an empty list."""
     lengths, before = dijkstra(graph, directed=False, indices=first, return_predecessors=True)
     if not np.isfinite(lengths[second]):
         return []

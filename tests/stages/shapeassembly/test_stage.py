@@ -36,7 +36,7 @@ REASONS = {
     "binary.txt": "syntax",
     "circle.txt": "too deep",
     "outside.txt": "reaches out of the bounding box",
-    "again.txt": "program is there already",
+    "again.txt": "duplicate program",
     "empty.txt": "number of parts",
 }
 
@@ -133,7 +133,7 @@ def test_an_archive_is_read_like_a_folder(folder: Path, tmp_path: Path) -> None:
 
 def test_edits_of_a_program_are_samples_of_its_split_that_name_it(folder: Path, tmp_path: Path) -> None:
     splits = {"shards": 1, "val": 0.2, "test": 0.2}
-    entry = {"name": "good", "path": str(EXAMPLES[0].parent.resolve()), "edits": 3, "spread": 0.1}
+    entry = {"name": "good", "path": str(EXAMPLES[0].parent.resolve()), "edits": 3, "log_std": 0.1}
     code, printed, out = make(tmp_path, {"programs": [entry], "splits": splits, "accept": "valid"})
     assert code == 0, printed
     found = [sample for shard in samples(out).values() for sample in shard]

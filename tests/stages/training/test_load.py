@@ -117,7 +117,7 @@ def dreamt(folder: Path, out: Path, model: str, asked: tuple[int, ...]) -> None:
     """What a model writes becomes samples, the same ones however they are shared out among shards and workers."""
     source = {"name": "stool", "dataset": "toy", "model": model, "kit": "furniture", "samples": 12}
     sections = {
-        "shapeassembly": {"sampled": [source], "overflow": 100, "splits": {"shards": 1}},
+        "shapeassembly": {"sampled": [source], "max_overflow": 100, "splits": {"shards": 1}},
         "program_sampling": {"programs_per_shard": 5},
     }
     config = folder / "dreamt.yaml"

@@ -1,4 +1,4 @@
-"""Hierarchies read in a process of their own, which may take so much and no more: a file may be anybody's."""
+"""Read hierarchies in a child process with limited resources: files may come from anybody."""
 
 from __future__ import annotations
 
@@ -20,52 +20,54 @@ MAX_MEMORY_MB = 4000
 
 
 def read_in_child(read: Callable[[Path], PartHierarchy], path: Path) -> PartHierarchy:
-    """What `read` makes of the file `path`, in a child process. Raises Rejected, naming the file, where `read` does,
-    and for a file that takes more than it may."""
-    said = json.loads(_content(lambda: json.dumps(_said(read(path))).encode(), path))
-    return PartHierarchy(said["name"], _part(said["root"]))
+    """Read a file in a child process.
+
+    Raises Rejected, naming the file, where `read` does, and for a file that exceeds the limits.
+    """
+    tree = json.loads(_content(lambda: json.dumps(_as_json(read(path))).encode(), path))
+    return PartHierarchy(tree["name"], _part(tree["root"]))
 
 
 def read_grass_in_child(path: Path) -> GrassFile:
-    """`read_grass`, in a child process. Raises Rejected as it does, and for a file that takes more than it may."""
+    """Run `read_grass` in a child process. Raises Rejected as it does, and for a file that exceeds the limits."""
 
     def arrays() -> bytes:
-        found = read_grass(path)
+        file = read_grass(path)
         stream = io.BytesIO()
-        np.savez(stream, boxes=found.boxes, offsets=found.offsets)
+        np.savez(stream, boxes=file.boxes, offsets=file.offsets)
         return stream.getvalue()
 
     with np.load(io.BytesIO(_content(arrays, path)), allow_pickle=False) as stored:
         return GrassFile(path.stem, stored["boxes"], stored["offsets"])
 
 
-class _Refused(Exception):
-    """What a reader rejects, on its way out of the child."""
+class _ChildRejected(Exception):
+    """A rejection of a reader, on its way out of the child."""
 
 
 def _content(work: Callable[[], bytes], path: Path) -> bytes:
-    def told() -> bytes:
+    def run() -> bytes:
         try:
             return work()
         except Rejected as error:
-            raise _Refused(json.dumps([error.reason, error.detail])) from None
+            raise _ChildRejected(json.dumps([error.reason, error.detail])) from None
 
     try:
-        return in_child(told, cpu_seconds=MAX_CPU_SECONDS, memory_mb=MAX_MEMORY_MB, refusal=_Refused)
-    except _Refused as error:
+        return in_child(run, cpu_seconds=MAX_CPU_SECONDS, memory_mb=MAX_MEMORY_MB, refusal=_ChildRejected)
+    except _ChildRejected as error:
         raise Rejected(*json.loads(str(error))) from None
     except ChildFailed as error:
         raise Rejected(UNREADABLE, f"{path.name}: cannot be read: {error}; export it again, simpler") from None
 
 
-def _said(hierarchy: PartHierarchy) -> dict[str, Any]:
-    def part(each: PartNode) -> list[Any]:
-        box = each.box
-        return [each.label, box.center.tolist(), box.size.tolist(), box.axes.tolist(), [*map(part, each.children)]]
+def _as_json(hierarchy: PartHierarchy) -> dict[str, Any]:
+    def part(node: PartNode) -> list[Any]:
+        box = node.box
+        return [node.label, box.center.tolist(), box.size.tolist(), box.axes.tolist(), [*map(part, node.children)]]
 
     return {"name": hierarchy.name, "root": part(hierarchy.root)}
 
 
-def _part(said: list[Any]) -> PartNode:
-    label, center, size, axes, children = said
+def _part(fields: list[Any]) -> PartNode:
+    label, center, size, axes, children = fields
     return PartNode(label, Box(np.array(center), np.array(size), np.array(axes)), tuple(map(_part, children)))

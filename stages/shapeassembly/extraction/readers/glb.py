@@ -1,4 +1,4 @@
-"""Reads part hierarchies from the scene graph of a GLB file: nodes are parts, meshes give their boxes."""
+"""Read part hierarchies from the scene graph of a GLB file: nodes are parts, meshes give their boxes."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
 _Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 _NUMBER = re.compile(r"[.~_]\d+$")
-"""What exporters add to tell nodes of one name apart."""
+"""Suffix by which exporters distinguish nodes of one name."""
 
 
 def read_glb(path: Path, up: Literal["y", "z"]) -> PartHierarchy:
-    """The hierarchy of the scene graph of `path`: each node that has a mesh is a leaf with the smallest box.
+    """Return the hierarchy of the scene graph: each node with a mesh is a leaf with the smallest box.
 
-    up: the axis that points up in the file; the hierarchy is y up. The label of a part is its node's name without
-    the path before it and the number after it. Raises Rejected, naming the file, for what is no GLB or has no mesh.
-    Nothing outside the file is read.
+    up: the axis that points up in the file; the hierarchy is y up.
+    The label of a part is its node's name without path and trailing number. Nothing outside the file is read. Raises
+    Rejected, naming the file, for an invalid GLB and for one without meshes.
     """
     import trimesh
 
@@ -41,21 +41,21 @@ def read_glb(path: Path, up: Literal["y", "z"]) -> PartHierarchy:
     except Exception:  # trimesh lets through whatever a malformed file makes numpy and json raise
         raise Rejected(UNREADABLE, f"{path.name}: not a whole GLB file; check it with a glTF validator") from None
     rotation = _Z_UP_TO_Y_UP if up == "z" else np.eye(3)
-    found = _part(scene, children, root, rotation, path.name, 0)
-    if found is None:
+    result = _part(scene, children, root, rotation, path.name, 0)
+    if result is None:
         raise Rejected(UNREADABLE, f"{path.name}: no node has a mesh; export the meshes with the scene")
-    return PartHierarchy(path.stem, check_limits(found[0], path.name))
+    return PartHierarchy(path.stem, check_limits(result[0], path.name))
 
 
 def _part(
     scene: Any, tree: Any, node: str, rotation: FloatArray, place: str, depth: int
 ) -> tuple[PartNode, FloatArray] | None:
-    """The part of a node and its points, float64 (n, 3) y up; None where no mesh is below it."""
+    """Return the part of a node and its points, float64 (n, 3) y up; None where no mesh is below it."""
     if depth > MAX_HIERARCHY_DEPTH:
         raise Rejected(UNREADABLE, f"{place}: more than {MAX_HIERARCHY_DEPTH} levels; simplify the scene")
     label = _NUMBER.sub("", node.rsplit("/", 1)[-1]) or "part"
-    found = [_part(scene, tree, child, rotation, place, depth + 1) for child in sorted(tree.get(node, []))]
-    below = [each for each in found if each is not None]
+    results = [_part(scene, tree, child, rotation, place, depth + 1) for child in sorted(tree.get(node, []))]
+    below = [result for result in results if result is not None]
     matrix, geometry = scene.graph.get(node)
     if geometry is not None:
         vertices = np.asarray(scene.geometry[geometry].vertices, dtype=np.float64)
@@ -67,5 +67,5 @@ def _part(
             return below[0]
     if not below:
         return None
-    points = np.concatenate([each for _, each in below])
+    points = np.concatenate([result for _, result in below])
     return PartNode(label, minimum_box(points), tuple(part for part, _ in below)), points

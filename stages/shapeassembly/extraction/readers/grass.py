@@ -1,4 +1,4 @@
-"""Reads the boxes of GRASS shapes from an npz file: flat hierarchies without labels."""
+"""Read the boxes of GRASS shapes from an npz file: flat hierarchies without labels."""
 
 from __future__ import annotations
 
@@ -21,8 +21,11 @@ from stages.shapeassembly.extraction.hierarchy import (
 
 @dataclass(frozen=True)
 class GrassFile:
-    """The shapes of one file. boxes: float64 (n, 12), rows of centre, three lengths and the directions of the first
-    two, with symmetric copies; offsets: int64 (k + 1,), slices the rows by shape."""
+    """The shapes of one file.
+
+    boxes: float64 (n, 12), centre, three lengths and the directions of the first two, symmetric copies included.
+    offsets: int64 (k + 1,), slices the rows by shape.
+    """
 
     name: str
     boxes: FloatArray
@@ -32,9 +35,9 @@ class GrassFile:
         return len(self.offsets) - 1
 
     def shape(self, index: int) -> PartHierarchy:
-        """Shape `index`, named by its place in the file: a root with a leaf for each box.
+        """Return shape `index`, named by its place in the file: a root with a leaf for each box.
 
-        Raises Rejected, naming the row, for a box that is none.
+        Raises Rejected, naming the row, for an invalid box.
         """
         name = f"{self.name}_{index:05d}"
         rows = range(int(self.offsets[index]), int(self.offsets[index + 1]))
@@ -45,7 +48,7 @@ class GrassFile:
 
 
 def read_grass(path: Path) -> GrassFile:
-    """The file `path`, which holds `full_boxes` and `full_offsets`. Raises Rejected for other contents."""
+    """Read a file with `full_boxes` and `full_offsets`. Raises Rejected for other contents."""
     try:
         with np.load(path, allow_pickle=False) as arrays:
             boxes, offsets = arrays["full_boxes"].astype(np.float64), arrays["full_offsets"].astype(np.int64)

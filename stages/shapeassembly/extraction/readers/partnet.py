@@ -1,4 +1,4 @@
-"""Reads PartNet shapes: `result_after_merging.json` with the meshes of the parts in `objs/` beside it."""
+"""Read PartNet shapes: `result_after_merging.json` with the meshes of the parts in `objs/`."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
 
 
 def read_partnet(path: Path) -> PartHierarchy:
-    """The hierarchy of the PartNet file `path`, named by its folder; a part's box is the smallest around its meshes.
+    """Return the hierarchy of a PartNet file, named by its folder; a part's box is the smallest around its meshes.
 
-    The file is a list with one tree of `{"name", "children"}` nodes; a leaf names its meshes in `objs`, found as
-    `objs/<name>.obj` beside the file. Raises Rejected, naming file and part, for what is not so.
+    The file is a list with one tree of `{"name", "children"}` nodes; a leaf names its meshes in `objs`, the files
+    `objs/<name>.obj` in the same folder. Raises Rejected, naming file and part, for anything else.
     """
     try:
         trees = json.loads(path.read_text(encoding="utf-8"))
@@ -38,7 +38,7 @@ def read_partnet(path: Path) -> PartHierarchy:
 
 
 def _part(node: Any, folder: Path, place: str, depth: int) -> tuple[PartNode, FloatArray]:
-    """A part and the points of its meshes, float64 (n, 3)."""
+    """Return a part and the points of its meshes, float64 (n, 3)."""
     if depth > MAX_HIERARCHY_DEPTH or not isinstance(node, dict):
         raise Rejected(UNREADABLE, f"{place}: a part is an object, at most {MAX_HIERARCHY_DEPTH} levels deep")
     label = node.get("name")
@@ -50,7 +50,7 @@ def _part(node: Any, folder: Path, place: str, depth: int) -> tuple[PartNode, Fl
         raise Rejected(UNREADABLE, f"{here}: `children` and `objs` are lists")
     if children:
         parts = [_part(child, folder, here, depth + 1) for child in children]
-        points = np.concatenate([each for _, each in parts])
+        points = np.concatenate([part_points for _, part_points in parts])
         return PartNode(label, minimum_box(points), tuple(part for part, _ in parts)), points
     if not meshes:
         raise Rejected(UNREADABLE, f"{here}: a leaf names its meshes in `objs`")
@@ -59,7 +59,7 @@ def _part(node: Any, folder: Path, place: str, depth: int) -> tuple[PartNode, Fl
 
 
 def _points(mesh: Any, folder: Path, place: str) -> FloatArray:
-    """The vertices of one OBJ file, float64 (n, 3)."""
+    """Return the vertices of one OBJ file, float64 (n, 3)."""
     if not isinstance(mesh, str) or not mesh or set(mesh) & set("/\\\0") or mesh in {".", ".."}:
         raise Rejected(UNREADABLE, f"{place}: a mesh is named by a file of `objs`, without a folder: {mesh!r}")
     path = folder / f"{mesh}.obj"

@@ -1,4 +1,4 @@
-"""Part hierarchies of a folder or a file, by place in their order: what a config names, what a shard reads."""
+"""Part hierarchies of a folder or a file, by index: what a config names, and a shard reads."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Literal
 
 from pipeline.errors import Rejected
-from pipeline.paths import file_digest
 from stages.shapeassembly.extraction.hierarchy import PartHierarchy
 from stages.shapeassembly.extraction.readers.child_process import read_grass_in_child, read_in_child
 from stages.shapeassembly.extraction.readers.glb import read_glb
 from stages.shapeassembly.extraction.readers.grass import GrassFile
 from stages.shapeassembly.extraction.readers.partnet import read_partnet
 from stages.shapeassembly.extraction.readers.structurenet import read_structurenet
+from stages.shapeassembly.sources import cached_digest
 
 HierarchyKind = Literal["structurenet", "partnet", "grass", "glb"]
 
@@ -25,15 +25,18 @@ _PATTERNS = {"structurenet": "*.json", "partnet": "result_after_merging.json", "
 
 @dataclass(frozen=True)
 class HierarchySource:
-    """Where hierarchies are. path: a folder, or one file; of `grass` an npz file with many shapes.
-    up: the axis that points up in `glb` files; the other kinds are y up."""
+    """A folder or file of hierarchies.
+
+    path: a folder, or one file; for `grass` an npz file with many shapes.
+    up: the axis that points up in `glb` files; other kinds are y up.
+    """
 
     path: Path
     kind: HierarchyKind
     up: Literal["y", "z"]
 
     def __len__(self) -> int:
-        """How many hierarchies there are, those that cannot be read included; of an unreadable npz file one."""
+        """Return the number of hierarchies, unreadable ones included; an unreadable npz file counts as one."""
         if self.kind != "grass":
             return len(self._files())
         try:
@@ -42,30 +45,28 @@ class HierarchySource:
             return 1
 
     def read(self, first: int, last: int) -> Iterator[tuple[str, PartHierarchy | Rejected]]:
-        """Hierarchies `first` to before `last`: the name of each below the path, and what was read or why not."""
+        """Yield hierarchies `first` to before `last`: name below the path, and the hierarchy or why it was rejected."""
         files = () if self.kind == "grass" else self._files()
-        for place in range(first, last):
-            name = self._name(files[place]) if files else f"{self.path.name}/{place:05d}"
+        for index in range(first, last):
+            name = self._name(files[index]) if files else f"{self.path.name}/{index:05d}"
             try:
-                yield name, self._read(files[place]) if files else self._grass().shape(place)
+                yield name, self._read(files[index]) if files else self._grass().shape(index)
             except Rejected as error:
                 yield name, error
 
     def digest(self, first: int, last: int) -> str:
-        """Hex sha256 of the names and bytes of what `read` reads."""
+        """Return the hex sha256 of names and bytes of what `read` reads."""
         digest = hashlib.sha256()
         for file in (self.path,) if self.kind == "grass" else self._files()[first:last]:
             meshes = sorted((file.parent / "objs").glob("*.obj")) if self.kind == "partnet" else []
-            for each in (file, *meshes):
-                state = each.stat()
-                known = _known_digest(each, state.st_mtime_ns, state.st_size)
-                digest.update(f"{self._name(each)}\0{known}\n".encode())
+            for part in (file, *meshes):
+                digest.update(f"{self._name(part)}\0{cached_digest(part)}\n".encode())
         return digest.hexdigest()
 
     def _files(self) -> Sequence[Path]:
         if self.path.is_file():
             return (self.path,)
-        files = [each for each in self.path.rglob(_PATTERNS[self.kind]) if each.is_file() and not each.is_symlink()]
+        files = [file for file in self.path.rglob(_PATTERNS[self.kind]) if file.is_file() and not file.is_symlink()]
         return sorted(files, key=self._name)
 
     def _name(self, file: Path) -> str:
@@ -78,12 +79,6 @@ class HierarchySource:
     def _read(self, file: Path) -> PartHierarchy:
         readers = {"structurenet": read_structurenet, "partnet": read_partnet}
         return read_in_child(readers.get(self.kind, lambda path: read_glb(path, self.up)), file)
-
-
-@lru_cache(maxsize=65536)
-def _known_digest(file: Path, modified: int, size: int) -> str:
-    """`file_digest`, asked once for each state of a file: a plan is made often."""
-    return file_digest(file)
 
 
 @lru_cache(maxsize=4)

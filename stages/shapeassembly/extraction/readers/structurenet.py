@@ -1,4 +1,4 @@
-"""Reads part hierarchies in StructureNet's JSON: nested `{"label", "box": [12 numbers], "children"}`."""
+"""Read part hierarchies in StructureNet's JSON: nested `{"label", "box": [12 numbers], "children"}`."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from stages.shapeassembly.extraction.hierarchy import (
 
 
 def read_structurenet(path: Path) -> PartHierarchy:
-    """The hierarchy in the StructureNet file `path`; a box is centre, size, x axis, y axis.
+    """Return the hierarchy of a StructureNet file; a box is centre, size, x axis, y axis.
 
-    Raises Rejected, naming file and part, for what is no such hierarchy. Relations (`edges`) are not read: the
-    extraction finds contacts and symmetries in the geometry itself (shapeassembly App. C).
+    Relations (`edges`) are not read: contacts and symmetries are found in the geometry (shapeassembly App. C). Raises
+    Rejected, naming file and part, for an invalid hierarchy.
     """
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from stages.shapeassembly import parse
 from stages.shapeassembly.analysis.edit_distance import edit_distance
-from stages.shapeassembly.analysis.figures import cluster_figure
 from stages.shapeassembly.analysis.statistics import cluster_curve, program_statistics
 from stages.shapeassembly.analysis.structure import block_signatures, program_distance, signature, tokens
 from stages.shapeassembly.execution.parameters import parameters, with_parameters
@@ -72,10 +71,3 @@ def test_statistics_and_clusters_of_few_programs() -> None:
     assert (found.programs, found.lines, found.leaf_parts) == (2, 4.5, 1.0)
     assert (found.reflects, found.translates, found.squeezes, found.macros) == (1 / 9, 1 / 9, 1 / 9, 3 / 9)
     assert cluster_curve("abbcbc").tolist() == [0.5, 5 / 6, 1.0]
-
-
-def test_the_figure_of_clusters_is_a_picture_and_the_same_each_time() -> None:
-    programs = {"toy": [parse(TEXT), parse(TEXT), parse("Assembly E { bbox = Cuboid(1.0, 1.0, 1.0, True) }")]}
-    picture = cluster_figure(programs)
-    assert picture.startswith(b"\x89PNG")
-    assert cluster_figure(programs) == picture

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from stages.shapeassembly import execute, parse
 from stages.shapeassembly.analysis.structure import signature
-from stages.shapeassembly.editing.edits import edited
+from stages.shapeassembly.editing.edits import edit_program
 from stages.shapeassembly.syntax.printer import print_program
 from stages.shapeassembly.syntax.program import AssemblyProgram, Attach, Cuboid, Squeeze
 from tests.stages.shapeassembly.strategies import programs
@@ -32,15 +32,15 @@ def numbers(program: AssemblyProgram) -> list[tuple[float, ...]]:
 
 @given(programs(), st.integers(0, 99))
 def test_an_edit_is_a_program_of_the_same_structure(program: AssemblyProgram, seed: int) -> None:
-    made = edited(program, 0.3, np.random.default_rng(seed))
+    made = edit_program(program, 0.3, np.random.default_rng(seed))
     assert signature(made) == signature(program)
     assert parse(print_program(made)) == made
-    assert edited(program, 0.3, np.random.default_rng(seed)) == made
+    assert edit_program(program, 0.3, np.random.default_rng(seed)) == made
 
 
 @given(programs(), st.integers(0, 99))
 def test_sizes_keep_their_order_and_places_their_side(program: AssemblyProgram, seed: int) -> None:
-    made = edited(program, 0.3, np.random.default_rng(seed))
+    made = edit_program(program, 0.3, np.random.default_rng(seed))
 
     def sizes(of: AssemblyProgram, axis: int) -> list[float]:
         return [line.dims[axis] for block in of.blocks for line in (block.bbox, *block.cuboids)]
@@ -64,8 +64,8 @@ def test_a_wider_spread_changes_more() -> None:
     program = parse(f"Assembly P {{ {lines} }}")
 
     def change(spread: float) -> float:
-        made = [edited(program, spread, np.random.default_rng(seed)) for seed in range(50)]
+        made = [edit_program(program, spread, np.random.default_rng(seed)) for seed in range(50)]
         return float(np.mean([abs(np.log(each.root.bbox.dims[0])) for each in made]))
 
     assert 0.5 * 0.05 < change(0.05) < change(0.2) < change(0.5)
-    assert len(execute(edited(program, 0.5, np.random.default_rng(1)))) == 1
+    assert len(execute(edit_program(program, 0.5, np.random.default_rng(1)))) == 1

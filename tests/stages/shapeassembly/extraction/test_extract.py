@@ -61,12 +61,12 @@ def test_table_is_a_top_on_two_legs_and_their_reflections() -> None:
 
 def test_program_makes_the_boxes_of_the_input() -> None:
     extraction = extracted(table())
-    assert covers(extraction.made, extraction.wanted)
+    assert covers(extraction.boxes, extraction.input_boxes)
     assert extraction.f_score == 100
     assert extraction.leaves == 3
     assert extraction.overflow == pytest.approx(0, abs=1e-3)
     again = execution_boxes(execute(parse(print_program(extraction.program))))
-    assert covers(again, extraction.wanted)
+    assert covers(again, extraction.input_boxes)
 
 
 def test_slats_at_equal_distances_are_translated() -> None:
@@ -85,7 +85,7 @@ def test_slats_at_unequal_distances_are_not_one_row() -> None:
     slats = [leaf("slat", (x, 0, 0), (0.1, 0.8, 0.05)) for x in (-0.9, -0.3, 0.1, 0.75)]
     shape = hierarchy(*rails, *slats)
     assert not any("translate" in line and ", 1, " not in line for line in lines(shape))
-    assert covers(extracted(shape).made, extracted(shape).wanted)
+    assert covers(extracted(shape).boxes, extracted(shape).input_boxes)
 
 
 def test_shelf_between_two_sides_is_squeezed() -> None:
@@ -103,7 +103,7 @@ def test_sides_that_stand_on_two_feet_each_become_a_sub_program() -> None:
     root, frame_block = extraction.program.blocks
     assert [cuboid.name for cuboid in root.cuboids] == ["Program_1", "cube1"]
     assert len(frame_block.cuboids) == 2, "two posts are one and its reflection"
-    assert covers(extraction.made, extraction.wanted)
+    assert covers(extraction.boxes, extraction.input_boxes)
 
 
 def test_hierarchy_of_the_input_becomes_sub_programs_numbered_level_by_level() -> None:
@@ -132,7 +132,7 @@ def test_members_of_a_group_are_attached_alike() -> None:
 
 def test_steps_of_cleaning_can_be_left_out() -> None:
     deep = hierarchy(*(leaf("post", (x, 0.02, 0), (0.1, 1.04, 0.1)) for x in (-0.9, 0.9)), BEAM)
-    gates = Gates(min_leaves=1, f_score=0)
+    gates = Gates(min_leaves=1, min_f_score=0)
     assert extract(deep, CATEGORY_RULES["any"], gates).program.root.cuboids[0].dims[1] == 1.0
     assert extract(deep, CATEGORY_RULES["any"], gates, Cleaning(shorten=False)).program.root.cuboids[0].dims[1] == 1.04
     alone = extract(deep, CATEGORY_RULES["any"], gates, Cleaning(group=False)).program
@@ -151,7 +151,7 @@ def test_tilted_back_between_seat_and_top_is_where_it_was(axis: int, degrees: fl
     axes = turned(axis, degrees)
     back = leaf("back", tuple(np.array([0, -0.42, -0.2]) + 0.6 * axes[1]), (0.6, 1.2, 0.1), axes)
     extraction = extracted(hierarchy(seat, legs, back))
-    assert covers(extraction.made, extraction.wanted, 0.02)
+    assert covers(extraction.boxes, extraction.input_boxes, 0.02)
 
 
 def test_mirrored_tilted_parts_are_reflected() -> None:
@@ -159,7 +159,7 @@ def test_mirrored_tilted_parts_are_reflected() -> None:
     legs = [leaf("leg", (sign * 0.8, 0, 0), (0.1, 0.98, 0.6), turned(2, sign * 12)) for sign in (-1, 1)]
     extraction = extracted(hierarchy(top, *legs), Gates(min_leaves=2))
     assert print_program(extraction.program).count("reflect(") == 1
-    assert covers(extraction.made, extraction.wanted, 0.05), "shortened where they are sunk in the top"
+    assert covers(extraction.boxes, extraction.input_boxes, 0.05), "shortened where they are sunk in the top"
 
 
 @settings(max_examples=25, deadline=None)
@@ -182,7 +182,7 @@ def test_size_and_place_of_a_shape_come_back(scale: float, move: tuple[float, fl
     wanted = [Box(part.box.center, part.box.size, part.box.axes) for part in parts]
     made = [
         Box(extraction.center + extraction.scale * box.center, extraction.scale * box.size, box.axes)
-        for box in extraction.made
+        for box in extraction.boxes
     ]
     assert covers(made, wanted, 0.005 * scale)
 
@@ -226,7 +226,7 @@ def test_fit_below_the_gate_is_refused() -> None:
     other = leaf("other", (0.3, -0.2, 0.8), (0.3, 0.6, 0.6))
     board = leaf("board", (0, 0.55, 0), (3, 0.1, 0.3), turned(1, 45))
     with pytest.raises(Rejected, match="poor fit"):
-        extracted(hierarchy(block, other, board), Gates(f_score=99.9, distance=0.001))
+        extracted(hierarchy(block, other, board), Gates(min_f_score=99.9, distance=0.001))
 
 
 @pytest.mark.parametrize(
@@ -244,7 +244,7 @@ def test_fit_below_the_gate_is_refused() -> None:
 )
 def test_boxes_of_odd_kinds_are_kept(parts: list[PartNode]) -> None:
     extraction = extracted(hierarchy(*parts))
-    assert covers(extraction.made, extraction.wanted, 0.02)
+    assert covers(extraction.boxes, extraction.input_boxes, 0.02)
 
 
 def test_ring_of_parts_is_closed_and_well_made() -> None:
@@ -255,7 +255,7 @@ def test_ring_of_parts_is_closed_and_well_made() -> None:
         leaf("w", (-0.9, 0.1, 0), (0.2, 0.6, 1.6)),
     ]
     extraction = extracted(hierarchy(*ring))
-    assert covers(extraction.made, extraction.wanted)
+    assert covers(extraction.boxes, extraction.input_boxes)
     assert violations(extraction.program) == []
 
 
@@ -264,7 +264,7 @@ def test_labels_order_the_lines_of_a_known_category() -> None:
     back = leaf("chair_back", (0, 0.1, -0.45), (0.9, 0.8, 0.1))
     base = leaf("chair_base", (0, 0.6, 0), (0.3, 0.2, 0.2))
     holder = leaf("chair_head", (0, 0.55, -0.3), (0.3, 0.1, 0.4))
-    program = extract(hierarchy(back, holder, seat, base), CATEGORY_RULES["chair"], Gates(f_score=0)).program
+    program = extract(hierarchy(back, holder, seat, base), CATEGORY_RULES["chair"], Gates(min_f_score=0)).program
     assert [cuboid.dims[0] for cuboid in program.root.cuboids] == [0.3, 1.0, 0.9, 0.3]
 
 

@@ -115,7 +115,7 @@ def test_a_mistake_is_shown_with_a_caret() -> None:
     with pytest.raises(ProgramError) as caught:
         parse(HEAD + "\treflect(cube0, W)\n}")
     assert str(caught.value).splitlines() == [
-        "line 3, column 17: syntax: 'W' stands where an axis, one of X, Y, Z is expected",
+        "line 3, column 17: syntax: 'W' found where an axis, one of X, Y, Z is expected",
         " reflect(cube0, W)",
         " " * 16 + "^",
     ]

@@ -65,5 +65,5 @@ def test_it_learns_what_a_stool_is(tmp_path: Path) -> None:
 def test_a_program_that_is_not_there_is_told_before_anything_starts() -> None:
     with pytest.raises(ConfigError, match="did you mean chair"):
         STAGE.check(config(programs=["chari"]))
-    with pytest.raises(ConfigError, match="it learns from programs, and there are none"):
+    with pytest.raises(ConfigError, match="it learns from programs, but the config has no program"):
         STAGE.check(config(program=""))
