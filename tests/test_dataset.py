@@ -15,7 +15,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from eval.__main__ import main as evaluate
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_files import load_kit
 from stages.shape.sample import read_samples
@@ -117,15 +116,16 @@ def test_a_kill_in_each_stage_and_another_go_make_the_same_folder(made: tuple[Pa
 
 
 def test_every_table_about_kits_can_be_made_of_it_and_stands_in_the_report(
-    made: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    made: tuple[Path, Path], tmp_path: Path
 ) -> None:
     config, one = made
     for name in ("small", ".work"):
         (tmp_path / name).symlink_to(one / name)
     asked = ["--config", str(config), "--out", str(tmp_path)]
-    few = ["--most", "6", "--dry", "0", "--similar", "2", "--probes", "200"]
-    assert evaluate(["all", *asked, *few]) == 0, capsys.readouterr()
-    about_kits = {"compression", "corpora", "growth", "near_twins", "physical"}
+    few = [f"--set={option}" for option in ("max_shapes=6", "dry_shapes=0", "probes=200")]
+    code, printed = shapemill("eval", "all", *asked, *few)
+    assert code == 0, printed
+    about_kits = {"compression", "corpora", "growth", "near_duplicates", "physical"}
     results = tmp_path / "small-eval"
     assert about_kits <= {path.stem for path in results.glob("*.csv")}
     header, *rows = csv.reader((results / "compression.csv").open())

@@ -96,6 +96,7 @@ def test_a_table_of_theirs_is_found_and_stands_in_the_report(made: tuple[Path, s
     command = [
         sys.executable,
         "-m",
+        "pipeline",
         "eval",
         "all",
         "--config",
@@ -103,12 +104,14 @@ def test_a_table_of_theirs_is_found_and_stands_in_the_report(made: tuple[Path, s
         "--out",
         str(made[0]),
     ]
-    done = subprocess.run([*command, "--dry", "0"], cwd=ROOT, env=environment, capture_output=True, text=True)
+    done = subprocess.run(
+        [*command, "--set", "dry_shapes=0"], cwd=ROOT, env=environment, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     results = made[0] / "heaps-eval"
     assert "highest" in (results / "heights.csv").read_text()
     report = (results / "report.html").read_text()
-    for said in ("How high are they?", "near-twins %", "How large a push they bear", "data:image/png;base64"):
+    for said in ("How high are the shapes?", "duplicates %", "Stability under a push", "data:image/png;base64"):
         assert said in report
 
 

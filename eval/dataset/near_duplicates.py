@@ -1,8 +1,8 @@
-"""Near-twins: shapes of val and test whose clouds are as near to a cloud of train as two samplings of one shape are.
+"""Near-duplicates: validation and test shapes as close to a training shape as two samplings of one shape are.
 
-The distance of two clouds is the symmetric mean chamfer distance, laid upon each other as well as may be: centroid on
-centroid, in the best of four quarter turns about the vertical, then moved a few times by the median step to the
-nearest points. It is told in units of the shape's own resampling distance: that of two independent clouds of it.
+Two clouds are aligned by their centroids, in the best of four quarter turns about the vertical, then moved a few times
+by the median step to the nearest points. Their distance is the symmetric mean Chamfer distance. Its unit is the
+resampling distance of the shape: that of two independent clouds of it.
 """
 
 from __future__ import annotations
@@ -22,104 +22,100 @@ from stages.points.area_sampling import sample_shape
 from stages.shape.arrays import BoolArray, FloatArray
 
 Clouds = Mapping[tuple[str, str], Sequence[tuple[FloatArray, FloatArray]]]
-"""By kit and split two independent clouds, float (n, 3), y up, of each shape."""
+"""By kit and split: two independent clouds, float (n, 3), y up, of each shape."""
 
-TWIN = 1.25
-"""A near-twin is at most so many resampling distances from a shape of train."""
-POINTS = 2048
-"""Points of a cloud."""
-COARSE = 256
-"""Points of the clouds by which those shapes of train are chosen that are looked at closely."""
-LOOKED_AT = 8
-"""So many shapes of train, each in one turn, are looked at closely for each shape."""
-STEPS = 3
-"""So many times two clouds are moved upon each other."""
+MAX_DUPLICATE_DISTANCE = 1.25
+"""In resampling distances."""
+POINTS_PER_CLOUD = 2048
+COARSE_POINTS = 256
+"""Points of a cloud by which candidates are chosen."""
+CANDIDATES_PER_SHAPE = 8
+ALIGNMENT_STEPS = 3
 
 _TURNS = [np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1))]
 
-COLUMNS = ("shapes of", "split", "shapes", "near-twins", "near-twins %", "least", "median")
+COLUMNS = ("shapes of", "split", "shapes", "duplicates", "duplicates %", "least", "median")
 
 NOTES = (
-    "Distances to the nearest shape of train, in resampling distances of the shape: symmetric mean chamfer distance of "
-    "clouds of equally many points, uniform by area, laid upon each other by their centroids, in the best of four "
-    f"quarter turns about the vertical, and moved {STEPS} times by the median step to the nearest points; 1 is the "
-    f"distance of two independent clouds of one shape. Near-twins: at most {TWIN:g}.",
+    "Distances to the nearest training shape: symmetric mean Chamfer distance of clouds sampled uniformly by area. "
+    "Clouds are aligned by their centroids, in the best of four quarter turns about the vertical, and moved "
+    f"{ALIGNMENT_STEPS} times by the median step to the nearest points. Unit: the distance of two independent clouds "
+    f"of one shape. Duplicates: at most {MAX_DUPLICATE_DISTANCE:g}.",
 )
 
 
 @dataclass(frozen=True)
-class Nearest:
-    """The nearest shape of train: its place there and its distance, in resampling distances of the shape asked for."""
+class NearestShape:
+    """The training shape nearest to a shape."""
 
-    place: int
+    index: int
+    """Among the training shapes of the kit."""
     distance: float
+    """In resampling distances of the shape."""
 
 
-def near_twins(nearest: Sequence[Nearest]) -> BoolArray:
-    """Which shapes are near-twins of their nearest in train, bool (n,)."""
-    return np.array([each.distance <= TWIN for each in nearest], dtype=np.bool_)
+def near_duplicates(nearest: Sequence[NearestShape]) -> BoolArray:
+    """Return which shapes are near-duplicates, bool (n,)."""
+    return np.array([shape.distance <= MAX_DUPLICATE_DISTANCE for shape in nearest], dtype=np.bool_)
 
 
 def dataset_clouds(folder: Path, seed: int) -> Clouds:
-    """The clouds of a finished dataset, of POINTS points, in its coordinates; 0.1 MB a shape.
+    """Sample the clouds of a finished dataset, POINTS_PER_CLOUD points each; 0.1 MB a shape.
 
-    Raises ConfigError where no dataset stands in `folder`.
+    Raises ConfigError if there is no dataset in `folder`.
     """
     clouds: dict[tuple[str, str], list[tuple[FloatArray, FloatArray]]] = {}
     for kit, split, key, shape in split_shapes(folder):
-        first, second = decision_rng(seed, "near_twins", key).spawn(2)
-        both = sample_shape(shape, POINTS, first).points, sample_shape(shape, POINTS, second).points
-        clouds.setdefault((kit, split), []).append(both)
+        pair = tuple(
+            sample_shape(shape, POINTS_PER_CLOUD, rng).points for rng in decision_rng(seed, "near_twins", key).spawn(2)
+        )
+        clouds.setdefault((kit, split), []).append((pair[0], pair[1]))
     return clouds
 
 
-def nearest_by_split(clouds: Clouds) -> dict[tuple[str, str], list[Nearest]]:
-    """By kit and split the nearest shape of train of each shape; for the splits but train of kits that have shapes
-    there."""
-    found = {}
-    for (kit, split), asked in clouds.items():
+def nearest_by_split(clouds: Clouds) -> dict[tuple[str, str], list[NearestShape]]:
+    """Return the nearest training shape of each validation and test shape, by kit and split."""
+    nearest = {}
+    for (kit, split), pairs in clouds.items():
         train = [first for first, _ in clouds.get((kit, "train"), ())]
-        if split != "train" and train and asked:
-            found[kit, split] = nearest_in_train(asked, train)
-    return found
+        if split != "train" and train and pairs:
+            nearest[kit, split] = nearest_in_train(pairs, train)
+    return nearest
 
 
-def near_twins_table(found: Mapping[tuple[str, str], Sequence[Nearest]]) -> Table:
-    """One row for each kit and split."""
+def near_duplicates_table(nearest: Mapping[tuple[str, str], Sequence[NearestShape]]) -> Table:
+    """Return one row for each kit and split."""
     rows = []
-    for (kit, split), nearest in found.items():
-        distances = [each.distance for each in nearest]
-        twins = int(near_twins(nearest).sum())
-        share = 100 * twins / len(nearest)
-        rows.append((kit, split, len(nearest), twins, share, min(distances), median(distances)))
-    return Table("Near-twins of train", COLUMNS, tuple(rows), NOTES)
+    for (kit, split), shapes in nearest.items():
+        distances = [shape.distance for shape in shapes]
+        duplicates = int(near_duplicates(shapes).sum())
+        share = 100 * duplicates / len(shapes)
+        rows.append((kit, split, len(shapes), duplicates, share, min(distances), median(distances)))
+    return Table("Near-duplicates of training shapes", COLUMNS, tuple(rows), NOTES)
 
 
-def nearest_in_train(asked: Sequence[tuple[FloatArray, FloatArray]], train: Sequence[FloatArray]) -> list[Nearest]:
-    """The nearest of `train`, clouds float (n, 3), for each shape of `asked`, two independent clouds of it.
+def nearest_in_train(pairs: Sequence[tuple[FloatArray, FloatArray]], train: Sequence[FloatArray]) -> list[NearestShape]:
+    """Return the nearest training shape for each shape.
 
-    The LOOKED_AT that are nearest by the first COARSE points of each cloud are looked at closely.
+    Only the CANDIDATES_PER_SHAPE nearest by the first COARSE_POINTS points are compared by all points.
+
+    pairs: two independent clouds of each shape, float (n, 3); train: a cloud of each training shape, float (n, 3).
     """
     centred = [_centred(cloud) for cloud in train]
-    coarse = np.array([cloud[:COARSE] for cloud in centred])
-    found = []
-    for first, second in asked:
-        unit = _mean_gap(_centred(first), np.asarray(second, np.float64) - np.mean(first, axis=0), steps=0)
+    coarse = np.array([cloud[:COARSE_POINTS] for cloud in centred])
+    nearest = []
+    for first, second in pairs:
+        unit = aligned_distance(_centred(first), np.asarray(second, np.float64) - np.mean(first, axis=0), steps=0)
         cloud = _centred(first)
-        gaps = np.array([_coarse_distances(cloud[:COARSE] @ turn.T, coarse) for turn in _TURNS])
+        gaps = np.array([_coarse_distances(cloud[:COARSE_POINTS] @ turn.T, coarse) for turn in _TURNS])
         turn_of, gap_of = gaps.argmin(axis=0), gaps.min(axis=0)
-        best = Nearest(-1, np.inf)
-        for other in np.argsort(gap_of, kind="stable")[:LOOKED_AT].tolist():
-            distance = _mean_gap(cloud @ _TURNS[turn_of[other]].T, centred[other], STEPS) / unit
-            best = min(best, Nearest(other, distance), key=lambda each: each.distance)
-        found.append(best)
-    return found
-
-
-def cloud_distance(first: FloatArray, second: FloatArray) -> float:
-    """The symmetric mean chamfer distance of two clouds float (n, 3), laid upon each other in the best quarter turn."""
-    a, b = _centred(first), _centred(second)
-    return min(_mean_gap(a @ turn.T, b, STEPS) for turn in _TURNS)
+        best = NearestShape(-1, np.inf)
+        for other in np.argsort(gap_of, kind="stable")[:CANDIDATES_PER_SHAPE].tolist():
+            turned = cloud @ _TURNS[turn_of[other]].T
+            candidate = NearestShape(other, aligned_distance(turned, centred[other], ALIGNMENT_STEPS) / unit)
+            best = min(best, candidate, key=lambda shape: shape.distance)
+        nearest.append(best)
+    return nearest
 
 
 def _centred(cloud: FloatArray) -> FloatArray:
@@ -128,9 +124,11 @@ def _centred(cloud: FloatArray) -> FloatArray:
     return centred
 
 
-def _mean_gap(first: FloatArray, second: FloatArray, steps: int) -> float:
-    """The least symmetric mean chamfer distance while `first` is moved so many times by the median of the steps between
-    nearest points: a median, so that where most of two shapes is the same, the rest does not push them apart."""
+def aligned_distance(first: FloatArray, second: FloatArray, steps: int) -> float:
+    """Return the least symmetric mean Chamfer distance while `first` moves by the median step between nearest points.
+
+    The median aligns what most of two shapes shares, whatever the rest is.
+    """
     from scipy.spatial import cKDTree
 
     of_first, of_second = cKDTree(first), cKDTree(second)
@@ -147,7 +145,7 @@ def _mean_gap(first: FloatArray, second: FloatArray, steps: int) -> float:
 
 @numba.njit(cache=True)
 def _coarse_distances(cloud, others):
-    """Symmetric mean chamfer distances of a cloud (n, 3) to each of `others` (k, n, 3), float64 (k,)."""
+    """Return symmetric mean Chamfer distances of a cloud (n, 3) to each of `others` (k, n, 3), float64 (k,)."""
     k, n = others.shape[:2]
     distances = np.empty(k)
     back = np.empty(n)

@@ -1,4 +1,4 @@
-"""The table of physical validity: does what a dataset holds stand, and what of it does not?"""
+"""Physical validity of shapes: rooted, stable, and how large a push they bear."""
 
 from __future__ import annotations
 
@@ -43,83 +43,84 @@ PUBLISHED = tuple(
         ("storage", "generated", 95.3, 83.7),
     )
 )
-"""Shapes of ShapeAssembly programs, real ones and those that its model generates."""
+"""Shapes of ShapeAssembly programs: real ones, and ones that its model generates."""
 
-PUSH = 0.1
-"""A push in weights, and so the tangent of a tilt: with it the shares of real shape programs are nearest to those that
-simulations find."""
+TILT_PUSH = 0.1
+"""In weights, the tangent of a tilt; the value whose shares of real shape programs are nearest to published ones."""
 
 NOTES = (
-    "Stable: connected parts are one rigid body that stands and bears a push of each part sideways and a twist. "
-    "Dropped: it is rooted, and after it has been let go and tilted as by a tenth of its weight its components rest as "
-    "high as before, within 2.5 %, which is what the simulations of shapeassembly ask. "
-    "Dry stable: as stable, with parts that only press and rub on each other where they touch. "
-    "Margin: median push, in weights, that rigid shapes bear (-1: does not stand). Tipping: median angle. "
-    "Pieces and floating parts: mean numbers. Overlap: volume in two parts; ground: area stood on, of the outline from "
-    "above; mirror: weight that an upright mirror maps to its like; means.",
+    "Stable: connected parts are one rigid body that bears a sideways push of each part and a twist. "
+    "Dropped: the shape is rooted, and its components keep their height, within 2.5 %, after a tilt that amounts to a "
+    "push of a tenth of its weight, as in the simulations of shapeassembly. "
+    "Dry stable: as stable, but parts only press and rub on each other where they touch. "
+    "Margin: median push, in weights, that rigid shapes bear; -1 for a shape that falls. Tipping: median angle. "
+    "Pieces and floating parts: mean numbers. Overlap: volume shared by two parts. Ground: support area as a share of "
+    "the outline from above. Mirror: weight that an upright mirror maps onto an equal part. All three are means.",
 )
 
 
 def judge_all(shapes: Sequence[Shape], config: PhysicsConfig) -> list[Validity]:
-    """The validity of each shape; shapes of one kit share what is found out about its parts."""
+    """Judge each shape; shapes of one kit share what is computed for its parts."""
     judges: dict[str, Judge] = {}
-    found = []
+    results = []
     for shape in shared_meshes(shapes):
         if shape.up not in judges:
             judges[shape.up] = Judge(shape.meshes, shape.up, config)
-        found.append(judges[shape.up].validity(shape.assembly))
-    return found
+        results.append(judges[shape.up].validity(shape.assembly))
+    return results
 
 
 def stays_up(shapes: Sequence[Shape], config: PhysicsConfig) -> list[bool]:
-    """Which shapes are rooted and rest as high as they were let go after a push of PUSH (shapeassembly App. E)."""
-    least = math.degrees(math.atan(PUSH))
-    return [Judge(shape.meshes, shape.up, config).tilt_to_fall(shape.assembly) > least for shape in shapes]
+    """Return which shapes are rooted and keep their height after a push of TILT_PUSH (shapeassembly App. E)."""
+    min_tilt = math.degrees(math.atan(TILT_PUSH))
+    return [Judge(shape.meshes, shape.up, config).tilt_to_fall(shape.assembly) > min_tilt for shape in shapes]
 
 
 @dataclass(frozen=True)
-class Judged:
-    """Shapes of one name, each with its validity as a rigid body."""
+class PhysicalResults:
+    """Shapes of one name, each with its validity as one rigid body."""
 
     shapes: Sequence[Shape]
     rigid: Sequence[Validity]
 
 
-def judged_by_name(named: Iterable[tuple[str, Shape]], config: PhysicsConfig) -> dict[str, Judged]:
-    """The shapes by their names, in order, judged as rigid bodies whatever `config.joints` says."""
+def judge_by_name(named: Iterable[tuple[str, Shape]], config: PhysicsConfig) -> dict[str, PhysicalResults]:
+    """Judge shapes as rigid bodies, whatever `config.joints` is, and group them by name."""
     groups: dict[str, list[Shape]] = {}
     for name, shape in named:
         groups.setdefault(name, []).append(shape)
     rigid = config.model_copy(update={"joints": "rigid"})
-    return {name: Judged(shapes, judge_all(shapes, rigid)) for name, shapes in groups.items()}
+    return {name: PhysicalResults(shapes, judge_all(shapes, rigid)) for name, shapes in groups.items()}
 
 
 def physical_table(
-    judged: Mapping[str, Judged], config: PhysicsConfig, most_dry: int, published: Sequence[ReferenceRow] = ()
+    results: Mapping[str, PhysicalResults],
+    config: PhysicsConfig,
+    dry_shapes: int,
+    published: Sequence[ReferenceRow] = (),
 ) -> Table:
-    """One row for each name. As dry blocks, which takes long, at most `most_dry` shapes of a name are judged, evenly
-    spread."""
-    rows = tuple(_row(name, each, config, most_dry) for name, each in judged.items())
+    """Return one row for each name. At most `dry_shapes` of its shapes, evenly spread, are judged as dry blocks."""
+    rows = tuple(_row(name, result, config, dry_shapes) for name, result in results.items())
     return Table("Physical validity", COLUMNS, rows, NOTES, published)
 
 
-def _row(name: str, judged: Judged, config: PhysicsConfig, most_dry: int) -> tuple[Cell, ...]:
-    shapes, rigid = judged.shapes, judged.rigid
-    tried = shapes[:: -(-len(shapes) // max(most_dry, 1))][:most_dry]
-    dry = judge_all(tried, config.model_copy(update={"joints": "dry"}))
+def _row(name: str, result: PhysicalResults, config: PhysicsConfig, dry_shapes: int) -> tuple[Cell, ...]:
+    shapes, rigid = result.shapes, result.rigid
+    subset = shapes[:: -(-len(shapes) // max(dry_shapes, 1))][:dry_shapes]
+    dry = judge_all(subset, config.model_copy(update={"joints": "dry"}))
     return (
         name,
         len(shapes),
         fmean(len(shape) for shape in shapes),
-        100 * fmean(each.rooted for each in rigid),
-        100 * fmean(each.stable for each in rigid),
+        100 * fmean(validity.rooted for validity in rigid),
+        100 * fmean(validity.stable for validity in rigid),
         100 * fmean(stays_up(shapes, config)),
-        100 * fmean(each.stable for each in dry) if dry else "",
-        median(each.margin for each in rigid),
-        median(each.tipping_degrees for each in rigid),
-        fmean(each.components for each in rigid),
-        fmean(each.floating for each in rigid),
-        100 * fmean(each.penetration for each in rigid),
-        100 * fmean(each.ground for each in rigid),
-        100 * fmean(each.symmetry for each in rigid),
+        100 * fmean(validity.stable for validity in dry) if dry else "",
+        median(validity.margin for validity in rigid),
+        median(validity.tipping_degrees for validity in rigid),
+        fmean(validity.components for validity in rigid),
+        fmean(validity.floating for validity in rigid),
+        100 * fmean(validity.penetration for validity in rigid),
+        100 * fmean(validity.ground for validity in rigid),
+        100 * fmean(validity.symmetry for validity in rigid),
     )

@@ -1,4 +1,4 @@
-"""What tables are about: a config, and whatever has been made of it so far."""
+"""A dataset as tables see it: its config, and what exists of it so far."""
 
 from __future__ import annotations
 
@@ -17,10 +17,13 @@ from stages.package.layout import MANIFEST
 
 @dataclass(frozen=True)
 class DatasetRun:
-    """config: the dataset's; out: the folder that datasets are made in."""
+    """The config of a dataset, and where the dataset is."""
 
     config: Config
     out: Path
+    """The folder that holds all datasets."""
+    workers: int = 1
+    """Processes for tables of several models."""
 
     @property
     def folder(self) -> Path:
@@ -29,30 +32,30 @@ class DatasetRun:
 
     @property
     def models(self) -> Path:
-        """The folder of what was trained on the dataset, a folder a model."""
+        """The models trained on the dataset, one folder each."""
         return self.out / f"{self.config.name}-models"
 
     @property
     def corpus(self) -> Path:
-        """The strings of its samples, a file for each kit and split."""
+        """The strings of its samples, one file for each kit and split."""
         return self.out / f"{self.config.name}-corpus"
 
     @property
     def results(self) -> Path:
-        """Where tables about the dataset are kept."""
+        """The folder of its tables."""
         return self.out / f"{self.config.name}-eval"
 
     @property
     def paths(self) -> DatasetPaths:
-        """The mill's folders of the dataset."""
+        """The pipeline's folders of the dataset."""
         return DatasetPaths(self.out, self.config.name)
 
     @cached_property
     def manifest(self) -> Mapping[str, Any]:
-        """What the finished dataset says of itself, empty where none stands."""
+        """The manifest of the finished dataset; empty without one."""
         path = self.folder / MANIFEST
-        described: dict[str, Any] = json.loads(path.read_bytes()) if path.is_file() else {}
-        return described
+        manifest: dict[str, Any] = json.loads(path.read_bytes()) if path.is_file() else {}
+        return manifest
 
     @property
     def samples(self) -> int:
@@ -60,6 +63,7 @@ class DatasetRun:
         return int(self.manifest.get("samples", 0))
 
 
-def load_dataset_run(config: Path, out: Path) -> DatasetRun:
-    """The subject of a config file. Raises ConfigError for a config that is not valid."""
-    return DatasetRun(load_config(config, {name: stage.config for name, stage in find_stages().items()}), out)
+def load_dataset_run(config: Path, out: Path, workers: int = 1) -> DatasetRun:
+    """Read the config of a dataset. Raises ConfigError for an invalid one."""
+    sections = {name: stage.config for name, stage in find_stages().items()}
+    return DatasetRun(load_config(config, sections), out, workers)

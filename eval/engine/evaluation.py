@@ -1,29 +1,31 @@
-"""What a table is to `make eval`: a question, what must be there to answer it, how long that takes, and the answer."""
+"""A table of `make eval`: the question it answers, its requirements, its options, and its result."""
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.table import Table
+from pipeline.config import StrictModel
 
 
 @dataclass(frozen=True)
 class Chart:
-    """Lines in one plot. lines: points (x, y) by the name of each line, x ascending; across, up: what x and y are."""
+    """Lines in one plot."""
 
     title: str
-    across: str
-    up: str
+    x_label: str
+    y_label: str
     lines: Mapping[str, Sequence[tuple[float, float]]]
+    """Points (x, y) by the name of their line, x ascending."""
 
 
 @dataclass(frozen=True)
 class ImageRow:
-    """Pictures side by side: captions and PNGs."""
+    """Small pictures in a row: captions and PNGs."""
 
     title: str
     pictures: Sequence[tuple[str, bytes]]
@@ -31,55 +33,51 @@ class ImageRow:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture as wide as the page, such as rows of shapes one below the other. name: of its file, in small letters;
-    title: what it shows; picture: a PNG."""
+    """A picture as wide as the page, such as several rows of shapes."""
 
     name: str
+    """In small letters; part of its file's name."""
     title: str
-    picture: bytes
+    png: bytes
 
 
 @dataclass(frozen=True)
 class TableResult:
-    """tables: at least one, the first under the evaluation's own name; curves and strips for the pages alone; sheets
-    for the pages, and as files beside them."""
+    """What a table came to. The first table has the evaluation's name; figures are kept as files, too."""
 
     tables: Sequence[Table]
-    curves: Sequence[Chart] = ()
-    strips: Sequence[ImageRow] = ()
-    sheets: Sequence[Figure] = ()
+    charts: Sequence[Chart] = ()
+    image_rows: Sequence[ImageRow] = ()
+    figures: Sequence[Figure] = ()
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """what: something that must be there, in a few words; missing: empty where it is there, else what is missing and
-    what would make it, in words."""
+    """What a table needs."""
 
-    what: str
+    description: str
     missing: Callable[[DatasetRun], str]
+    """What is missing and which command makes it; empty where nothing is missing."""
 
 
-def _no_options(_: ArgumentParser) -> None:
-    return
+class NoOptions(StrictModel):
+    """The options of a table without options."""
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """One table. `TABLE = Evaluation(...)` stands in `eval/tables/<name>.py`, and nowhere else.
-
-    question: what it answers, a sentence; needs: asked in order, the first that is missing is told.
-    seconds: about how long it takes on one core.
-    answer: makes it, of a subject that has all it needs and of the options of the command line.
-    of_files: makes it of files instead of a dataset, if it can; options: adds options of its own to the command line.
-    """
+    """One table: `TABLE = Evaluation(...)` in `eval/tables/<name>.py`."""
 
     question: str
-    needs: Sequence[Requirement]
-    seconds: Callable[[DatasetRun], float]
-    answer: Callable[[DatasetRun, Namespace], TableResult]
-    of_files: Callable[[Sequence[Path], Namespace], TableResult] | None = None
-    options: Callable[[ArgumentParser], None] = field(default=_no_options)
+    requirements: Sequence[Requirement]
+    estimate_seconds: Callable[[DatasetRun], float]
+    """On one core."""
+    compute: Callable[[DatasetRun, Any], TableResult]
+    """From a run that meets all requirements, and the options."""
+    compute_from_files: Callable[[Sequence[Path], Any], TableResult] | None = None
+    """From files instead of a dataset."""
+    options: type[StrictModel] = NoOptions
 
-    def missing(self, subject: DatasetRun) -> str:
-        """What keeps it from being made, or nothing."""
-        return next((told for told in (need.missing(subject) for need in self.needs) if told), "")
+    def missing(self, run: DatasetRun) -> str:
+        """Return the first missing requirement, or an empty text."""
+        return next((text for text in (need.missing(run) for need in self.requirements) if text), "")

@@ -1,4 +1,4 @@
-"""Trained models as tables see them: found by their kind, grouped over their seeds."""
+"""Trained models in tables: found by kind, grouped over seeds."""
 
 from __future__ import annotations
 
@@ -15,26 +15,27 @@ from pipeline.errors import ConfigError
 from stages.training.checkpoint import CheckpointError, read_header, weights_of_kind
 
 Model = TypeVar("Model")
-Figures = TypeVar("Figures")
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
 class TrainedModel(Generic[Model]):
-    """A trained model: what it is called in the config, its kit, its seed, and the model itself."""
+    """A trained model of a kit."""
 
     name: str
+    """In `training.models` of the config."""
     kit: str
     seed: int
     model: Model
 
     @property
     def group(self) -> str:
-        """Name of the models that differ by their seeds alone."""
+        """The name that models share if only their seeds differ."""
         return f"{self.name}-{self.kit}"
 
     @property
     def folder(self) -> str:
-        """Name of its folder among the published models."""
+        """The name of its folder among the published models."""
         return f"{self.group}-{self.seed}"
 
 
@@ -44,10 +45,12 @@ def trained_models(
     load: Callable[[Path, Mapping[str, Any]], Model],
     kits: Container[str] | None = None,
 ) -> list[TrainedModel[Model]]:
-    """The models of a kind in a folder of published models, by kit, name and seed, those of other kits than `kits` left
-    out; `load` reads one, of its weights and what they say of themselves. Raises ConfigError for weights that are not
-    what they should be."""
-    found = []
+    """Load the models of a kind in a folder of published models, sorted by kit, name and seed.
+
+    `load`: from the path of the weights and their header. `kits`: the kits whose models are loaded; None for all.
+    Raises ConfigError for weights that cannot be read.
+    """
+    models = []
     for path in weights_of_kind(folder, kind):
         try:
             header = read_header(path)
@@ -57,25 +60,26 @@ def trained_models(
         except CheckpointError as error:
             raise ConfigError(f"{error}; make train") from error
         name, seed = header["name"].split(f"-{header['kit']}-", 1)
-        found.append(TrainedModel(name, header["kit"], int(seed), model))
-    return sorted(found, key=lambda each: (each.kit, each.name, each.seed))
+        models.append(TrainedModel(name, header["kit"], int(seed), model))
+    return sorted(models, key=lambda trained: (trained.kit, trained.name, trained.seed))
 
 
 def training_curve(folder: Path, column: str) -> list[tuple[float, float]]:
-    """Steps, and a figure of the training after so many, of a published model."""
+    """Return a column of a published model's training log, as (step, value)."""
     with open(folder / "curves.csv", newline="") as stream:
         return [(float(row["step"]), float(row[column])) for row in csv.DictReader(stream)]
 
 
-def by_group(found: Iterable[tuple[TrainedModel[Any], Figures]]) -> dict[str, list[Figures]]:
-    """Figures of models that stand beside each other where they differ by their seeds alone."""
-    return {group: [each for _, each in of_group] for group, of_group in groupby(found, key=lambda each: each[0].group)}
+def by_group(results: Iterable[tuple[TrainedModel[Any], Result]]) -> dict[str, list[Result]]:
+    """Group results of models over seeds; models of one group are adjacent."""
+    groups = groupby(results, key=lambda pair: pair[0].group)
+    return {group: [figures for _, figures in pairs] for group, pairs in groups}
 
 
-def over_seeds(found: Sequence[Any], names: Sequence[str]) -> list[Cell]:
-    """Means of some figures, with their standard deviation where there are several seeds."""
+def over_seeds(results: Sequence[Any], names: Sequence[str]) -> list[Cell]:
+    """Return the means of some attributes, with standard deviations if there are several seeds."""
     cells: list[Cell] = []
     for name in names:
-        values = [float(getattr(each, name)) for each in found]
+        values = [float(getattr(result, name)) for result in results]
         cells.append(f"{fmean(values):.1f} ± {stdev(values):.1f}" if len(values) > 1 else values[0])
     return cells

@@ -1,4 +1,4 @@
-"""Pictures for the report: small portraits."""
+"""Small pictures of shapes and point clouds for the report."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ PICTURE_SIZE = (264, 264)
 
 
 def shape_picture(shape: Shape) -> bytes:
-    """The portrait of a shape as PNG."""
+    """Render a shape as PNG."""
     from stages.shape.views.sheet import picture_png
 
     return picture_png(shape_portrait(shape))
 
 
 def shape_portrait(shape: Shape) -> ByteArray:
-    """A portrait of a shape, uint8 (h, w, 3), its parts told by colour where its model tells them by none."""
+    """Render a shape, uint8 (h, w, 3). Parts get distinct colours if the model has none."""
     from stages.shape.views.part_colors import part_paint
     from stages.shape.views.portrait import portrait
     from stages.shape.views.scene import scene_of
@@ -28,14 +28,14 @@ def shape_portrait(shape: Shape) -> ByteArray:
 
 
 def cloud_picture(points: FloatArray) -> bytes:
-    """The portrait of a cloud (n, 3), y up, as PNG."""
+    """Render a cloud (n, 3), y up, as PNG."""
     from stages.shape.views.sheet import picture_png
 
     return picture_png(cloud_portrait(points))
 
 
 def cloud_portrait(points: FloatArray) -> ByteArray:
-    """A portrait of a cloud (n, 3), y up, uint8 (h, w, 3)."""
+    """Render a cloud (n, 3), y up, uint8 (h, w, 3)."""
     from stages.shape.views.portrait import points_portrait
 
     return points_portrait(points, np.zeros(len(points), np.int32), ABOVE, PICTURE_SIZE, "y")

@@ -1,7 +1,7 @@
-"""The report: every table about one dataset in one page that needs nothing but itself.
+"""The report: all tables of one dataset in one self-contained HTML page.
 
-The page is a jinja2 template with autoescape: what a config, a kit or a model file calls itself is text there, never
-markup. A Content-Security-Policy in the page forbids it to load anything.
+The page is a jinja2 template with autoescape, so names from configs, kits and model files are never markup. Its
+Content-Security-Policy forbids it to load anything.
 """
 
 from __future__ import annotations
@@ -32,87 +32,90 @@ TEMPLATE = Path(__file__).with_suffix(".html")
 
 @dataclass(frozen=True)
 class FinishedTable:
-    """A table that was made. seconds: how long it took."""
+    """A table that was made."""
 
     name: str
     question: str
-    answer: TableResult
+    result: TableResult
     seconds: float
+    """That it took."""
 
 
-def report_html(subject: DatasetRun, made: Sequence[FinishedTable], unmade: Mapping[str, str], began: datetime) -> str:
-    """The page. unmade: why, of the tables that were not made, by their names; began: when work on the first began."""
-    house = Environment(
+def report_html(
+    run: DatasetRun, finished: Sequence[FinishedTable], unmade: Mapping[str, str], started: datetime
+) -> str:
+    """Return the page. `unmade`: the reason for each table that was not made, by name."""
+    environment = Environment(
         loader=FileSystemLoader(TEMPLATE.parent),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
     )
-    house.filters["figure"] = cell_text
-    config = subject.config
-    return house.get_template(TEMPLATE.name).render(
+    environment.filters["cell"] = cell_text
+    config = run.config
+    return environment.get_template(TEMPLATE.name).render(
         title=config.title,
-        subtitle=_subtitle(subject),
-        made=[_shown(each) for each in made],
+        subtitle=_subtitle(run),
+        finished=[_section(table) for table in finished],
         unmade=list(unmade.items()),
-        facts=_facts(subject, began),
+        facts=_facts(run, started),
         libraries=list(library_versions().items()),
         config=config.path.read_text(),
         colors=NUM_COLORS,
     )
 
 
-def _shown(made: FinishedTable) -> Mapping[str, object]:
-    answer = made.answer
-    curves = [each for each in answer.curves if any(each.lines.values())]
+def _section(table: FinishedTable) -> Mapping[str, object]:
+    result = table.result
     return {
-        "name": made.name,
-        "question": made.question,
-        "answer": answer,
-        "seconds": made.seconds,
-        "charts": [(each, Markup(chart_svg(each))) for each in curves],
-        "strips": [
-            {"title": each.title, "pictures": [(caption, _inlined(png)) for caption, png in each.pictures]}
-            for each in answer.strips
-            if each.pictures
+        "name": table.name,
+        "question": table.question,
+        "tables": result.tables,
+        "seconds": table.seconds,
+        "charts": [(chart, Markup(chart_svg(chart))) for chart in result.charts if any(chart.lines.values())],
+        "image_rows": [
+            (row.title, [(caption, _data_url(png)) for caption, png in row.pictures])
+            for row in result.image_rows
+            if row.pictures
         ],
-        "sheets": [(each.title, _inlined(each.picture)) for each in answer.sheets],
+        "figures": [(figure.title, _data_url(figure.png)) for figure in result.figures],
     }
 
 
-def _inlined(png: bytes) -> str:
+def _data_url(png: bytes) -> str:
     return f"data:image/png;base64,{b64encode(png).decode()}"
 
 
-def _subtitle(subject: DatasetRun) -> str:
-    described = subject.manifest
-    if not described:
-        return f"{subject.config.name}: no finished dataset yet"
-    kits = ", ".join(f"{count:,} of {kit}" for kit, count in described["kits"].items())
-    return f"{described['name']} {described['version']}: {described['samples']:,} shapes, {kits}"
+def _subtitle(run: DatasetRun) -> str:
+    manifest = run.manifest
+    if not manifest:
+        return f"{run.config.name}: no finished dataset yet"
+    kits = ", ".join(f"{count:,} of {kit}" for kit, count in manifest["kits"].items())
+    return f"{manifest['name']} {manifest['version']}: {manifest['samples']:,} shapes, {kits}"
 
 
-def _changed_sections(subject: DatasetRun) -> list[str]:
-    """The sections of the config that differ from those that the dataset was made with."""
-    said = json.loads(json.dumps(config_sections(subject.config)))
-    made = subject.manifest.get("config", {})
-    return [name for name, section in said.items() if name in made and made[name] != section]
+def _changed_sections(run: DatasetRun) -> list[str]:
+    """Return the sections of the config that differ from those of the finished dataset."""
+    sections = json.loads(json.dumps(config_sections(run.config)))
+    before = run.manifest.get("config", {})
+    return [name for name, section in sections.items() if name in before and before[name] != section]
 
 
-def _facts(subject: DatasetRun, began: datetime) -> list[tuple[str, str]]:
-    """What was run, when and on what."""
-    described = subject.manifest
-    facts = [("Tables made", f"{began:%Y-%m-%d %H:%M} to {datetime.now(UTC):%H:%M} UTC")]
-    facts.append(("Code", f"shapemill {code_version(tables)}, Python {platform.python_version()}"))
-    facts.append(("Machine", f"{os.cpu_count()} cores, {platform.machine()}, {sys.platform}"))
-    facts.append(("Config", f"{subject.config.path}, seed {subject.config.seed}"))
-    if described:
-        made_with = described["made_with"]["shapemill"]
-        facts.append(("Dataset", f"{described['name']} {described['version']}, seed {described['seed']}"))
+def _facts(run: DatasetRun, started: datetime) -> list[tuple[str, str]]:
+    """Return what was run, when and on what."""
+    manifest = run.manifest
+    facts = [
+        ("Tables made", f"{started:%Y-%m-%d %H:%M} to {datetime.now(UTC):%H:%M} UTC"),
+        ("Code", f"shapemill {code_version(tables)}, Python {platform.python_version()}"),
+        ("Machine", f"{os.cpu_count()} cores, {platform.machine()}, {sys.platform}"),
+        ("Config", f"{run.config.path}, seed {run.config.seed}"),
+    ]
+    if manifest:
+        made_with = manifest["made_with"]["shapemill"]
+        facts.append(("Dataset", f"{manifest['name']} {manifest['version']}, seed {manifest['seed']}"))
         facts.append(("Dataset made by", f"shapemill {made_with}"))
-        changed = _changed_sections(subject)
+        changed = _changed_sections(run)
         if changed:
-            told = f"sections of the config that say something else now: {', '.join(changed)}"
-            facts.append(("Not as it was made", told))
-        facts.append(("Splits", ", ".join(f"{split} {count:,}" for split, count in described["splits"].items())))
+            facts.append(("Changed since then", f"sections of the config: {', '.join(changed)}"))
+        facts.append(("Splits", ", ".join(f"{split} {count:,}" for split, count in manifest["splits"].items())))
     return facts

@@ -1,16 +1,15 @@
-"""Long tables in parts: what is made of one is kept, and not made again after a kill."""
+"""Long tables in sections: each finished section is cached, so a killed run resumes."""
 
 from __future__ import annotations
 
 import hashlib
 import sys
-from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from time import perf_counter
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
@@ -22,114 +21,116 @@ from pipeline.paths import file_digest, write_file
 from pipeline.shards import json_bytes
 from stages.package.versions import library_versions
 
-Said = TypeVar("Said")
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
 class TableSection:
-    """A part of a long table, such as the rows of one model.
-
-    name: no other part of the table has it; reads: the files that its figures depend on; make: makes it; code: modules
-    that it finds at run time, by a name; options: of the table's options those that its figures depend on, by name; all
-    where it is None. Of the config it depends on the dataset's name and seed alone.
-    """
+    """A section of a long table, such as the rows of one model. Of the config it depends on name and seed alone."""
 
     name: str
-    reads: Sequence[Path]
-    make: Callable[[], TableResult]
-    code: Sequence[str] = ()
+    """Unique within the table."""
+    input_files: Sequence[Path]
+    """All files that its values depend on."""
+    compute: Callable[[], TableResult]
+    modules: Sequence[str] = ()
+    """Modules that it imports by name at run time."""
     options: Sequence[str] | None = None
+    """The names of the options that its values depend on; None for all."""
 
 
-class _Kept(BaseModel):
+class _CachedResult(BaseModel):
     model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64", ser_json_inf_nan="constants")
 
-    answer: TableResult
+    result: TableResult
 
 
 def cached_sections(
-    parts: Callable[[DatasetRun, Namespace], Iterable[TableSection]], options: Callable[[ArgumentParser], None]
-) -> Callable[[DatasetRun, Namespace], TableResult]:
-    """The `Evaluation.answer` of a table that is made of `parts`, which hang on its `options`.
+    sections: Callable[[DatasetRun, Any], Iterable[TableSection]],
+) -> Callable[[DatasetRun, Any], TableResult]:
+    """Return the `Evaluation.compute` of a table that consists of sections.
 
-    Each part is kept in `OUT/<dataset>-eval/parts/<table>/<part>.json` when it is made. It is taken from there as long
-    as the code that makes it, the libraries, the options, the seed and the files that it reads are the same.
+    Each section is kept in `OUT/<dataset>-eval/cache/<table>/<section>.json`. It is computed again when its code, the
+    libraries, its options, the seed or its input files have changed.
     """
-    module = parts.__module__
+    module = sections.__module__
     table = module.rpartition(".")[2]
 
-    def answer(subject: DatasetRun, asked: Namespace) -> TableResult:
-        own = ArgumentParser()
-        options(own)
+    def compute(run: DatasetRun, options: Any) -> TableResult:
         digest = cache(file_digest)
-        common = {"libraries": library_versions(), "dataset": (subject.config.name, subject.config.seed)}
+        common = {"libraries": library_versions(), "dataset": (run.config.name, run.config.seed)}
 
-        def each_part() -> Iterator[TableResult]:
-            for part in parts(subject, asked):
-                code, read = (
-                    code_digest(transitive_imports([module, *part.code])),
-                    [digest(path) for path in part.reads],
-                )
-                names = vars(own.parse_args([])) if part.options is None else part.options
-                chosen = {name: getattr(asked, name) for name in names}
-                described = {**common, "options": chosen, "part": part.name, "code": code, "reads": read}
-                key = hashlib.sha256(json_bytes(described)).hexdigest()
-                yield _answer_of(part, key, subject.results / "parts" / table / f"{part.name}.json")
+        def results() -> Iterator[TableResult]:
+            for section in sections(run, options):
+                names = None if section.options is None else set(section.options)
+                inputs = {
+                    **common,
+                    "options": options.model_dump(mode="json", include=names),
+                    "section": section.name,
+                    "code": code_digest(transitive_imports([module, *section.modules])),
+                    "files": [digest(path) for path in section.input_files],
+                }
+                key = hashlib.sha256(json_bytes(inputs)).hexdigest()
+                yield _cached(section, key, run.results / "cache" / table / f"{section.name}.json")
 
-        return join_results(list(each_part()))
+        return join_results(list(results()))
 
-    return answer
+    return compute
 
 
-def _answer_of(part: TableSection, key: str, path: Path) -> TableResult:
-    kept = _read(path, key)
-    if kept is not None:
-        print(f"{part.name}: made before", file=sys.stderr)
-        return kept
+def _cached(section: TableSection, key: str, path: Path) -> TableResult:
+    result = _read(path, key)
+    if result is not None:
+        print(f"{section.name}: cached", file=sys.stderr)
+        return result
     start = perf_counter()
-    answer = part.make()
-    written = _Kept(answer=answer).model_dump_json().encode()
-    write_file(path, _seal(key, written) + b"\n" + written)
-    print(f"{part.name}: made in {perf_counter() - start:.0f} s", file=sys.stderr)
-    return answer
+    result = section.compute()
+    content = _CachedResult(result=result).model_dump_json().encode()
+    write_file(path, _checksum(key, content) + b"\n" + content)
+    print(f"{section.name}: made in {perf_counter() - start:.0f} s", file=sys.stderr)
+    return result
 
 
 def _read(path: Path, key: str) -> TableResult | None:
-    """The answer with this key in a file; None where there is none, or none any more: the disk has spoilt it."""
+    """Return the result with this key, or None for a missing, outdated or corrupted file."""
     if not path.is_file():
         return None
-    seal, _, written = path.read_bytes().partition(b"\n")
-    return _Kept.model_validate_json(written).answer if seal == _seal(key, written) else None
+    checksum, _, content = path.read_bytes().partition(b"\n")
+    return _CachedResult.model_validate_json(content).result if checksum == _checksum(key, content) else None
 
 
-def _seal(key: str, written: bytes) -> bytes:
-    return hashlib.sha256(key.encode() + written).hexdigest().encode()
+def _checksum(key: str, content: bytes) -> bytes:
+    return hashlib.sha256(key.encode() + content).hexdigest().encode()
 
 
-def join_results(answers: Sequence[TableResult]) -> TableResult:
-    """One answer of several: tables of one title and the same columns become one, and so do curves in one plot; what
-    all say in notes and published rows is said once."""
+def join_results(results: Sequence[TableResult]) -> TableResult:
+    """Join results: tables with equal titles and columns, and charts with equal titles and labels, become one each.
+
+    Notes and reference rows that several results share appear once.
+    """
     tables: dict[tuple[str, tuple[str, ...]], Table] = {}
-    curves: dict[tuple[str, str, str], Chart] = {}
-    for answer in answers:
-        for table in answer.tables:
-            there = tables.setdefault((table.title, table.columns), replace(table, rows=(), notes=(), published=()))
+    charts: dict[tuple[str, str, str], Chart] = {}
+    for result in results:
+        for table in result.tables:
+            empty = replace(table, rows=(), notes=(), reference_rows=())
+            joined = tables.setdefault((table.title, table.columns), empty)
             tables[table.title, table.columns] = replace(
-                there,
-                rows=(*there.rows, *table.rows),
-                notes=_once(there.notes, table.notes),
-                published=_once(there.published, table.published),
+                joined,
+                rows=(*joined.rows, *table.rows),
+                notes=_without_repeats(joined.notes, table.notes),
+                reference_rows=_without_repeats(joined.reference_rows, table.reference_rows),
             )
-        for curve in answer.curves:
-            alike = curves.setdefault((curve.title, curve.across, curve.up), replace(curve, lines={}))
-            curves[curve.title, curve.across, curve.up] = replace(alike, lines={**alike.lines, **curve.lines})
+        for chart in result.charts:
+            key = chart.title, chart.x_label, chart.y_label
+            lines = charts[key].lines if key in charts else {}
+            charts[key] = replace(chart, lines={**lines, **chart.lines})
     return TableResult(
         list(tables.values()),
-        list(curves.values()),
-        [strip for answer in answers for strip in answer.strips],
-        [sheet for answer in answers for sheet in answer.sheets],
+        list(charts.values()),
+        [row for result in results for row in result.image_rows],
+        [figure for result in results for figure in result.figures],
     )
 
 
-def _once(first: Sequence[Said], second: Sequence[Said]) -> list[Said]:
-    return [*first, *(each for each in second if each not in first)]
+def _without_repeats(first: Sequence[Item], second: Sequence[Item]) -> list[Item]:
+    return [*first, *(item for item in second if item not in first)]

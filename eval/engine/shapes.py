@@ -1,10 +1,11 @@
-"""Shapes to measure, from wherever they are: a finished dataset, a model file, a file of boxes."""
+"""Shapes to measure: from a finished dataset, a model file, or a file of boxes."""
 
 from __future__ import annotations
 
 import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -23,50 +24,49 @@ from stages.shape.shape import Shape
 NO_CONTACTS = np.empty((0, 2), dtype=np.int32)
 QUADS = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 BOX_FACES = np.array([face for a, b, c, d in QUADS for face in ((a, b, c), (a, c, d))], dtype=np.int32)
-CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+UNIT_BOX = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
 
-def dataset_shapes(folder: Path, most: int) -> Iterator[tuple[str, Shape]]:
-    """Shapes of a finished dataset with the names of their kits, read from its shards: at most `most`, evenly spread.
+def dataset_shapes(folder: Path, max_shapes: int) -> Iterator[tuple[str, Shape]]:
+    """Yield at most `max_shapes` evenly spread shapes of a finished dataset, each with the name of its kit.
 
-    Raises ConfigError where no dataset stands in `folder`.
+    Raises ConfigError if there is no dataset in `folder`.
     """
-    shards = sorted((folder / "data").glob("*/*.tar"))
-    if not shards:
-        raise ConfigError(f"no dataset stands in {folder}; make it first: make dataset CONFIG=...")
+    shards = _data_shards(folder)
     total: int = json.loads((folder / "manifest.json").read_text())["samples"]
-    step = max(1, -(-total // most))
-    number = 0
-    for shard in shards:
-        for _, members in read_shard(shard):
-            if number % step == 0:
-                record = json.loads(members["json"])
-                yield str(record["kit"]), _sample_shape(record, members)
-            number += 1
+    step = max(1, -(-total // max_shapes))
+    samples = (members for shard in shards for _, members in read_shard(shard))
+    for members in islice(samples, 0, None, step):
+        record = json.loads(members["json"])
+        yield str(record["kit"]), _sample_shape(record, members)
 
 
 def split_shapes(folder: Path) -> Iterator[tuple[str, str, str, Shape]]:
-    """Every shape of a finished dataset with its kit, its split and its key.
+    """Yield kit, split, key and shape of each sample of a finished dataset.
 
-    Raises ConfigError where no dataset stands in `folder`.
+    Raises ConfigError if there is no dataset in `folder`.
     """
-    shards = sorted((folder / "data").glob("*/*.tar"))
-    if not shards:
-        raise ConfigError(f"no dataset stands in {folder}; make it first: make dataset CONFIG=...")
-    for shard in shards:
+    for shard in _data_shards(folder):
         for key, members in read_shard(shard):
             record = json.loads(members["json"])
             yield str(record["kit"]), str(record["split"]), key, _sample_shape(record, members)
 
 
+def _data_shards(folder: Path) -> list[Path]:
+    shards = sorted((folder / "data").glob("*/*.tar"))
+    if not shards:
+        raise ConfigError(f"there is no dataset in {folder}; make it first: make dataset CONFIG=...")
+    return shards
+
+
 def model_shapes(path: Path, up: str) -> Iterator[tuple[str, Shape]]:
-    """The shape in a model file, with the name of `model_kits`."""
+    """Yield the name and the shape of a model file, as in `model_kits`."""
     for name, kit in model_kits(path, up):
         yield name, Shape(kit.types, kit.exemplars[0].assembly, kit.up, kit.type_names())
 
 
 def model_kits(path: Path, up: str) -> Iterator[tuple[str, Kit]]:
-    """The kit of a model file, with the file's name, or its folder's where the file is just called `model`."""
+    """Yield the kit of a model file and its name: that of the file, or of its folder if the file is called `model`."""
     name = path.parent.name if path.stem == "model" else path.stem
     config = KitConfig(name="model", shapes=(ShapeFile(path=path),), up="z" if up == "z" else "y")
     config = config.resolve(STRICTEST)
@@ -74,10 +74,11 @@ def model_kits(path: Path, up: str) -> Iterator[tuple[str, Kit]]:
 
 
 def box_shapes(path: Path, up: str) -> Iterator[tuple[str, Shape]]:
-    """The shapes in a file of boxes: an `.npz` with `part_corners` float (n, 8, 3), the corners of each box in any
-    order, and `part_offsets` int (k + 1,), where the boxes of each of the k shapes begin and the last end.
+    """Yield the name of a file of boxes and each of its shapes.
 
-    Raises ConfigError for a file that is not so.
+    The file is an `.npz` with `part_corners`, float (n, 8, 3), corners of each box in any order, and `part_offsets`,
+    int (k + 1,): the boxes of shape i are those from `part_offsets[i]` to `part_offsets[i + 1]`. Raises ConfigError if
+    arrays are missing.
     """
     with np.load(path, allow_pickle=False) as stored:
         if not {"part_corners", "part_offsets"} <= set(stored.files):
@@ -88,28 +89,28 @@ def box_shapes(path: Path, up: str) -> Iterator[tuple[str, Shape]]:
 
 
 def box_shape(corners: FloatArray, up: str) -> Shape:
-    """The shape of boxes with these corners, float64 (n, 8, 3), in any order; boxes without volume are left out.
+    """Return the shape of boxes with corners float64 (n, 8, 3), in any order; boxes without volume are left out.
 
-    Raises ConfigError for corners that are not those of a box.
+    Raises ConfigError for corners that form no box.
     """
     from stages.shape.physics.boxes import recognise_boxes
 
-    found, centres, axes, halves = recognise_boxes(corners)
+    is_box, centres, axes, halves = recognise_boxes(corners)
     spans = np.linalg.svd(corners - corners.mean(axis=1, keepdims=True), compute_uv=False)
     full = spans[:, 2] > 1e-4 * spans[:, 0]
-    if (full & ~found).any():
-        raise ConfigError(f"the corners of part {int(np.argmax(full & ~found))} are not those of a box")
+    if (full & ~is_box).any():
+        raise ConfigError(f"the corners of part {int(np.argmax(full & ~is_box))} form no box")
     axes[np.linalg.det(axes) < 0, 2] *= -1
     poses = np.tile(np.eye(4), (int(full.sum()), 1, 1))
     poses[:, :3, :3], poses[:, :3, 3] = axes[full].transpose(0, 2, 1), centres[full]
     grey = np.full((12, 3), 160, np.uint8)
-    meshes = tuple(PartMesh("box", CORNERS * 2 * half, BOX_FACES, grey) for half in halves[full])
+    meshes = tuple(PartMesh("box", UNIT_BOX * 2 * half, BOX_FACES, grey) for half in halves[full])
     assembly = Assembly(np.arange(len(meshes), dtype=np.int16), poses, NO_CONTACTS)
     return Shape(meshes, assembly, "z" if up == "z" else "y", ("box",))
 
 
 def _sample_shape(record: Mapping[str, Any], members: Mapping[str, bytes]) -> Shape:
-    """A sample of a dataset; its GLB stands upright, y up."""
+    """Return the shape of a sample; its GLB is y up."""
     import trimesh
 
     scene = trimesh.load_scene(io.BytesIO(members["glb"]), file_type="glb", process=False)
@@ -127,26 +128,26 @@ def _sample_shape(record: Mapping[str, Any], members: Mapping[str, bytes]) -> Sh
 
 
 def _welded(name: str, mesh: Any) -> PartMesh:
-    """A mesh of a file, in which a vertex stands once for each of its colours, with each vertex once."""
-    vertices, place = np.unique(np.asarray(mesh.vertices, dtype=np.float64), axis=0, return_inverse=True)
-    faces = place.reshape(-1)[np.asarray(mesh.faces)].astype(np.int32)
+    """Return a mesh without duplicate vertices; a GLB repeats a vertex for each of its colours."""
+    vertices, index = np.unique(np.asarray(mesh.vertices, dtype=np.float64), axis=0, return_inverse=True)
+    faces = index.reshape(-1)[np.asarray(mesh.faces)].astype(np.int32)
     return PartMesh(name, vertices, faces, np.full((len(faces), 3), 160, np.uint8))
 
 
 def shared_meshes(shapes: Sequence[Shape]) -> list[Shape]:
-    """The same shapes on one list of meshes, each mesh once: what is known of it serves them all."""
-    places: dict[tuple[bytes, bytes], int] = {}
+    """Return the same shapes on one shared list of distinct meshes."""
+    indices: dict[tuple[bytes, bytes], int] = {}
     meshes: list[PartMesh] = []
-    place_of: list[list[int]] = []
+    index_of: list[list[int]] = []
     for shape in shapes:
         own = []
         for mesh in shape.meshes:
             key = mesh.vertices.tobytes(), mesh.faces.tobytes()
-            if key not in places:
-                places[key] = len(meshes)
+            if key not in indices:
+                indices[key] = len(meshes)
                 meshes.append(mesh)
-            own.append(places[key])
-        place_of.append(own)
+            own.append(indices[key])
+        index_of.append(own)
     labels = tuple(dict.fromkeys(mesh.name for mesh in meshes))
     shared = tuple(meshes)
     return [
@@ -156,5 +157,5 @@ def shared_meshes(shapes: Sequence[Shape]) -> list[Shape]:
             shape.up,
             labels,
         )
-        for shape, own in zip(shapes, place_of, strict=True)
+        for shape, own in zip(shapes, index_of, strict=True)
     ]

@@ -1,4 +1,4 @@
-"""Shapes that models dreamt beside those that the models have learnt from: what is lost, what is won (strings §6)."""
+"""Generated shapes compared with training shapes: diversity, novelty, stability (strings §6)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ COLUMNS = (
     "cycle rank",
     "histograms",
     "E exemplar",
-    "E learnt",
+    "E training",
     "copied %",
     "pieces",
     "rooted %",
@@ -40,16 +40,16 @@ COLUMNS = (
 )
 
 NOTES = (
-    "Learnt: what stands in train of the dataset that the model was trained on. Graphs, histograms: how many different "
-    "ones. Parts, cycle rank, pieces, margin: medians. E: histogram "
-    "distance (strings §5.3) to the nearest exemplar, and to the nearest other shape that was learnt; medians. Copied: "
-    "share of a shape in its largest piece that stands so in an exemplar, median; pieces: how few cover it.",
+    "Training: the train split of the dataset that the model was trained on. Graphs, histograms: distinct ones. Parts, "
+    "cycle rank, pieces, margin: medians. E: histogram distance (strings §5.3) to the nearest exemplar and to the "
+    "nearest other training shape, medians. Copied: share of a shape in its largest verbatim piece of an exemplar, "
+    "median. Pieces: the fewest verbatim pieces that cover a shape.",
 )
 
 
 @dataclass(frozen=True)
-class Dream:
-    """A shape of a finished dataset with what its record says of how it stands."""
+class GeneratedShape:
+    """A shape of a finished dataset, with the physics of its record."""
 
     assembly: Assembly
     rooted: bool
@@ -57,67 +57,76 @@ class Dream:
     margin: float
 
 
-def finished_shapes(folder: Path, places: DatasetPaths, splits: Sequence[str]) -> Iterator[tuple[str, Dream]]:
-    """The kit's name and the shape of each sample of these splits of a finished dataset of kits in `folder`, whose
-    mill's folders are `places`; of those whose parts are all as the kit has them."""
-    anew = LANGUAGE.rebuild(places)
+def finished_shapes(folder: Path, paths: DatasetPaths, splits: Sequence[str]) -> Iterator[tuple[str, GeneratedShape]]:
+    """Yield the kit's name and the shape of each sample of some splits; samples with stretched parts are left out.
+
+    folder: a finished dataset; paths: the pipeline's folders of it.
+    """
+    shape_of = LANGUAGE.rebuild(paths)
     for split in splits:
         for shard in sorted((folder / "data" / split).glob("*.tar")):
             for _key, members in read_shard(shard):
                 record: Mapping[str, Any] = json.loads(members["json"])
                 physics = record["physics"]
-                shape = anew(record, pairs_of(members[CONTACTS]))
+                shape = shape_of(record, pairs_of(members[CONTACTS]))
                 if not shape.is_stretched:
-                    found = Dream(shape.assembly, physics["rooted"], physics["stable"], physics["margin"])
-                    yield record["kit"], found
+                    yield (
+                        record["kit"],
+                        GeneratedShape(shape.assembly, physics["rooted"], physics["stable"], physics["margin"]),
+                    )
 
 
-def dream_row(name: str, kit: Kit, dreams: Sequence[Dream], learnt: Sequence[Dream]) -> tuple[Cell, ...]:
-    """The row of at least one shape. Where `dreams` are the shapes `learnt` themselves, in the same order, none is its
-    own neighbour."""
-    shapes = [each.assembly for each in dreams]
-    graphs = [graph_digest(each.types, each.edges) for each in shapes]
-    themselves = dreams is learnt
+def generated_row(
+    name: str, kit: Kit, shapes: Sequence[GeneratedShape], training: Sequence[GeneratedShape]
+) -> tuple[Cell, ...]:
+    """Return the row of at least one shape. If `shapes` is `training` itself, no shape is its own neighbour."""
+    assemblies = [shape.assembly for shape in shapes]
+    graphs = [graph_digest(assembly.types, assembly.edges) for assembly in assemblies]
     table = DockingTable.of(kit)
     test = CopyDetector(kit, table)
-    copied = [test.copied(each, table.label_edges(each.types, each.poses, each.edges)) for each in shapes]
-    histograms = _histograms(kit, shapes)
+    copied = [
+        test.copied(assembly, table.label_edges(assembly.types, assembly.poses, assembly.edges))
+        for assembly in assemblies
+    ]
+    histograms = _histograms(kit, assemblies)
+    exemplars = _histograms(kit, [exemplar.assembly for exemplar in kit.exemplars])
+    trained = _histograms(kit, [shape.assembly for shape in training])
     return (
         name,
         len(shapes),
         len(set(graphs)),
-        round(median(len(each) for each in shapes)),
-        round(median(len(each.edges) - len(each) + 1 for each in shapes)),
+        round(median(len(assembly) for assembly in assemblies)),
+        round(median(len(assembly.edges) - len(assembly) + 1 for assembly in assemblies)),
         len(np.unique(histograms, axis=0)),
-        _nearest(histograms, _histograms(kit, [each.assembly for each in kit.exemplars]), False),
-        _nearest(histograms, _histograms(kit, [each.assembly for each in learnt]), themselves),
-        100 * median(each.largest for each in copied),
-        round(median(each.pieces for each in copied)),
-        100 * fmean(each.rooted for each in dreams),
-        100 * fmean(each.stable for each in dreams),
-        median(each.margin for each in dreams),
+        _nearest(histograms, exemplars, False),
+        _nearest(histograms, trained, shapes is training),
+        100 * median(copy.largest for copy in copied),
+        round(median(copy.pieces for copy in copied)),
+        100 * fmean(shape.rooted for shape in shapes),
+        100 * fmean(shape.stable for shape in shapes),
+        median(shape.margin for shape in shapes),
     )
 
 
-def dreams_table(rows: Sequence[tuple[Cell, ...]]) -> Table:
-    """The rows of `dream_row`."""
-    return Table("Dreams beside what they were learnt from", COLUMNS, tuple(rows), NOTES)
+def generated_table(rows: Sequence[tuple[Cell, ...]]) -> Table:
+    """Return the table of rows of `generated_row`."""
+    return Table("Generated shapes and training shapes", COLUMNS, tuple(rows), NOTES)
 
 
 def _histograms(kit: Kit, shapes: Sequence[Assembly]) -> FloatArray:
-    """How many parts of each type: float64 (shapes, types)."""
-    counted = [np.bincount(each.types, minlength=len(kit.types)) for each in shapes]
-    return np.array(counted, dtype=np.float64).reshape(-1, len(kit.types))
+    """Count the parts of each type, float64 (shapes, types)."""
+    counts = [np.bincount(shape.types, minlength=len(kit.types)) for shape in shapes]
+    return np.array(counts, dtype=np.float64).reshape(-1, len(kit.types))
 
 
-def _nearest(histograms: FloatArray, others: FloatArray, themselves: bool) -> Cell:
-    """The median of E to the nearest."""
-    if len(others) <= themselves:
+def _nearest(histograms: FloatArray, others: FloatArray, is_same: bool) -> Cell:
+    """Return the median E to the nearest of others; with `is_same` both are equal, and no row is its own neighbour."""
+    if len(others) <= is_same:
         return ""
-    found = []
-    for place, each in enumerate(histograms):
-        apart = histogram_metric(each, others)
-        if themselves:
-            apart[place] = np.inf
-        found.append(float(apart.min()))
-    return median(found)
+    nearest = []
+    for row, histogram in enumerate(histograms):
+        distances = histogram_metric(histogram, others)
+        if is_same:
+            distances[row] = np.inf
+        nearest.append(float(distances.min()))
+    return median(nearest)

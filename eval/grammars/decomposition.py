@@ -1,4 +1,4 @@
-"""What comes back of known parts when a model is merged to one mesh and cut again."""
+"""Recovery of known parts from a model that is merged to one mesh and segmented again."""
 
 from __future__ import annotations
 
@@ -22,35 +22,40 @@ from stages.shape.arrays import IntArray
 from stages.shape.geometry.pose import transform_points
 from stages.shape.shape import Shape
 
-POINTS = 8192
-"""Points of the surface by which parts are compared."""
-COVERED = 1e-3
-"""Faces that are nearer to each other than this share of the diagonal lie on each other."""
-HALF = 0.5
-"""A part has come back if it and what was found have more than this share of what both cover in common."""
+NUM_POINTS = 8192
+"""Surface points by which parts are compared."""
+CONTACT_DISTANCE_SHARE = 1e-3
+"""Between faces in contact, as a share of the diagonal."""
+MIN_OVERLAP = 0.5
+"""Intersection over union above which a part counts as recovered."""
 
 
 @dataclass(frozen=True)
-class Returned:
-    """What came back of a model. parts, types: how many there were and how many were found; part_index, type_index:
-    adjusted Rand index of points by part and by type, 1 where all came back; back: share of the parts that have one of
-    their own; contacts: share of the contacts between such parts that are contacts of what was found; why: why
-    nothing was found, else empty; seconds: for the cut."""
+class PartRecovery:
+    """The recovery of the parts of a model."""
 
     name: str
-    cut: str
+    segmentation: str
     parts: tuple[int, int]
+    """Known and found."""
     types: tuple[int, int]
+    """Known and found."""
     part_index: float
+    """Adjusted Rand index of points by part."""
     type_index: float
-    back: float
+    """Adjusted Rand index of points by type."""
+    recovered: float
+    """Share of the parts with a found part of their own."""
     contacts: float
+    """Share of the contacts between recovered parts that are found."""
     seconds: float
-    why: str = ""
+    """For the segmentation."""
+    failure: str = ""
+    """Why no parts were found."""
 
 
-def merged(shape: Shape, path: Path) -> None:
-    """Write a shape as one mesh: what its parts share, corners that meet, is welded, and nothing tells them apart."""
+def write_merged(shape: Shape, path: Path) -> None:
+    """Write a shape as one mesh, with coincident vertices of its parts welded."""
     vertices, faces, count = [], [], 0
     for kind, pose in zip(shape.assembly.types.tolist(), shape.placements, strict=True):
         mesh = shape.meshes[kind]
@@ -62,68 +67,69 @@ def merged(shape: Shape, path: Path) -> None:
     whole.export(path)
 
 
-def returned(name: str, shape: Shape, cut: Segmentation) -> Returned:
-    """Merge a shape whose parts are known, cut it, and compare. What no parts can be made of has none."""
+def measure_part_recovery(name: str, shape: Shape, segmentation: Segmentation) -> PartRecovery:
+    """Merge a shape with known parts, segment it, and compare. A failed segmentation has no parts."""
     known = (len(shape.assembly), len(np.unique(shape.assembly.types)))
-    begun = time.perf_counter()
+    start = time.perf_counter()
     try:
-        found = _cut(shape, cut)
+        found = _segment_merged(shape, segmentation)
     except ConfigError as error:
-        nothing = (known[0], 0), (known[1], 0), 0.0, 0.0, 0.0, 0.0, time.perf_counter() - begun
-        return Returned(name, cut, *nothing, why=str(error).partition(": ")[2].partition(";")[0])
-    seconds = time.perf_counter() - begun
+        nothing = (known[0], 0), (known[1], 0), 0.0, 0.0, 0.0, 0.0, time.perf_counter() - start
+        return PartRecovery(name, segmentation, *nothing, failure=str(error).partition(": ")[2].partition(";")[0])
+    seconds = time.perf_counter() - start
     cloud = points_of_parts(shape)
     truth, nearest = cloud.instances.astype(np.int64), _nearest_parts(found, cloud.points)
     matched = _matched(truth, nearest, known[0])
     types = shape.assembly.types[truth].astype(np.int64), found.assembly.types[nearest].astype(np.int64)
-    asked = [(matched[i], matched[j]) for i, j in shape.assembly.edges.tolist() if i in matched and j in matched]
-    there = {(min(pair), max(pair)) for pair in found.assembly.edges.tolist()}
-    kept = sum((min(pair), max(pair)) in there for pair in asked)
-    return Returned(
+    expected = [(matched[i], matched[j]) for i, j in shape.assembly.edges.tolist() if i in matched and j in matched]
+    contacts = {(min(pair), max(pair)) for pair in found.assembly.edges.tolist()}
+    kept = sum((min(pair), max(pair)) in contacts for pair in expected)
+    return PartRecovery(
         name,
-        cut,
+        segmentation,
         (known[0], len(found.assembly)),
         (known[1], len(np.unique(found.assembly.types))),
         rand_index(truth, nearest),
         rand_index(*types),
         len(matched) / known[0],
-        kept / len(asked) if asked else 0.0,
+        kept / len(expected) if expected else 0.0,
         seconds,
     )
 
 
-def _cut(shape: Shape, cut: Segmentation) -> Shape:
-    """What Shapemill makes of the merged shape."""
+def _segment_merged(shape: Shape, segmentation: Segmentation) -> Shape:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "merged.glb"
-        merged(shape, path)
-        config = KitConfig(name="merged", shapes=(ShapeFile(path=path),), parts=cut, up=shape.up).resolve(STRICTEST)
-        kit = observe_models(config, [read_model(path, cut)]).kit
+        write_merged(shape, path)
+        config = KitConfig(name="merged", shapes=(ShapeFile(path=path),), parts=segmentation, up=shape.up).resolve(
+            STRICTEST
+        )
+        kit = observe_models(config, [read_model(path, segmentation)]).kit
     return Shape(kit.types, kit.exemplars[0].whole, kit.up, kit.type_names())
 
 
 def points_of_parts(shape: Shape) -> SurfacePoints:
-    """Points of the surface of a shape, but for those where two parts meet: each belongs to one part alone."""
-    cloud = sample_shape(shape, POINTS, np.random.default_rng(0))
+    """Sample surface points of a shape, without those where two parts touch."""
+    cloud = sample_shape(shape, NUM_POINTS, np.random.default_rng(0))
     scene, _ = scene_of_parts(shape)
-    reach = COVERED * float(np.linalg.norm(np.ptp(cloud.points, axis=0)))
+    reach = CONTACT_DISTANCE_SHARE * float(np.linalg.norm(np.ptp(cloud.points, axis=0)))
     rays = np.concatenate([cloud.points - reach * cloud.normals, cloud.normals], axis=1).astype(np.float32)
-    # from behind its own face: that is hit once, and again what lies on it
+    # rays from behind the face hit it once, and a second time a face in contact
     hits = scene.list_intersections(o3d.core.Tensor(rays))
-    near = hits["t_hit"].numpy() < 2 * reach
-    counts = np.bincount(hits["ray_ids"].numpy()[near], minlength=len(rays))
+    is_near = hits["t_hit"].numpy() < 2 * reach
+    counts = np.bincount(hits["ray_ids"].numpy()[is_near], minlength=len(rays))
     return cloud.take(np.flatnonzero(counts < 2))
 
 
 def _nearest_parts(shape: Shape, points: np.ndarray) -> IntArray:
-    """The part of a shape that is nearest to each point (n, 3), int64 (n,)."""
+    """Return the part of a shape nearest to each point (n, 3), int64 (n,)."""
     scene, part_of = scene_of_parts(shape)
     closest = scene.compute_closest_points(o3d.core.Tensor(points.astype(np.float32)))
-    return np.array([part_of[each] for each in closest["geometry_ids"].numpy().tolist()], dtype=np.int64)
+    return np.array([part_of[geometry] for geometry in closest["geometry_ids"].numpy().tolist()], dtype=np.int64)
 
 
 def scene_of_parts(shape: Shape) -> tuple[o3d.t.geometry.RaycastingScene, dict[int, int]]:
-    """The parts of a shape to be looked at, and the part of each geometry."""
+    """Return a scene of the parts of a shape, and the part of each geometry."""
     scene = o3d.t.geometry.RaycastingScene(nthreads=1)
     part_of: dict[int, int] = {}
     for part, (kind, pose) in enumerate(zip(shape.assembly.types.tolist(), shape.placements, strict=True)):
@@ -134,18 +140,17 @@ def scene_of_parts(shape: Shape) -> tuple[o3d.t.geometry.RaycastingScene, dict[i
 
 
 def _matched(truth: np.ndarray, nearest: np.ndarray, parts: int) -> dict[int, int]:
-    """For each part that has come back the part that was found."""
+    """Return the found part of each recovered part."""
     counts = np.zeros((parts, int(nearest.max()) + 1))
     np.add.at(counts, (truth, nearest), 1)
     union = counts.sum(axis=1, keepdims=True) + counts.sum(axis=0, keepdims=True) - counts
     share = counts / np.maximum(union, 1)
     best = share.argmax(axis=1)
-    return {part: int(best[part]) for part in range(parts) if share[part, best[part]] > HALF}
+    return {part: int(best[part]) for part in range(parts) if share[part, best[part]] > MIN_OVERLAP}
 
 
 def rand_index(first: np.ndarray, second: np.ndarray) -> float:
-    """The adjusted Rand index (Hubert and Arabie 1985) of two labellings (n,) of the same things: 1 where they tell the
-    same apart, about 0 for one by chance."""
+    """Return the adjusted Rand index (Hubert and Arabie 1985) of two labellings (n,): 1 if equal, about 0 by chance."""
     _, rows = np.unique(first, return_inverse=True)
     _, columns = np.unique(second, return_inverse=True)
     counts = np.zeros((rows.max() + 1, columns.max() + 1))
@@ -156,26 +161,37 @@ def rand_index(first: np.ndarray, second: np.ndarray) -> float:
 
     of_rows, of_columns = pairs(counts.sum(axis=1)), pairs(counts.sum(axis=0))
     expected = of_rows * of_columns / max(pairs(np.array([len(first)])), 1.0)
-    most = (of_rows + of_columns) / 2
-    return 1.0 if most == expected else (pairs(counts) - expected) / (most - expected)
+    largest = (of_rows + of_columns) / 2
+    return 1.0 if largest == expected else (pairs(counts) - expected) / (largest - expected)
 
 
-def decomposition_table(shapes: Iterable[tuple[str, Shape]], cuts: Sequence[Segmentation]) -> Table:
-    """A row for each shape and way to cut it."""
+def decomposition_table(shapes: Iterable[tuple[str, Shape]], segmentations: Sequence[Segmentation]) -> Table:
+    """Return one row for each shape and segmentation."""
     rows: list[tuple[Cell, ...]] = []
     for name, shape in shapes:
-        for cut in cuts:
-            each = returned(name, shape, cut)
-            counts = (f"{each.parts[0]} / {each.parts[1]}", f"{each.types[0]} / {each.types[1]}")
-            shares = (100 * each.back, 100 * each.contacts)
-            figures: tuple[Cell, ...] = ("", "", "", "") if each.why else (each.part_index, each.type_index, *shares)
-            rows.append((name, cut, *counts, *figures, each.seconds, each.why))
-    columns = ("model", "cut by", "parts", "types", "parts, Rand", "types, Rand", "parts back %", "contacts %", "s", "")
-    notes = (
-        f"Models whose parts are known, merged to one mesh and welded, then cut again; {POINTS:,} points of their "
-        "surface, but for those where two parts meet. Parts, types: known / found. Rand: adjusted Rand index of the "
-        "points by part, and by type; 1 where all came back, 0 by chance. Parts back: those that have a found part of "
-        "their own, with more than half of what both cover in common. Contacts: of those between parts that came back, "
-        "how many are contacts of what was found.",
+        for segmentation in segmentations:
+            recovery = measure_part_recovery(name, shape, segmentation)
+            counts = (f"{recovery.parts[0]} / {recovery.parts[1]}", f"{recovery.types[0]} / {recovery.types[1]}")
+            shares = (recovery.part_index, recovery.type_index, 100 * recovery.recovered, 100 * recovery.contacts)
+            cells: tuple[Cell, ...] = ("", "", "", "") if recovery.failure else shares
+            rows.append((name, segmentation, *counts, *cells, recovery.seconds, recovery.failure))
+    columns = (
+        "model",
+        "segmentation",
+        "parts",
+        "types",
+        "parts, Rand",
+        "types, Rand",
+        "recovered %",
+        "contacts %",
+        "s",
+        "",
     )
-    return Table("What comes back of known parts", columns, tuple(rows), notes)
+    notes = (
+        f"Models with known parts, merged to one mesh and welded, then segmented; {NUM_POINTS:,} points of their "
+        "surface, "
+        "without those where two parts touch. Parts, types: known / found. Rand: adjusted Rand index of the points by "
+        "part and by type; 1 for full recovery, 0 by chance. Recovered: parts with a found part of their own, by more "
+        "than half intersection over union. Contacts: those between recovered parts that are found.",
+    )
+    return Table("Recovery of known parts", columns, tuple(rows), notes)

@@ -1,4 +1,4 @@
-"""What may take each other's place in a model by its parts (symmetry §3.3, strings §3)."""
+"""Exchanges of parts that the neighbourhoods of a model allow (symmetry §3.3, strings §3)."""
 
 from __future__ import annotations
 
@@ -15,90 +15,88 @@ from stages.variations.substructures.alignments import find_region_swaps
 from stages.variations.substructures.docking_sites import contact_graph
 from stages.variations.substructures.region_swaps import RegionSwaps
 
-LARGEST = 0.5
-"""Share of the surface that a piece has at most: to exchange more is to exchange the rest."""
-TRIED = 4096
-"""Sets of regions that are tried along a motion, from each region on."""
+MAX_PIECE_SHARE = 0.5
+"""Of the surface; a larger exchange is one of the rest."""
+MAX_REGION_SETS = 4096
+"""Sets of regions tried for a transform, from each start region."""
 
 
 @dataclass(frozen=True, eq=False)
 class Exchange:
-    """An exchange by parts: which leave and which come, bool (n,) each, and what brings those, float64 (4, 4)."""
+    """An exchange of parts."""
 
-    taken: BoolArray
+    removed: BoolArray
+    """Parts that leave, bool (n,)."""
     piece: BoolArray
-    motion: FloatArray
+    """Parts whose copies are added, bool (n,)."""
+    transform: FloatArray
+    """Of the copies, float64 (4, 4)."""
 
 
 def known_exchanges(kit: Kit) -> list[Exchange]:
-    """What may take each other's place in the first exemplar of a kit: elementary docking sites (symmetry §3.3), of
-    parts in place of points and of their neighbours in place of the radius.
+    """Return the elementary exchanges of the first exemplar of a kit (symmetry §3.3).
 
-    Each motion that keeps what points up and lays some part upon an equal one leaves regions of parts that it does not
-    lay upon equal ones. As few regions change places at once as it takes for every part to have a neighbourhood that
-    the kit's grammar admits. An exchange and the one back are one. Pieces of more than half of the surface are left
-    out.
+    Parts take the role of points, and neighbours that of the radius. A transform that keeps up and aligns equal parts
+    leaves regions of unaligned parts. An exchange is a minimal set of regions that can change places so that the kit's
+    grammar admits every neighbourhood. An exchange and its inverse are one. Pieces of more than half of the surface
+    are left out.
     """
     assembly = kit.exemplars[0].whole
     graph = contact_graph(kit, assembly, np.zeros((len(assembly.edges), 2), dtype=np.int32))
     moves = find_region_swaps(kit, {"y": 1, "z": 2}[kit.up], (assembly, graph), (assembly, graph))
     area = _areas(kit, assembly)
-    found: dict[frozenset[bytes], Exchange] = {}
+    exchanges: dict[frozenset[bytes], Exchange] = {}
     for motion in range(len(moves.motions)):
         for chosen in _elementary(kit, assembly, moves, motion):
             move = moves.along(motion, chosen)
             pair = move.taken, move.piece
-            if max(area[each].sum() for each in pair) <= LARGEST and (pair[0] != pair[1]).any():
-                found.setdefault(frozenset(each.tobytes() for each in pair), Exchange(*pair, move.motion))
-    return list(found.values())
+            if max(area[parts].sum() for parts in pair) <= MAX_PIECE_SHARE and (pair[0] != pair[1]).any():
+                exchanges.setdefault(frozenset(parts.tobytes() for parts in pair), Exchange(*pair, move.motion))
+    return list(exchanges.values())
 
 
 def _areas(kit: Kit, assembly: Assembly) -> FloatArray:
-    """Share of the surface that each part has, float64 (n,)."""
-    corners = [kit.types[each].vertices[kit.types[each].faces] for each in assembly.types.tolist()]
+    """Return the share of the surface of each part, float64 (n,)."""
+    corners = [kit.types[kind].vertices[kit.types[kind].faces] for kind in assembly.types.tolist()]
     areas = np.array([triangle_areas(part).sum() for part in corners])
     shares: FloatArray = areas / areas.sum()
     return shares
 
 
-def _elementary(kit: Kit, assembly: Assembly, moves: RegionSwaps, motion: int) -> Iterator[BoolArray]:
-    """The least sets of regions along a motion that can change places, by their numbers, bool (n + n,)."""
-    regions, near = moves.regions[motion], assembly.neighbours()
+def _elementary(kit: Kit, assembly: Assembly, swaps: RegionSwaps, transform: int) -> Iterator[BoolArray]:
+    """Yield the minimal sets of regions of a transform that can change places, by region, bool (n + n,)."""
+    regions, neighbours = swaps.regions[transform], assembly.neighbours()
     count = len(assembly)
     every = frozenset(np.unique(regions[regions >= 0]).tolist())
-    between = []  # a part that stays, what is beside it that may leave or stay, and that may come
-    for other, part in enumerate(moves.images[motion].tolist()):
+    aligned = []  # a part that stays; its neighbours, which may leave; and the neighbours that may be added
+    for other, part in enumerate(swaps.images[transform].tolist()):
         if part >= 0:
-            between.append(
-                (
-                    part,
-                    [(int(regions[each]), each) for each in near[part]],
-                    [(int(regions[count + each]), each) for each in near[other] if regions[count + each] >= 0],
-                )
-            )
+            own = [(int(regions[neighbour]), neighbour) for neighbour in neighbours[part]]
+            new = [(int(regions[count + neighbour]), neighbour) for neighbour in neighbours[other]]
+            aligned.append((part, own, [pair for pair in new if pair[0] >= 0]))
 
-    def beside_misfit(chosen: frozenset[int]) -> frozenset[int]:
-        """The regions beside the first part that would have a neighbourhood that is not admitted; none if all have."""
-        for part, own, new in between:
+    def around_misfit(chosen: frozenset[int]) -> frozenset[int]:
+        """Return the regions around the first part without an admitted neighbourhood; none if all have one."""
+        for part, own, new in aligned:
             around = frozenset(region for region, _ in (*own, *new) if region >= 0)
-            left = [each for region, each in own if region not in chosen]
-            come = [each for region, each in new if region in chosen]
-            if around and not admits(kit.grammar, int(assembly.types[part]), assembly.multiset(left + come)):
+            kept = [neighbour for region, neighbour in own if region not in chosen]
+            added = [neighbour for region, neighbour in new if region in chosen]
+            if around and not admits(kit.grammar, int(assembly.types[part]), assembly.multiset(kept + added)):
                 return around
         return frozenset()
 
-    least: list[frozenset[int]] = []
+    minimal: list[frozenset[int]] = []
     for first in sorted(every):
-        waiting, seen = [frozenset([first])], {frozenset([first])}
-        for chosen in waiting:  # grows; the smaller sets come first
-            if any(each <= chosen for each in least) or chosen == every or len(waiting) > TRIED:
+        queue, seen = [frozenset([first])], {frozenset([first])}
+        for chosen in queue:  # grows; smaller sets come first
+            if any(smaller <= chosen for smaller in minimal) or chosen == every or len(queue) > MAX_REGION_SETS:
                 continue
-            around = beside_misfit(chosen)
+            around = around_misfit(chosen)
             if not around:
-                least.append(chosen)
-            more = [chosen | {each} for each in sorted(around - chosen)]
-            waiting += [each for each in more if each not in seen]
-            seen.update(more)
-    for chosen in least:
-        if not any(each < chosen for each in least):
+                minimal.append(chosen)
+            larger = [chosen | {region} for region in sorted(around - chosen)]
+            queue += [regions_set for regions_set in larger if regions_set not in seen]
+            seen.update(larger)
+    for chosen in minimal:
+        if not any(smaller < chosen for smaller in minimal):
             yield np.isin(np.arange(len(regions)), list(chosen))

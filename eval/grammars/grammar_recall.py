@@ -1,4 +1,4 @@
-"""How much of what the parts of a model allow its shape grammar finds again without them (symmetry §3.3, §3.4)."""
+"""Grammar recall: the exchanges known from a model's parts that its shape grammar finds (symmetry §3.3, §3.4)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import numpy as np
 import open3d as o3d
 
 from eval.engine.table import Cell, Table
-from eval.grammars.decomposition import merged, points_of_parts, scene_of_parts
-from eval.grammars.exchanges import LARGEST, Exchange, known_exchanges
+from eval.grammars.decomposition import points_of_parts, scene_of_parts, write_merged
+from eval.grammars.exchanges import MAX_PIECE_SHARE, Exchange, known_exchanges
 from stages.grammars.extraction.docked_pieces import DockedPiece
 from stages.grammars.extraction.extract import extract_grammar
 from stages.grammars.read_surface import read_surface
@@ -25,96 +25,100 @@ from stages.shape.shape import Shape, kit_shape
 from stages.symmetry.matching.cell_lookup import is_among
 from stages.symmetry.surface.grid import SurfaceGrid
 
-RADIUS = 0.016
+RADIUS_SHARE = 0.016
 """Radius of similarity, as a share of the longest side of the box (symmetry §5)."""
-SAME = 0.8
-"""Two exchanges are one if what they take away has this share of what both cover in common, and what they bring."""
-WHOLE = 0.9
-"""Share of a part that stays as it is, or may go along, where an exchange leaves it whole."""
-CHANGE = 4e-3
-"""Share of the surface, of what goes and what comes together, from which on an exchange changes something: borders of
-cells do not move with dockers."""
-NEAR = 0.25
-"""Surface is the same if it is so near; unit: cells."""
-TURNED = 0.95
-"""Cosine of the angle of normals up to which it is the same."""
+MIN_EXCHANGE_OVERLAP = 0.8
+"""Intersection over union from which two exchanges are one, of what they remove and of what they add."""
+MIN_WHOLE_SHARE = 0.9
+"""Share of a part that stays, or leaves, in an exchange of whole parts."""
+MIN_CHANGED_SHARE = 4e-3
+"""Of the surface, removed and added; borders of cells do not move with docked pieces."""
+MAX_DISTANCE_CELLS = 0.25
+"""Between surfaces that are the same."""
+MIN_NORMAL_COSINE = 0.95
+"""Between normals of surfaces that are the same."""
 
 
 @dataclass(frozen=True)
-class GrammarReturned:
-    """Exchanges of a model by its parts and by its grammar. known: how many its parts allow; found: how many of them
-    the grammar has; dockers, classes: of the grammar; pairs: of dockers of one class; whole: how many of those leave
-    every part whole; seconds: CPU seconds for the grammar."""
+class GrammarRecall:
+    """Exchanges of a model by its parts and by its grammar."""
 
     name: str
     parts: int
     known: int
+    """Exchanges that the parts allow."""
     found: int
+    """Of these, in the grammar."""
     docked_pieces: int
     classes: int
+    """Of docked pieces."""
     pairs: int
+    """Exchanges of two docked pieces of one class."""
     whole: int
+    """Of these, of whole parts."""
     seconds: float
+    """CPU seconds for the grammar."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Change:
-    """What an exchange changes, of the points of a sample, bool (p,) each: those that go away, and those whose copies
-    come; both where the exemplar has them."""
+    """The change of an exchange, as points of a sample, bool (p,) each."""
 
-    goes: BoolArray
-    comes: BoolArray
+    removed: BoolArray
+    added: BoolArray
+    """Points whose copies are added."""
 
     @property
     def is_any(self) -> bool:
-        """Whether it is anything."""
-        return bool(self.goes.mean() + self.comes.mean() > CHANGE)
+        return bool(self.removed.mean() + self.added.mean() > MIN_CHANGED_SHARE)
 
     def is_like(self, other: _Change) -> bool:
-        """Whether both, or the one and what takes back the other, change the same."""
-        return (_same(self.goes, other.goes) and _same(self.comes, other.comes)) or (
-            _same(self.goes, other.comes) and _same(self.comes, other.goes)
+        """Return whether both change the same, or one reverts the other."""
+        return (_same(self.removed, other.removed) and _same(self.added, other.added)) or (
+            _same(self.removed, other.added) and _same(self.added, other.removed)
         )
 
 
-def grammar_returned(name: str, kit: Kit) -> GrammarReturned:
-    """Merge the first exemplar of a kit, make a grammar of it, and compare what can be exchanged.
+def measure_recall(name: str, kit: Kit) -> GrammarRecall:
+    """Merge the first exemplar of a kit, extract its grammar, and compare the exchanges.
 
-    A docking site may be moved within what is symmetric, and the exchange is the same (symmetry §3.3, figure 4a). So
-    exchanges are compared by what they change. Raises ConfigError where no grammar can be made.
+    A docking site can move within what is symmetric without changing the exchange (symmetry §3.3, figure 4a), so
+    exchanges are compared by what they change. Raises ConfigError if no grammar can be extracted.
     """
     shape = kit_shape(kit, kit.exemplars[0].whole)
-    begun = time.process_time()
+    start = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "merged.glb"
-        merged(shape, path)
+        write_merged(shape, path)
         surface, _ = read_surface(path)
-    made = extract_grammar(surface, name, RADIUS, kit.up, np.random.default_rng(0))
-    seconds = time.process_time() - begun
-    sample = _Sample(shape, made.grid)
-    known = [change for each in known_exchanges(kit) if (change := sample.of_parts(each)).is_any]
-    ours, whole = [], 0
-    for one, other in combinations(made.docked_pieces, 2):
-        if one.site == other.site and max(sample.held(one).mean(), sample.held(other).mean()) <= LARGEST:
-            change, leaves_whole = sample.of_dockers(one, other)
+    extraction = extract_grammar(surface, name, RADIUS_SHARE, kit.up, np.random.default_rng(0))
+    seconds = time.process_time() - start
+    sample = _Sample(shape, extraction.grid)
+    known = [change for exchange in known_exchanges(kit) if (change := sample.of_parts(exchange)).is_any]
+    found, whole = [], 0
+    for first, second in combinations(extraction.docked_pieces, 2):
+        if first.site != second.site:
+            continue
+        if max(sample.held(first).mean(), sample.held(second).mean()) <= MAX_PIECE_SHARE:
+            change, leaves_whole = sample.of_docked_pieces(first, second)
             if change.is_any:
-                ours.append(change)
+                found.append(change)
                 whole += leaves_whole
-    return GrammarReturned(
+    return GrammarRecall(
         name,
         len(shape.assembly),
         len(known),
-        sum(any(each.is_like(one) for one in ours) for each in known),
-        len(made.docked_pieces),
-        len({each.site for each in made.docked_pieces}),
-        len(ours),
+        sum(any(change.is_like(other) for other in found) for change in known),
+        len(extraction.docked_pieces),
+        len({piece.site for piece in extraction.docked_pieces}),
+        len(found),
         whole,
         seconds,
     )
 
 
 class _Sample:
-    """Points of a shape, each of one part, and what stands where motions take them."""
+    """Points of a shape, each of one part, and the surface at their images under transforms."""
 
     def __init__(self, shape: Shape, grid: SurfaceGrid) -> None:
         from scipy.spatial import KDTree
@@ -126,85 +130,89 @@ class _Sample:
         self._grid, self._cells = grid, KDTree(grid.cells)
         self._home = self._cells_at(np.eye(4))
 
-    def held(self, docker: DockedPiece) -> BoolArray:
-        """Which points a docker holds, bool (p,)."""
-        return is_among(docker.cells, self._home)
+    def held(self, piece: DockedPiece) -> BoolArray:
+        """Return which points a docked piece holds, bool (p,)."""
+        return is_among(piece.cells, self._home)
 
     def of_parts(self, exchange: Exchange) -> _Change:
-        """What an exchange of parts changes."""
-        back_on, back_part = self._met(invert(exchange.motion))
-        on, part = self._met(exchange.motion)
+        """Return the change of an exchange of parts."""
+        covered_before, part_before = self._surface_at(invert(exchange.transform))
+        covered, part = self._surface_at(exchange.transform)
         return _Change(
-            exchange.taken[self._part] & ~(back_on & exchange.piece[back_part]),
-            exchange.piece[self._part] & ~(on & exchange.taken[part]),
+            exchange.removed[self._part] & ~(covered_before & exchange.piece[part_before]),
+            exchange.piece[self._part] & ~(covered & exchange.removed[part]),
         )
 
-    def of_dockers(self, one: DockedPiece, other: DockedPiece) -> tuple[_Change, bool]:
-        """What it changes to put one docker where another of its class is, and whether that leaves every part whole.
+    def of_docked_pieces(self, first: DockedPiece, second: DockedPiece) -> tuple[_Change, bool]:
+        """Return the change of replacing one docked piece by another of its class, and whether it keeps parts whole.
 
-        Each part either stays, for hardly any of it changes, or can go as a whole, for what of it is not held is
-        symmetric; one part goes at least, and all that go are not most of the surface.
+        Each part then either stays, with hardly any change, or can leave as a whole, since the rest of it is symmetric.
+        At least one part leaves, and those that leave are not most of the surface.
         """
-        way = one.frame @ invert(other.frame)  # of the other to where the one is
-        changed, whole, goes_any = [], True, False
-        for own, docked, there in ((one, other, invert(way)), (other, one, way)):
-            on, _ = self._met(there)
+        transform = first.frame @ invert(second.frame)  # from the second to where the first is
+        changed, whole, any_leaves = [], True, False
+        for own, other, there in ((first, second, invert(transform)), (second, first, transform)):
+            covered, _ = self._surface_at(there)
             held = self.held(own)
-            changed.append(held & ~(on & is_among(docked.cells, self._cells_at(there))))
-            goes = self._share(changed[-1]) > 1 - WHOLE
-            whole &= bool((self._share(held | on)[goes] >= WHOLE).all())
-            whole &= bool((held | goes[self._part]).mean() <= LARGEST)
-            goes_any |= bool(goes.any())
-        return _Change(*changed), whole and goes_any
+            changed.append(held & ~(covered & is_among(other.cells, self._cells_at(there))))
+            leaves = self._share(changed[-1]) > 1 - MIN_WHOLE_SHARE
+            whole &= bool((self._share(held | covered)[leaves] >= MIN_WHOLE_SHARE).all())
+            whole &= bool((held | leaves[self._part]).mean() <= MAX_PIECE_SHARE)
+            any_leaves |= bool(leaves.any())
+        return _Change(*changed), whole and any_leaves
 
     def _share(self, chosen: BoolArray) -> FloatArray:
-        """Which share of each part is chosen, float64 (n,)."""
+        """Return the chosen share of each part, float64 (n,)."""
         count = np.bincount(self._part)
         share: FloatArray = np.bincount(self._part, weights=chosen, minlength=len(count)) / np.maximum(count, 1)
         return share
 
-    def _cells_at(self, motion: FloatArray) -> np.ndarray:
-        """The occupied cell that is nearest to where a motion (4, 4) takes each point, int64 (p,)."""
-        at = (transform_points(motion, self._points) - self._grid.origin) / self._grid.cell_size
-        found: np.ndarray = self._cells.query(at - 0.5)[1]
+    def _cells_at(self, transform: FloatArray) -> np.ndarray:
+        """Return the occupied cell nearest to each point's image under a transform (4, 4), int64 (p,)."""
+        image = (transform_points(transform, self._points) - self._grid.origin) / self._grid.cell_size
+        found: np.ndarray = self._cells.query(image - 0.5)[1]
         return found
 
-    def _met(self, motion: FloatArray) -> tuple[BoolArray, np.ndarray]:
-        """Whether the surface is where a motion (4, 4) takes each point, and as there, bool (p,); and the part that is
-        nearest to that place, int64 (p,)."""
-        at = transform_points(motion, self._points)
-        closest = self._scene.compute_closest_points(o3d.core.Tensor(at.astype(np.float32)))
-        away = np.linalg.norm(closest["points"].numpy() - at, axis=1)
-        turned = (closest["primitive_normals"].numpy() * (self._normals @ motion[:3, :3].T)).sum(axis=1)
-        parts = np.array([self._part_of[each] for each in closest["geometry_ids"].numpy().tolist()], dtype=np.int64)
-        return (away < NEAR * self._grid.cell_size) & (turned > TURNED), parts
+    def _surface_at(self, transform: FloatArray) -> tuple[BoolArray, np.ndarray]:
+        """Look at the surface at each point's image under a transform (4, 4).
+
+        Return whether it matches in position and normal, bool (p,), and the nearest part, int64 (p,).
+        """
+        image = transform_points(transform, self._points)
+        closest = self._scene.compute_closest_points(o3d.core.Tensor(image.astype(np.float32)))
+        distance = np.linalg.norm(closest["points"].numpy() - image, axis=1)
+        cosine = (closest["primitive_normals"].numpy() * (self._normals @ transform[:3, :3].T)).sum(axis=1)
+        parts = np.array(
+            [self._part_of[geometry] for geometry in closest["geometry_ids"].numpy().tolist()], dtype=np.int64
+        )
+        return (distance < MAX_DISTANCE_CELLS * self._grid.cell_size) & (cosine > MIN_NORMAL_COSINE), parts
 
 
-def _same(one: BoolArray, other: BoolArray) -> bool:
-    """Whether two sets of points have SAME of what both cover in common."""
-    return bool((one & other).sum() >= SAME * (one | other).sum())
+def _same(first: BoolArray, second: BoolArray) -> bool:
+    """Return whether two sets of points overlap by MIN_EXCHANGE_OVERLAP, intersection over union."""
+    return bool((first & second).sum() >= MIN_EXCHANGE_OVERLAP * (first | second).sum())
 
 
 def grammar_table(kits: Iterable[tuple[str, Kit]]) -> Table:
-    """A row for each model, of which the parts are known."""
+    """Return one row for each model with known parts."""
     rows: list[tuple[Cell, ...]] = []
     for name, kit in kits:
-        each = grammar_returned(name, kit)
-        found: Cell = 100 * each.found / each.known if each.known else ""
-        whole: Cell = 100 * each.whole / each.pairs if each.pairs else ""
-        counts = (f"{each.docked_pieces} / {each.classes}", each.pairs)
-        rows.append((name, each.parts, each.known, found, *counts, whole, each.seconds))
-    columns = ("model", "parts", "exchanges", "found %", "dockers / classes", "pairs", "whole parts %", "CPU s")
+        recall = measure_recall(name, kit)
+        found: Cell = 100 * recall.found / recall.known if recall.known else ""
+        whole: Cell = 100 * recall.whole / recall.pairs if recall.pairs else ""
+        counts = (f"{recall.docked_pieces} / {recall.classes}", recall.pairs)
+        rows.append((name, recall.parts, recall.known, found, *counts, whole, recall.seconds))
+    columns = ("model", "parts", "exchanges", "found %", "pieces / classes", "pairs", "whole parts %", "CPU s")
     notes = (
-        "Models whose parts are known, merged to one mesh and welded, of which a shape grammar is made by symmetry, "
-        f"radius {100 * RADIUS:g} %. Exchanges: what may take each other's place by the parts. Motions lay the model "
-        "upon itself, equal parts upon equal ones; as few of the regions left over change places as it takes for every "
-        "part to have neighbours as one like it has them in the model: elementary docking sites (symmetry §3.3), of "
-        "parts and their neighbours in place of points and the radius. Pairs: of dockers of one class that are not the "
-        "same, each of which may stand where the other does. Of both only pieces of at most half of the surface count: "
-        "to exchange more is to exchange the rest. Found: exchanges that are a pair, by the surface that goes and the "
-        f"surface that comes, {100 * SAME:g} % of what both cover in common of each; for a site may be moved within "
-        "what is symmetric, and the exchange is the same. Whole parts: pairs that let every part stay or go as a "
-        f"whole, {100 * WHOLE:g} % of it. Whether what comes runs into what stays is asked of neither.",
+        "Models with known parts, merged to one mesh and welded, and their shape grammar by symmetry, with a radius of "
+        f"{100 * RADIUS_SHARE:g} %. Exchanges: those that the parts allow. Transforms align equal parts of the model; "
+        "as "
+        "few of the remaining regions as possible change places so that every part keeps a neighbourhood of the model. "
+        "These are elementary docking sites (symmetry §3.3), with parts and neighbours for points and radius. Pairs: "
+        "exchanges of two docked pieces of one class. Both count only pieces of at most half of the surface: a larger "
+        "exchange is one of the rest. Found: exchanges that are a pair, by the removed and the added surface, with "
+        f"{100 * MIN_EXCHANGE_OVERLAP:g} % intersection over union, since a site can move within what is symmetric. "
+        f"Whole parts: pairs that keep or replace every part as a whole, by {100 * MIN_WHOLE_SHARE:g} % of it. "
+        "Collisions of added and kept parts are not checked.",
     )
-    return Table("How much of the grammar of known parts comes back", columns, tuple(rows), notes)
+    return Table("Grammar recall of known parts", columns, tuple(rows), notes)

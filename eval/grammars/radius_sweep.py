@@ -1,4 +1,4 @@
-"""What the radius of similarity does to the grammar of a mesh (symmetry figure 10 j)."""
+"""Grammars of a mesh by radius of similarity (symmetry figure 10 j)."""
 
 from __future__ import annotations
 
@@ -16,47 +16,50 @@ from stages.grammars.read_surface import read_surface
 from stages.grammars.settings import GrammarConfig
 from stages.shape.views.sheet import Section, contact_sheet, picture_png
 
-DOCKERS = 3
-"""So many dockers are shown of each radius."""
-SHAPES = 2
-"""So many shapes by each method."""
-CELL = 200
+SITES_SHOWN = 3
+SHAPES_PER_METHOD = 2
+PICTURE_WIDTH = 200
 
 
 def extractions(path: Path, radii: Sequence[float], up: Literal["y", "z"]) -> dict[float, ExtractedGrammar]:
-    """The grammar of the mesh or cloud in a file, whose axis `up` points up, for each radius, as a share of the longest
-    side."""
+    """Extract the grammar of the mesh or cloud in a file for each radius, as a share of the longest side."""
     name = path.parent.name if path.stem == "model" else path.stem
     surface, _ = read_surface(path)
-    return {each: extract_grammar(surface, name, each, up, decision_rng(0, "radii", name)) for each in radii}
+    return {radius: extract_grammar(surface, name, radius, up, decision_rng(0, "radii", name)) for radius in radii}
 
 
-def radii_table(found: dict[float, ExtractedGrammar]) -> Table:
-    """A row for each radius."""
+def radius_table(by_radius: dict[float, ExtractedGrammar]) -> Table:
+    """Return one row for each radius."""
     rows: list[tuple[Cell, ...]] = []
-    for radius, each in found.items():
-        grids = ", ".join(" x ".join(map(str, one.counts)) for one in each.grammar.grids)
-        sites = len({docker.site for docker in each.docked_pieces})
-        counts = (len(each.grid), each.transforms, len(each.docked_pieces), sites, len(each.grammar.productions))
-        rows.append((f"{radius:.1%}", *counts, grids or "none", sum(each.seconds.values())))
-    columns = ("radius", "cells", "motions", "docking sites", "classes", "rules", "grids", "s")
+    for radius, extraction in by_radius.items():
+        grids = ", ".join(" x ".join(map(str, grid.counts)) for grid in extraction.grammar.grids)
+        sites = len({piece.site for piece in extraction.docked_pieces})
+        counts = (
+            len(extraction.grid),
+            extraction.transforms,
+            len(extraction.docked_pieces),
+            sites,
+            len(extraction.grammar.productions),
+        )
+        rows.append((f"{radius:.1%}", *counts, grids or "none", sum(extraction.seconds.values())))
+    columns = ("radius", "cells", "transforms", "docking sites", "classes", "productions", "grids", "s")
     notes = (
         "Radius: of similarity, as a share of the longest side of the model's box. Grids: cells along their rows. "
         "s: CPU seconds.",
     )
-    return Table("What the radius of similarity does", columns, tuple(rows), notes)
+    return Table("Grammar by radius of similarity", columns, tuple(rows), notes)
 
 
-def radii_sheet(path: Path, found: dict[float, ExtractedGrammar]) -> Figure:
-    """For each radius the model with its docking sites, some dockers, and some shapes by rules and by grids."""
+def radius_figure(path: Path, by_radius: dict[float, ExtractedGrammar]) -> Figure:
+    """Show, for each radius, the model with its docking sites, some docked pieces, and shapes by rules and by grids."""
     sections = []
-    for radius, each in found.items():
-        grammar = each.grammar
+    for radius, extraction in by_radius.items():
+        grammar = extraction.grammar
         config = GrammarConfig(name="radii", model=path.resolve(), radius=radius)
-        shapes = [text for texts in preview_shapes(grammar, config, SHAPES).values() for text in texts]
-        row = [*docked_pieces_row(each, DOCKERS), *shapes_row(grammar, shapes)]
-        note = f"{each.transforms} motions, {len(grammar.productions)} rules, {len(grammar.grids)} grids"
+        shapes = [text for texts in preview_shapes(grammar, config, SHAPES_PER_METHOD).values() for text in texts]
+        row = [*docked_pieces_row(extraction, SITES_SHOWN), *shapes_row(grammar, shapes)]
+        note = f"{extraction.transforms} transforms, {len(grammar.productions)} productions, {len(grammar.grids)} grids"
         sections.append(Section(f"Radius {radius:.1%}", [row], note))
-    name = next(iter(found.values())).grammar.name
-    title = f"{name}: docking sites, dockers (yellow), shapes"
-    return Figure(name.lower(), title, picture_png(contact_sheet(sections, title, CELL)))
+    name = next(iter(by_radius.values())).grammar.name
+    title = f"{name}: docking sites, docked pieces (yellow), shapes"
+    return Figure(name.lower(), title, picture_png(contact_sheet(sections, title, PICTURE_WIDTH)))

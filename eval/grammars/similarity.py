@@ -1,5 +1,7 @@
-"""Is a shape r-similar to an exemplar (symmetry §3.1)? An answer from the surfaces alone: nothing here is shared with
-the search for symmetries, or knows how a shape was made."""
+"""r-similarity of a shape to an exemplar, from their surfaces alone (symmetry §3.1).
+
+The test is independent of the search for symmetries and of how a shape was made.
+"""
 
 from __future__ import annotations
 
@@ -18,116 +20,117 @@ from stages.shape.geometry.pose import transform_points
 from stages.shape.geometry.triangles import area_vectors
 from stages.shape.shape import Shape
 
-COLUMNS = ("shapes of", "exemplars", "shapes", "radius", "similar %", "probes", "matched %", "worst", "motions")
+COLUMNS = ("shapes of", "exemplars", "shapes", "radius", "similar %", "probes", "matched %", "worst", "transforms")
 
 NOTES = (
-    "Similar: shapes of which every probe, a random point of the surface, has its neighbourhood in an exemplar: some "
-    "rigid motion lays what lies within the radius along the surface onto it, both ways, with normals. Matched: "
-    "probes; worst: of the least matched probe of all the share of its neighbourhood that some motion matched. "
-    "Motions: how many it took to match a shape, median: into so many pieces the exemplar was cut at least.",
+    "Similar: shapes with all probes matched. A probe is a random point of the surface; it matches if a rigid "
+    "transform "
+    "aligns its neighbourhood, within the radius along the surface, with one of an exemplar, in both directions and "
+    "with "
+    "normals. Matched: probes. Worst: matched share of the neighbourhood of the least matched probe. Transforms: "
+    "median number that matches a shape; the exemplar was cut into at least as many pieces.",
 )
 
-SPACING = 6.0
-"""So many samples of a surface lie side by side along the radius."""
-LINKED = 2.2
-"""Samples closer than so many spacings are linked: distances along the surface are sums of links."""
-TOLERANCE = 0.02
-"""Surfaces that are farther apart than this share of the radius differ."""
-SAME_ANGLE = 0.05
-"""Radians between normals that are one."""
-SAME_NORMAL = 1e-3
-"""Radians between faces at a vertex that count as one plane."""
-SAME_VERTEX = 1e-4
-"""Corners of triangles closer than about this share of the radius are one vertex."""
-ABOUT = np.linspace(0.25, 1.75, 7) * np.pi
-"""Directions about a side, in radians from its own triangle, in which more surface is looked for."""
-MOST_PLANES = 8
+SAMPLES_PER_RADIUS = 6.0
+"""Samples of a surface along the radius."""
+MAX_LINK_SPACINGS = 2.2
+"""Between linked samples, in spacings; distances along the surface are sums of links."""
+TOLERANCE_SHARE = 0.02
+"""Of the radius, between surfaces that are the same."""
+MAX_NORMAL_RADIANS = 0.05
+"""Between normals that are the same."""
+PLANE_RADIANS = 1e-3
+"""Between faces at a vertex that count as one plane."""
+WELD_SHARE = 1e-4
+"""Of the radius, between corners of triangles that are one vertex."""
+EDGE_DIRECTIONS = np.linspace(0.25, 1.75, 7) * np.pi
+"""About a side, in radians from its own triangle, in which adjacent surface is looked for."""
+MAX_PLANES = 8
 """A vertex of more planes is the tip of a cone."""
-NEAREST = 12
-"""So many corner frames of the shape, those nearest to a probe, are laid on all like them of the exemplar."""
-FRAMES = 30_000
-"""Of the exemplar at most about so many corner frames of a kind are tried."""
-GLANCE = 6
-"""Samples of a neighbourhood that are looked at before all of them."""
-TRIED = 64
-"""Motions that pass the glance, and are tried one after another."""
-ANYWHERE, TURNS = 1000, 12
-"""Where no corner helps, a probe is laid on so many samples of the exemplar, in so many turns about its normal."""
+CORNER_FRAMES_TRIED = 12
+"""Of the shape, nearest to a probe."""
+MAX_EXEMPLAR_FRAMES = 30_000
+"""Of one kind, about."""
+PRECHECK_SAMPLES = 6
+"""Of a neighbourhood, before all of them are compared."""
+MAX_TRANSFORMS = 64
+"""Compared in full for a probe."""
+FALLBACK_SAMPLES, FALLBACK_TURNS = 1000, 12
+"""Samples of the exemplar, and turns about the normal, tried for a probe without matching corners."""
 
 
 @dataclass(frozen=True)
 class Similarity:
-    """What was found at the probes of a shape.
-
-    probes: float64 (p, 3), points of the shape; matched: bool (p,), whether the exemplar has the neighbourhood of each
-    somewhere; shares: float64 (p,), of what is not matched the greatest share of a neighbourhood that any motion
-    matched, else 1; motions: float64 (m, 4, 4), those that matched, from the exemplar to the shape.
-    """
+    """The result for the probes of a shape."""
 
     probes: FloatArray
+    """Points of the shape, float64 (p, 3)."""
     matched: BoolArray
+    """Whether the exemplar has the neighbourhood of each, bool (p,)."""
     shares: FloatArray
-    motions: FloatArray
+    """Greatest matched share of each neighbourhood, 1 if matched, float64 (p,)."""
+    transforms: FloatArray
+    """Those that matched, from the exemplar to the shape, float64 (m, 4, 4)."""
 
     @property
     def share(self) -> float:
-        """The share of probes that are matched."""
+        """The share of matched probes."""
         return float(self.matched.mean())
 
     @property
     def worst(self) -> FloatArray:
-        """The probe of which least was matched, float64 (3,)."""
-        found: FloatArray = self.probes[self.shares.argmin()]
-        return found
+        """The least matched probe, float64 (3,)."""
+        probe: FloatArray = self.probes[self.shares.argmin()]
+        return probe
 
 
 def r_similarity(
     exemplar: FloatArray, shape: FloatArray, radius: float, probes: int, rng: np.random.Generator
 ) -> Similarity:
-    """Whether each of `probes` random points of a shape, triangles (t, 3, 3), has its neighbourhood in the exemplar.
+    """Test whether each of `probes` random points of a shape, triangles (t, 3, 3), has its ball in an exemplar.
 
-    Definition of §3.1: there are a point of the exemplar and a rigid motion to the point of the shape which takes what
-    lies within `radius` along the exemplar onto the shape, with its normals; and, so that the topology is the same too,
-    what lies within it along the shape comes from the exemplar. Distances along a surface are those in a graph of
-    samples, some per cent longer; sheets closer than about a third of the radius count as linked.
+    By §3.1, a rigid transform must take a point of the exemplar to the probe, and its neighbourhood, within `radius`
+    along the surface, onto the shape with its normals. For equal topology the neighbourhood of the probe must also come
+    from the exemplar. Distances along a surface are those in a graph of samples, some per cent longer; sheets closer
+    than about a third of the radius count as linked.
 
-    Motions are found where corners, each with two planes that meet there, lie on corners of the same kind; each that
-    matches one probe is tried on all others: there is a search for each piece of a shape and not for each probe.
-    Raises ValueError for a surface without area.
+    Transforms align corners of one kind, where two planes meet. Each that matches one probe is tried on all others, so
+    there is one search for each piece of a shape. Raises ValueError for a surface without area.
     """
-    one, other = _Surface(exemplar, radius, rng), _Surface(shape, radius, rng)
-    places = np.sort(rng.choice(len(other.points), min(probes, len(other.points)), replace=False))
-    around = other.balls(places)
-    matched, shares = np.zeros(len(places), dtype=bool), np.zeros(len(places))
-    motions: list[FloatArray] = []
-    for place in range(len(places)):
-        if matched[place]:
+    exemplar_surface, surface = _Surface(exemplar, radius, rng), _Surface(shape, radius, rng)
+    samples = np.sort(rng.choice(len(surface.points), min(probes, len(surface.points)), replace=False))
+    balls = surface.balls(samples)
+    matched, shares = np.zeros(len(samples), dtype=bool), np.zeros(len(samples))
+    transforms: list[FloatArray] = []
+    for probe in range(len(samples)):
+        if matched[probe]:
             continue
-        motion, shares[place] = _search(one, other, places[place], around[place], rng)
-        if motion is None:
+        transform, shares[probe] = _search(exemplar_surface, surface, samples[probe], balls[probe], rng)
+        if transform is None:
             continue
-        motions.append(motion)
+        transforms.append(transform)
         left = np.flatnonzero(~matched)
-        same = _matches(one, other, motion, places[left], [around[each] for each in left.tolist()])
+        of_left = [balls[number] for number in left.tolist()]
+        same = _matches(exemplar_surface, surface, transform, samples[left], of_left)
         matched[left[same >= 1.0]] = True
-        matched[place], shares[place] = True, 1.0
+        matched[probe], shares[probe] = True, 1.0
     shares[matched] = 1.0
-    return Similarity(other.points[places], matched, shares, np.array(motions).reshape(-1, 4, 4))
+    return Similarity(surface.points[samples], matched, shares, np.array(transforms).reshape(-1, 4, 4))
 
 
 def triangles_of(shape: Shape) -> FloatArray:
-    """All triangles of a shape, float64 (t, 3, 3)."""
+    """Return all triangles of a shape, float64 (t, 3, 3)."""
     placed = zip(shape.assembly.types.tolist(), shape.assembly.poses, strict=True)
     return np.concatenate(
         [transform_points(pose, shape.meshes[kind].vertices)[shape.meshes[kind].faces] for kind, pose in placed]
     )
 
 
-def apart(shapes: Sequence[FloatArray]) -> FloatArray:
-    """Shapes, triangles (t, 3, 3) each, side by side along x with the width of the widest between them, as one."""
-    width = max(float(np.ptp(each[..., 0])) for each in shapes)
-    shifts = [np.array([2 * width * place - each[..., 0].min(), 0, 0]) for place, each in enumerate(shapes)]
-    return np.concatenate([each + shift for each, shift in zip(shapes, shifts, strict=True)])
+def lay_side_by_side(shapes: Sequence[FloatArray]) -> FloatArray:
+    """Join shapes, triangles (t, 3, 3) each, along x with gaps as wide as the widest."""
+    width = max(float(np.ptp(shape[..., 0])) for shape in shapes)
+    shifts = [np.array([2 * width * number - shape[..., 0].min(), 0, 0]) for number, shape in enumerate(shapes)]
+    return np.concatenate([shape + shift for shape, shift in zip(shapes, shifts, strict=True)])
 
 
 def similarity_row(
@@ -138,31 +141,33 @@ def similarity_row(
     probes: int,
     rng: np.random.Generator,
 ) -> tuple[Cell, ...]:
-    """The row of at least one shape, triangles (t, 3, 3), beside what it was made from. radius: as a share of the
-    longest side of the largest exemplar's box."""
-    longest = max(float(np.ptp(each.reshape(-1, 3), axis=0).max()) for each in exemplars)
-    one = apart(exemplars)
-    found = [r_similarity(one, each, radius * longest, probes, rng) for each in shapes]
+    """Return the row of at least one shape, triangles (t, 3, 3), compared with its exemplars.
+
+    radius: as a share of the longest side of the largest exemplar's box.
+    """
+    longest = max(float(np.ptp(exemplar.reshape(-1, 3), axis=0).max()) for exemplar in exemplars)
+    joined = lay_side_by_side(exemplars)
+    results = [r_similarity(joined, shape, radius * longest, probes, rng) for shape in shapes]
     return (
         name,
         len(exemplars),
         len(shapes),
         radius * longest,
-        100 * float(np.mean([each.matched.all() for each in found])),
-        sum(len(each.probes) for each in found),
-        100 * float(np.concatenate([each.matched for each in found]).mean()),
-        float(min(each.shares.min() for each in found)),
-        round(median(len(each.motions) for each in found)),
+        100 * float(np.mean([result.matched.all() for result in results])),
+        sum(len(result.probes) for result in results),
+        100 * float(np.concatenate([result.matched for result in results]).mean()),
+        float(min(result.shares.min() for result in results)),
+        round(median(len(result.transforms) for result in results)),
     )
 
 
 def similarity_table(rows: Sequence[tuple[Cell, ...]]) -> Table:
-    """The rows of `similarity_row`."""
-    return Table("Shapes that look everywhere like somewhere in an exemplar", COLUMNS, tuple(rows), NOTES)
+    """Return the table of rows of `similarity_row`."""
+    return Table("r-similarity of shapes to their exemplars", COLUMNS, tuple(rows), NOTES)
 
 
 class _Surface:
-    """A surface with samples, the way between them, its corner frames, and what lies nearest to points."""
+    """A surface with samples, distances between them, corner frames, and nearest points."""
 
     def __init__(self, corners: FloatArray, radius: float, rng: np.random.Generator) -> None:
         import open3d as o3d
@@ -171,13 +176,13 @@ class _Surface:
         doubled = np.linalg.norm(ways, axis=1)
         # slivers, such as cuts leave, have normals of rounding
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-        real = doubled > SAME_VERTEX * radius * sides
+        real = doubled > WELD_SHARE * radius * sides
         if not real.any():
             raise ValueError("a surface without area is similar to nothing")
         corners, doubled = corners[real], doubled[real]
         normals = ways[real] / doubled[:, None]
         self.corners, self.face_normals, self.radius = corners, normals, radius
-        self.tolerance, self.spacing = TOLERANCE * radius, radius / SPACING
+        self.tolerance, self.spacing = TOLERANCE_SHARE * radius, radius / SAMPLES_PER_RADIUS
         self._scene = o3d.t.geometry.RaycastingScene(1)
         self._scene.add_triangles(
             corners.reshape(-1, 3).astype(np.float32), np.arange(3 * len(corners), dtype=np.uint32).reshape(-1, 3)
@@ -194,43 +199,43 @@ class _Surface:
         self.points, self.normals = points[clear], normals[clear]
 
     def lies_on(self, points: FloatArray, normals: FloatArray) -> BoolArray:
-        """Which points (n, 3) lie on the surface with these normals (n, 3), bool (n,).
+        """Return which points (n, 3) are on the surface with normals (n, 3), bool (n,).
 
-        Asked a little above the surface, where beside a crease the right one of its sides is the nearest.
+        The query is slightly above the surface, where the right side of a crease is the nearest.
         """
         above = 2 * self.tolerance
-        asked = points + above * normals
-        nearest = self._scene.compute_closest_points(asked.astype(np.float32))
-        apart = asked - nearest["points"].numpy()
-        along = (apart * normals).sum(axis=1)
+        query = points + above * normals
+        nearest = self._scene.compute_closest_points(query.astype(np.float32))
+        offset = query - nearest["points"].numpy()
+        along = (offset * normals).sum(axis=1)
         faces = self.face_normals[nearest["primitive_ids"].numpy()]
         found: BoolArray = np.asarray(
             (np.abs(along - above) <= self.tolerance)
-            & (np.linalg.norm(apart - along[:, None] * normals, axis=1) <= self.tolerance)
-            & ((faces * normals).sum(axis=1) > np.cos(SAME_ANGLE))
+            & (np.linalg.norm(offset - along[:, None] * normals, axis=1) <= self.tolerance)
+            & ((faces * normals).sum(axis=1) > np.cos(MAX_NORMAL_RADIANS))
         )
         return found
 
     @cached_property
     def tree(self) -> Any:
-        """The samples as a tree."""
+        """A tree of the samples."""
         from scipy.spatial import KDTree
 
         return KDTree(self.points)
 
     @cached_property
     def _links(self) -> tuple[np.ndarray, np.ndarray, FloatArray]:
-        pairs = self.tree.query_pairs(LINKED * self.spacing, output_type="ndarray")
+        pairs = self.tree.query_pairs(MAX_LINK_SPACINGS * self.spacing, output_type="ndarray")
         ends = np.concatenate([pairs, pairs[:, ::-1]])
         ends = ends[np.argsort(ends[:, 0], kind="stable")]
         lengths: FloatArray = np.linalg.norm(self.points[ends[:, 0]] - self.points[ends[:, 1]], axis=1)
         return np.searchsorted(ends[:, 0], np.arange(len(self.points) + 1)), ends[:, 1], lengths
 
-    def balls(self, places: np.ndarray, less: FloatArray | None = None) -> list[np.ndarray]:
-        """The samples within the radius (`less` (n,) for each) along the surface of those at `places`, int64 each."""
-        limits = np.full(len(places), self.radius) if less is None else self.radius - less
-        starts, members = _balls(*self._links, places, limits)
-        return np.split(members, starts[1:-1]) if len(places) else []
+    def balls(self, samples: np.ndarray, offsets: FloatArray | None = None) -> list[np.ndarray]:
+        """Return the samples within the radius, less `offsets` (n,), along the surface around each sample, int64."""
+        limits = np.full(len(samples), self.radius) if offsets is None else self.radius - offsets
+        starts, members = _balls(*self._links, samples, limits)
+        return np.split(members, starts[1:-1]) if len(samples) else []
 
     @cached_property
     def frames(self) -> tuple[FloatArray, np.ndarray, BoolArray]:
@@ -244,12 +249,12 @@ class _Surface:
         first = np.flatnonzero(np.r_[True, vertices[1:] != vertices[:-1]])
         full = np.add.reduceat(~ends, first) >= 3
         count = np.diff(np.r_[first, len(vertices)])
-        count[count > MOST_PLANES] = 0
+        count[count > MAX_PLANES] = 0
         start, width = np.repeat(first, count**2), np.repeat(count, count**2)
         number = np.arange(len(start)) - np.repeat(np.cumsum(count**2) - count**2, count**2)
         one, two = start + number // np.maximum(width, 1), start + number % np.maximum(width, 1)
         cosine = (planes[one] * planes[two]).sum(axis=1)
-        bent = np.abs(cosine) < np.cos(SAME_ANGLE)
+        bent = np.abs(cosine) < np.cos(MAX_NORMAL_RADIANS)
         one, two, cosine = one[bent], two[bent], cosine[bent]
         frames = np.zeros((len(one), 4, 4))
         across = planes[two] - cosine[:, None] * planes[one]
@@ -264,7 +269,7 @@ class _Surface:
     def _welded(self) -> tuple[FloatArray, np.ndarray]:
         points = self.corners.reshape(-1, 3)
         _, first, place = np.unique(
-            np.round(points / (SAME_VERTEX * self.radius)), axis=0, return_index=True, return_inverse=True
+            np.round(points / (WELD_SHARE * self.radius)), axis=0, return_index=True, return_inverse=True
         )
         return points[first], place.reshape(-1, 3)
 
@@ -291,7 +296,7 @@ class _Surface:
         normals = np.concatenate([np.tile(self.face_normals, (3, 1)), np.tile(out, (2, 1))])
         is_end = np.arange(len(at)) >= 3 * len(faces)
         points = np.concatenate([np.tile(middles, (3, 1)), np.tile(vertices[sides[single]].mean(axis=1), (2, 1))])
-        labels = np.column_stack([at, is_end, np.round(normals / SAME_NORMAL)])
+        labels = np.column_stack([at, is_end, np.round(normals / PLANE_RADIANS)])
         _, first = np.unique(labels, axis=0, return_index=True)
         return at[first], normals[first], is_end[first], points[first]
 
@@ -301,7 +306,7 @@ class _Surface:
         them."""
         reach = 2 * self.tolerance
         found = np.zeros(len(middles), dtype=bool)
-        for angle in ABOUT:
+        for angle in EDGE_DIRECTIONS:
             asked = middles + reach * (np.sin(angle) * normals - np.cos(angle) * out)
             found |= self._scene.compute_distance(asked.astype(np.float32)).numpy() < reach / 2
         return found
@@ -313,14 +318,14 @@ def _search(
     """A motion that takes a neighbourhood of the exemplar `one` to that of a sample of the shape `other`, if any is
     found, and the greatest share of it that one did."""
     best = 0.0
-    glance = np.r_[probe, around[rng.integers(len(around), size=GLANCE)]]
+    glance = np.r_[probe, around[rng.integers(len(around), size=PRECHECK_SAMPLES)]]
     for way in range(3):
         motions = _by_corners(one, other, other.points[probe], way) if way < 2 else _anywhere(one, other, probe, rng)
         for sample in glance.tolist():
             back = np.linalg.inv(motions)
             there = back[:, :3, :3] @ other.points[sample] + back[:, :3, 3]
             motions = motions[one.lies_on(there, back[:, :3, :3] @ other.normals[sample])] if len(back) else motions
-        for motion in motions[:TRIED]:
+        for motion in motions[:MAX_TRANSFORMS]:
             share = float(_matches(one, other, motion, np.array([probe]), [around])[0])
             if share >= 1.0:
                 return motion, share
@@ -336,9 +341,9 @@ def _by_corners(one: _Surface, other: _Surface, point: FloatArray, way: int) -> 
     there = np.flatnonzero(np.isin(_packed(kinds), _packed(known)) & (full == (way == 0)))
     order = np.argsort(np.linalg.norm(frames[there, :3, 3] - point, axis=1), kind="stable")
     found = []
-    for each in there[order[:NEAREST]].tolist():
+    for each in there[order[:CORNER_FRAMES_TRIED]].tolist():
         like = np.flatnonzero((known == kinds[each]).all(axis=1))
-        found.append(frames[each] @ np.linalg.inv(own[like[:: 1 + len(like) // FRAMES]]))
+        found.append(frames[each] @ np.linalg.inv(own[like[:: 1 + len(like) // MAX_EXEMPLAR_FRAMES]]))
     return np.concatenate(found) if found else np.empty((0, 4, 4))
 
 
@@ -349,11 +354,11 @@ def _packed(kinds: np.ndarray) -> np.ndarray:
 
 def _anywhere(one: _Surface, other: _Surface, probe: int, rng: np.random.Generator) -> FloatArray:
     """Motions (m, 4, 4) that take samples of one surface to a sample of the other, however turned about its normal."""
-    asked = rng.integers(len(one.points), size=ANYWHERE)
+    asked = rng.integers(len(one.points), size=FALLBACK_SAMPLES)
     own = _with_normal(one.points[asked], one.normals[asked])
     goal = _with_normal(other.points[[probe]], other.normals[[probe]])[0]
-    turns = np.zeros((TURNS, 4, 4))
-    angle = 2 * np.pi * np.arange(TURNS) / TURNS
+    turns = np.zeros((FALLBACK_TURNS, 4, 4))
+    angle = 2 * np.pi * np.arange(FALLBACK_TURNS) / FALLBACK_TURNS
     turns[:, 0, 0] = turns[:, 1, 1] = np.cos(angle)
     turns[:, 1, 0], turns[:, 0, 1] = np.sin(angle), -np.sin(angle)
     turns[:, 2, 2] = turns[:, 3, 3] = 1.0

@@ -1,5 +1,5 @@
-"""From point clouds to programs: an encoder into the latent space of a model, and fits of what is written there
-(shapeassembly §7.3, Table 7)."""
+"""Programs of point clouds: an encoder into the latent space of a model, and fits of what it decodes (shapeassembly
+§7.3, Table 7)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 from torch import nn
 
 from eval.engine.table import Cell, ReferenceRow, Table
-from eval.programs.quality import boxes_of_programs, clouds_of, physics_of, shape_of_boxes
-from eval.programs.two_sample_test import POINTS, features_of
+from eval.programs.quality import boxes_of_programs, clouds_of, physical_shares, shape_of_boxes
+from eval.programs.two_sample_test import POINTS_PER_CLOUD, features_of
 from pipeline.errors import Rejected
 from stages.abstraction.hierarchy import Boxes, hierarchy_of
 from stages.abstraction.settings import AbstractionConfig
@@ -30,137 +30,145 @@ from stages.training.latent import LatentPoints
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.program_vae.trained import TrainedProgramVae
 
-NEAR = 0.02
-"""Points agree that are no further apart, as a share of the diagonal of the target, as in `extraction.distance`."""
+MATCH_DISTANCE_SHARE = 0.02
+"""Greatest distance of matching points, as a share of the target's diagonal, as in `extraction.distance`."""
 
-EPOCHS = 60
-HIDDEN = 512
+TRAINING_EPOCHS = 60
+HIDDEN_UNITS = 512
 
-FITS = ("", " + cuboids", " + program")
-"""What is done with what the model writes: nothing; its cuboids, or its program, are fitted to the points."""
+FIT_SUFFIXES = ("", " + cuboids", " + program")
+"""The decoded shape as it is; with its cuboids, or its program, fitted to the points."""
 
 Encoder = Callable[[FloatArray], LatentPoints]
-"""Descriptions of clouds to points of a latent space, float32 (n, latent)."""
+"""From descriptors of clouds, float64 (n, d), to latent points, float32 (n, latent)."""
 
 
-def described(clouds: FloatArray) -> FloatArray:
-    """What an encoder sees of clouds (n, k, 3), float64 (n, d): features of a network that has seen curve chairs alone,
-    which knows no size and place, and these. Raises ValueError where no network ships."""
+def cloud_descriptors(clouds: FloatArray) -> FloatArray:
+    """Return the inputs of the encoder for clouds (n, k, 3), float64 (n, d): network features, and the bounding box.
+
+    The network was trained on curve chairs alone, and its features do not depend on size and position. Raises
+    ValueError if it is not there.
+    """
     features = features_of(clouds)
     if features is None:
-        raise ValueError("the model of chairs' clouds that comes with Shapemill is not there")
+        raise ValueError("the pretrained recovery model of chairs and point clouds is not there")
     return np.concatenate([features, clouds.min(axis=1), clouds.max(axis=1)], axis=1)
 
 
-def trained_encoder(seen: FloatArray, points: LatentPoints, seed: int) -> Encoder:
-    """From descriptions of clouds (n, d) to the points float32 (n, latent) at which a model has their shapes."""
-    centre, spread = seen.mean(axis=0), seen.std(axis=0) + 1e-6
+def train_cloud_encoder(descriptors: FloatArray, points: LatentPoints, seed: int) -> Encoder:
+    """Train an encoder from descriptors of clouds (n, d) to latent points of their shapes, float32 (n, latent)."""
+    centre, scale = descriptors.mean(axis=0), descriptors.std(axis=0) + 1e-6
     unit = float(points.std()) + 1e-6
-    rows, goals = torch.from_numpy((seen - centre) / spread).float(), torch.from_numpy(points / unit)
+    inputs, targets = torch.from_numpy((descriptors - centre) / scale).float(), torch.from_numpy(points / unit)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         module = nn.Sequential(
-            nn.Linear(seen.shape[1], HIDDEN), nn.LeakyReLU(0.2), nn.Dropout(0.2),
-            nn.Linear(HIDDEN, HIDDEN), nn.LeakyReLU(0.2), nn.Dropout(0.2), nn.Linear(HIDDEN, points.shape[1]),
+            nn.Linear(descriptors.shape[1], HIDDEN_UNITS), nn.LeakyReLU(0.2), nn.Dropout(0.2),
+            nn.Linear(HIDDEN_UNITS, HIDDEN_UNITS), nn.LeakyReLU(0.2), nn.Dropout(0.2),
+            nn.Linear(HIDDEN_UNITS, points.shape[1]),
         )  # fmt: skip
-        batches = max(1, len(rows) // 64)
+        batches = max(1, len(inputs) // 64)
         optimizer = torch.optim.AdamW(module.parameters(), 1e-3, weight_decay=1e-2)
-        falling = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, EPOCHS * batches)
-        for _ in range(EPOCHS):
-            for batch in torch.randperm(len(rows)).chunk(batches):
+        schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, TRAINING_EPOCHS * batches)
+        for _ in range(TRAINING_EPOCHS):
+            for batch in torch.randperm(len(inputs)).chunk(batches):
                 optimizer.zero_grad()
-                torch.autograd.backward((module(rows[batch]) - goals[batch]).square().sum(dim=1).mean())
+                torch.autograd.backward((module(inputs[batch]) - targets[batch]).square().sum(dim=1).mean())
                 optimizer.step()
-                falling.step()
+                schedule.step()
     module.eval()
 
     def encode(clouds: FloatArray) -> LatentPoints:
         with torch.no_grad():
-            found: LatentPoints = module(torch.from_numpy((clouds - centre) / spread).float()).numpy() * unit
-        return found.astype(np.float32)
+            encoded: LatentPoints = module(torch.from_numpy((clouds - centre) / scale).float()).numpy() * unit
+        return encoded.astype(np.float32)
 
     return encode
 
 
 def reconstructions(
     model: TrainedProgramVae | TrainedPartGraphVae,
-    place: LatentPoints,
+    point: LatentPoints,
     cloud: FloatArray,
     rng: np.random.Generator,
     steps: int,
 ) -> Iterator[tuple[str, Sequence[Box]]]:
-    """What a model has at a place, float32 (latent,), and after fits to a cloud (n, 3), by FITS; those that cannot be
-    had are left out, such as that of a program where cuboids have none."""
+    """Yield the cuboids decoded at a latent point, float32 (latent,), and fitted to a cloud (n, 3), by FIT_SUFFIXES.
+
+    Those that do not exist are left out, such as the fit of a program to cuboids without one.
+    """
     if isinstance(model, TrainedPartGraphVae):
-        boxes: Sequence[Box] = model.decode(place[None])[0]
+        boxes: Sequence[Box] = model.decode(point[None])[0]
         program, centre, scale = _program_of(boxes) if boxes else (None, np.zeros(3), 1.0)
     else:
-        program, centre, scale = model.decode(place[None], reject=False)[0], np.zeros(3), 1.0
+        program, centre, scale = model.decode(point[None], reject=False)[0], np.zeros(3), 1.0
         boxes = boxes_of_programs([program])[0] if program else ()
     if not boxes:
         return
-    yield FITS[0], boxes
-    yield FITS[1], fit_cuboids(boxes, cloud, rng, steps)
+    yield FIT_SUFFIXES[0], boxes
+    yield FIT_SUFFIXES[1], fit_cuboids(boxes, cloud, rng, steps)
     if program is not None:
         try:
             fitted = fit(program, (cloud - centre) / scale, rng, steps).program
-            found = boxes_of_programs([fitted])[0]
+            fitted_boxes = boxes_of_programs([fitted])[0]
         except ProgramError:
             return
-        yield FITS[2], [replace(box, center=centre + scale * box.center, size=scale * box.size) for box in found]
+        yield (
+            FIT_SUFFIXES[2],
+            [replace(box, center=centre + scale * box.center, size=scale * box.size) for box in fitted_boxes],
+        )
 
 
 def _program_of(boxes: Sequence[Box]) -> tuple[AssemblyProgram | None, FloatArray, float]:
-    """The program that is extracted of cuboids, with the centre and the scale of its coordinates; None where none is
-    found."""
+    """Return the program extracted from cuboids, or None, and the centre and scale of its coordinates."""
     try:
         hierarchy = hierarchy_of(shape_of_boxes(boxes), AbstractionConfig().children, Boxes())
-        found = extract(hierarchy, CATEGORY_RULES["any"], Gates(), Cleaning())
+        extracted = extract(hierarchy, CATEGORY_RULES["any"], Gates(), Cleaning())
     except Rejected:
         return None, np.zeros(3), 1.0
-    return found.program, found.center, found.scale
+    return extracted.program, extracted.center, extracted.scale
 
 
 def f_score(boxes: Sequence[Box], cloud: FloatArray) -> float:
-    """F-score from 0 to 100 of the surface of cuboids against a cloud (n, 3), by as many points (Knapitsch and others
-    2017)."""
-    made = clouds_of([boxes], len(cloud))[0]
-    near = NEAR * float(np.linalg.norm(np.ptp(cloud, axis=0)))
+    """Return the F-score from 0 to 100 of the surface of cuboids against a cloud (n, 3) (Knapitsch et al. 2017)."""
+    surface = clouds_of([boxes], len(cloud))[0]
+    max_distance = MATCH_DISTANCE_SHARE * float(np.linalg.norm(np.ptp(cloud, axis=0)))
     precision, recall = (
-        float((cKDTree(other).query(each)[0] <= near).mean()) for each, other in ((made, cloud), (cloud, made))
+        float((cKDTree(other).query(points)[0] <= max_distance).mean())
+        for points, other in ((surface, cloud), (cloud, surface))
     )
     return 200 * precision * recall / (precision + recall) if precision + recall else 0.0
 
 
 @dataclass(frozen=True)
-class Rebuilt:
-    """The shapes of a row, and beside each points (n, 3) on the surface that it should have."""
+class ReconstructedShapes:
+    """The shapes of a row, and for each points (n, 3) of the true surface."""
 
     boxes: list[Sequence[Box]]
     clouds: list[FloatArray]
 
 
-def clouds_table(rows: Mapping[str, Rebuilt]) -> Table:
-    """Table 7 of the paper."""
-    figures = {
+def clouds_table(rows: Mapping[str, ReconstructedShapes]) -> Table:
+    """Return Table 7 of the paper."""
+    published = {
         "StructureNet": (24.3, 95.1, 78.4), "ShapeAssembly": (31.1, 95.5, 84.4),
         "StructureNet + cuboids": (80.0, 92.9, 72.7), "StructureNet + program": (77.4, 90.0, 71.9),
         "ShapeAssembly + cuboids": (77.6, 93.1, 72.9), "ShapeAssembly + program": (75.8, 95.3, 80.2),
     }  # fmt: skip
     columns = ("F1", "rooted %", "stable %")
     cells: list[tuple[Cell, ...]] = []
-    for name, each in rows.items():
-        found = physics_of(each.boxes)
-        scores = [f_score(boxes, cloud) for boxes, cloud in zip(each.boxes, each.clouds, strict=True)]
-        cells.append((name, len(each.boxes), fmean(scores), found.rooted, found.stable))
+    for name, shapes in rows.items():
+        physics = physical_shares(shapes.boxes)
+        scores = [f_score(boxes, cloud) for boxes, cloud in zip(shapes.boxes, shapes.clouds, strict=True)]
+        cells.append((name, len(shapes.boxes), fmean(scores), physics.rooted, physics.stable))
     notes = (
-        f"A surrogate for dense meshes, which cannot be had: clouds of {POINTS} points on the cuboids of val. F1 at "
-        f"{100 * NEAR:.0f} % of the diagonal. The encoder is trained here, on clouds of train, from features of the "
-        "encoder for clouds of chairs that comes with Shapemill to the points of the latent space.",
-        "Shapes: those for which it can be had; cuboids without attachments have a program where one can be extracted.",
+        f"Surrogate for dense meshes, which are not available: clouds of {POINTS_PER_CLOUD} points on cuboids of val. "
+        f"F1 at {100 * MATCH_DISTANCE_SHARE:.0f} % of the diagonal. The encoder is trained here on clouds of train, "
+        "from features of the pretrained recovery model of chairs to latent points.",
+        "Shapes: those for which the method has a result; of cuboids without attachments a program is extracted.",
     )
-    published = [
+    references = [
         ReferenceRow(f"chair, {name}", "shapeassembly Table 7, of dense meshes", dict(zip(columns, row, strict=True)))
-        for name, row in figures.items()
+        for name, row in published.items()
     ]
-    return Table("From clouds to programs", ("shapes of", "shapes", *columns), tuple(cells), notes, published)
+    return Table("From clouds to programs", ("shapes of", "shapes", *columns), tuple(cells), notes, references)

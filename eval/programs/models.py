@@ -1,5 +1,4 @@
-"""Models of ShapeAssembly programs, or of their cuboids, and the programs that they have learnt from, as tables see
-them."""
+"""Trained models of ShapeAssembly programs or of their cuboids, and the programs they were trained on."""
 
 from __future__ import annotations
 
@@ -26,51 +25,50 @@ from stages.training.program_vae.lines import assembly_lines
 from stages.training.program_vae.trained import load_program_vae
 
 PROGRAM_KINDS = ("program_vae", "program_lm")
-"""The kinds that write whole programs; the others write cuboids."""
+"""The kinds that generate programs; the others generate cuboids."""
 
 
-def program_models(subject: DatasetRun, top_p: float) -> list[TrainedModel[Any]]:
-    """All of them, category by category. top_p: as in `shapeassembly.sampled`."""
+def program_models(run: DatasetRun, top_p: float) -> list[TrainedModel[Any]]:
+    """Load all of them, by category. `top_p`: as in `shapeassembly.sampled`."""
     loaders: dict[str, Callable[[Path, Mapping[str, Any]], Any]] = {
         "program_vae": load_program_vae,
         "program_lm": partial(load_program_lm, top_p=top_p),
         "cuboid_rnn": load_cuboid_rnn,
         "part_graph_vae": load_part_graph_vae,
     }
-    found = [each for kind, load in loaders.items() for each in trained_models(subject.models, kind, load)]
-    return sorted(found, key=lambda each: each.kit)
+    models = [trained for kind, load in loaders.items() for trained in trained_models(run.models, kind, load)]
+    return sorted(models, key=lambda trained: trained.kit)
 
 
-def told_without(trained: TrainedModel[Any]) -> str:
-    """The part of the language without which a model tells programs, or `nothing`."""
+def ablation_of(trained: TrainedModel[Any]) -> str:
+    """Return the part of the language that is ablated in a model, or `nothing`."""
     return str(trained.model.header["settings"].get("ablate", "nothing"))
 
 
-def category_programs(subject: DatasetRun, category: str, split: str) -> list[AssemblyProgram]:
-    """The programs of a category in a split of the dataset."""
-    shards = program_shards(subject, split)
-    return [parse(each.text) for shard in shards for each in read_samples(shard) if each.kit == category]
+def category_programs(run: DatasetRun, category: str, split: str) -> list[AssemblyProgram]:
+    """Read the programs of a category in a split of the dataset."""
+    samples = (sample for shard in program_shards(run, split) for sample in read_samples(shard))
+    return [parse(sample.text) for sample in samples if sample.kit == category]
 
 
-def program_shards(subject: DatasetRun, split: str) -> list[Path]:
-    """The files of all programs in a split of the dataset."""
-    return sorted(subject.paths.stage("shapeassembly").root.glob(f"{subject.config.name}-{split}-*.tar"))
+def program_shards(run: DatasetRun, split: str) -> list[Path]:
+    """Return the files of all programs in a split of the dataset."""
+    return sorted(run.paths.stage("shapeassembly").root.glob(f"{run.config.name}-{split}-*.tar"))
 
 
-def read_by_all(
-    subject: DatasetRun, category: str, split: str, most: int, rng: np.random.Generator
+def commonly_readable_programs(
+    run: DatasetRun, category: str, split: str, max_programs: int, rng: np.random.Generator
 ) -> list[AssemblyProgram]:
-    """At most so many random programs of a category in a split, of those that every kind of model with a latent space
-    can read."""
-    programs = category_programs(subject, category, split)
+    """Return random programs of a category in a split that every kind of model with a latent space can encode."""
+    programs = category_programs(run, category, split)
     kept: list[AssemblyProgram] = []
-    for place in rng.permutation(len(programs)).tolist():
+    for index in rng.permutation(len(programs)).tolist():
         try:
-            assembly_lines(programs[place])
-            graph_nodes(execute(programs[place]))
+            assembly_lines(programs[index])
+            graph_nodes(execute(programs[index]))
         except (Rejected, ProgramError):
             continue
-        kept.append(programs[place])
-        if len(kept) == most:
+        kept.append(programs[index])
+        if len(kept) == max_programs:
             break
     return kept

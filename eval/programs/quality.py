@@ -1,5 +1,4 @@
-"""What models of ShapeAssembly programs write, and models of the cuboids that these make: quality, variability,
-smoothness (shapeassembly §7)."""
+"""Quality, variability and smoothness of generated ShapeAssembly programs and of their cuboids (shapeassembly §7)."""
 
 from __future__ import annotations
 
@@ -13,7 +12,7 @@ import numpy as np
 from eval.dataset.physical_validity import judge_all, stays_up
 from eval.engine.shapes import box_shape
 from eval.engine.table import Cell
-from eval.programs.nearest import nearest, paired
+from eval.programs.nearest import nearest_distances, paired_distances
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.shape import Shape
@@ -27,41 +26,40 @@ from stages.training.latent import LatentPoints
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.program_vae.trained import TrainedProgramVae
 
-POINTS = 256
-"""Points of a shape's surface that Chamfer distances are measured with."""
+POINTS_PER_SHAPE = 256
+"""Surface points for Chamfer distances."""
 
-AT_ONCE = 128
-"""Points of a latent space that are decoded at once."""
+DECODE_BATCH_SIZE = 128
 
 
 @dataclass(frozen=True)
-class Physics:
-    """Percent of shapes that are rooted, and that stay up when dropped and pushed (App. E)."""
+class PhysicalShares:
+    """Percentages of rooted shapes, and of shapes that are stable under a drop and a push (App. E)."""
 
     rooted: float
     stable: float
 
 
 def boxes_of_programs(programs: Sequence[AssemblyProgram]) -> list[list[Box]]:
-    """The cuboids of each executed program."""
+    """Execute programs and return the cuboids of each."""
     return [execution_boxes(execution) for execution in execute_all(programs)]
 
 
 def shape_of_boxes(boxes: Sequence[Box]) -> Shape:
-    """The shape of some cuboids."""
+    """Return the shape of some cuboids."""
     return box_shape(np.stack([box_corners(box) for box in boxes]), "y")
 
 
-def physics_of(samples: Sequence[Sequence[Box]]) -> Physics:
-    """Of shapes of some cuboids each."""
+def physical_shares(samples: Sequence[Sequence[Box]]) -> PhysicalShares:
+    """Judge shapes, each given by its cuboids."""
     shapes = [shape_of_boxes(boxes) for boxes in samples]
     config = PhysicsConfig()
-    rooted = fmean(each.rooted for each in judge_all(shapes, config))
-    return Physics(100 * rooted, 100 * fmean(stays_up(shapes, config)))
+    rooted = fmean(validity.rooted for validity in judge_all(shapes, config))
+    return PhysicalShares(100 * rooted, 100 * fmean(stays_up(shapes, config)))
 
 
-def clouds_of(samples: Sequence[Sequence[Box]], count: int = POINTS) -> FloatArray:
-    """Points on the surface of the cuboids of each shape, float64 (n, count, 3)."""
+def clouds_of(samples: Sequence[Sequence[Box]], count: int = POINTS_PER_SHAPE) -> FloatArray:
+    """Return points on the surface of the cuboids of each shape, float64 (n, count, 3)."""
     clouds = []
     for boxes in samples:
         points = surface_points(boxes, 2 * count)
@@ -71,77 +69,82 @@ def clouds_of(samples: Sequence[Sequence[Box]], count: int = POINTS) -> FloatArr
 
 @dataclass(frozen=True)
 class Variability:
-    """Mean Chamfer distances to the nearest: generalization, of a sample in train; coverage, of a shape of val among
-    the samples, empty for the shapes of val themselves; variety, of a sample among the others. leaf_parts: cuboids of a
-    sample."""
+    """Mean Chamfer distances to the nearest shape, and the mean number of cuboids."""
 
     generalization: float
+    """From a sample to train."""
     coverage: Cell
+    """From a shape of val to the samples; empty for the shapes of val themselves."""
     variety: float
+    """From a sample to the other samples."""
     leaf_parts: float
 
 
 def variability(samples: Sequence[Sequence[Box]], train: FloatArray, val: FloatArray | None) -> Variability:
-    """Of shapes of some cuboids each, beside the clouds (n, POINTS, 3) of train and, if they are not val themselves, of
-    val."""
+    """Compare shapes, given by their cuboids, with clouds (n, POINTS_PER_SHAPE, 3); None for `val` if they are val."""
     clouds = clouds_of(samples)
     return Variability(
-        float(nearest(clouds, train, False).mean()),
-        "" if val is None else float(nearest(val, clouds, False).mean()),
-        float(nearest(clouds, clouds, True).mean()),
+        float(nearest_distances(clouds, train, False).mean()),
+        "" if val is None else float(nearest_distances(val, clouds, False).mean()),
+        float(nearest_distances(clouds, clouds, True).mean()),
         fmean(map(len, samples)),
     )
 
 
 def novelty(samples: Sequence[AssemblyProgram], train: Sequence[AssemblyProgram]) -> float:
-    """Percent of samples whose structure train has not (§7.1.3)."""
-    known = {signature(each) for each in train}
-    return 100 * fmean(signature(each) not in known for each in samples)
+    """Return the percentage of samples whose structure train does not have (§7.1.3)."""
+    known = {signature(program) for program in train}
+    return 100 * fmean(signature(program) not in known for program in samples)
 
 
-def unrejected(
+def sample_without_rejection(
     model: TrainedProgramVae, count: int, rng: np.random.Generator, temperature: float
 ) -> list[AssemblyProgram]:
-    """So many programs of random points, none of which is rejected for a line that breaks a rule: its assembly ends
-    before that line (§7.1.1, "no reject"). Points that give no cuboid at all are passed over. Raises ValueError where
-    nearly all do."""
-    kept: list[AssemblyProgram] = []
-    most = 50 * (1 + count // AT_ONCE)
-    for _ in range(most):
-        found = model.decode(model.sample_points(AT_ONCE, rng, temperature), reject=False)
-        kept += [each for each in found if each is not None]
-        if len(kept) >= count:
-            return kept[:count]
-    raise ValueError(f"{len(kept)} of {most * AT_ONCE} random points gave a program; train the model longer")
+    """Decode programs at random points, ending an assembly before a line that breaks a rule (§7.1.1, "no reject").
+
+    Points without any cuboid are skipped. Raises ValueError if nearly all are.
+    """
+    programs: list[AssemblyProgram] = []
+    max_batches = 50 * (1 + count // DECODE_BATCH_SIZE)
+    for _ in range(max_batches):
+        decoded = model.decode(model.sample_points(DECODE_BATCH_SIZE, rng, temperature), reject=False)
+        programs += [program for program in decoded if program is not None]
+        if len(programs) >= count:
+            return programs[:count]
+    raise ValueError(
+        f"{len(programs)} of {max_batches * DECODE_BATCH_SIZE} random points gave a program; train the model longer"
+    )
 
 
 def smoothness(
     model: TrainedProgramVae | TrainedPartGraphVae, sequences: int, steps: int, rng: np.random.Generator
 ) -> tuple[Cell, Cell, float]:
-    """How much changes from step to step on straight ways between random points (§7.2): Chamfer distance as a share of
-    the diagonal of the bounding box, edit distance of programs; and the percent of points that gave no shape, and are
-    passed over. The first two are empty where no two points in a row gave one, the second of cuboids without
-    programs."""
+    """Measure the change per step on straight lines between random latent points (§7.2).
+
+    Return the mean Chamfer distance as a share of the diagonal, the mean edit distance of programs, and the percentage
+    of points without a shape, which are skipped. The first two are empty without consecutive shapes, the second also
+    for a model of cuboids.
+    """
     ends = model.sample_points(2 * sequences, rng).reshape(sequences, 2, model.latent)
     shares = np.linspace(0, 1, steps, dtype=np.float32)[:, None]
-    geometry, structure, none = [], [], 0
+    geometry, structure, failed = [], [], 0
     for first, last in ends:
         programs, samples = _decoded(model, first + shares * (last - first))
-        none += steps - len(samples)
-        clouds = clouds_of(samples) if samples else np.empty((0, POINTS, 3))
-        for before, distance in zip(samples, paired(clouds[:-1], clouds[1:]).tolist(), strict=False):
-            corners = np.concatenate([box_corners(box) for box in before])
+        failed += steps - len(samples)
+        clouds = clouds_of(samples) if samples else np.empty((0, POINTS_PER_SHAPE, 3))
+        for boxes, distance in zip(samples, paired_distances(clouds[:-1], clouds[1:]).tolist(), strict=False):
+            corners = np.concatenate([box_corners(box) for box in boxes])
             geometry.append(distance / float(np.linalg.norm(np.ptp(corners, axis=0))))
-        structure += [program_distance(one, other) for one, other in pairwise(programs)]
-    share = 100 * none / (sequences * steps)
+        structure += [program_distance(*pair) for pair in pairwise(programs)]
+    share = 100 * failed / (sequences * steps)
     return fmean(geometry) if geometry else "", fmean(structure) if structure else "", share
 
 
 def _decoded(
     model: TrainedProgramVae | TrainedPartGraphVae, points: LatentPoints
 ) -> tuple[list[AssemblyProgram], Sequence[Sequence[Box]]]:
-    """The programs at points that give any, nothing rejected, and the cuboids at those that give any."""
+    """Return the programs, without rejection, and the cuboids at those points that have any."""
     if isinstance(model, TrainedPartGraphVae):
-        return [], [each for each in model.decode(points) if each]
-    programs = [each for each in model.decode(points, reject=False) if each is not None]
+        return [], [boxes for boxes in model.decode(points) if boxes]
+    programs = [program for program in model.decode(points, reject=False) if program is not None]
     return programs, boxes_of_programs(programs)

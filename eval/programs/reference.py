@@ -1,5 +1,4 @@
-"""What the shapes that models write are compared with: the programs of a category, read and measured once for all its
-models."""
+"""The programs of a category that generated shapes are compared with, read and sampled once for all models."""
 
 from __future__ import annotations
 
@@ -11,36 +10,38 @@ import numpy as np
 from eval.engine.dataset_run import DatasetRun
 from eval.programs.models import category_programs
 from eval.programs.quality import boxes_of_programs, clouds_of
-from eval.programs.two_sample_test import POINTS, features_of
+from eval.programs.two_sample_test import POINTS_PER_CLOUD, features_of
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.syntax.program import AssemblyProgram
 
 
 @dataclass(frozen=True)
-class Reference:
-    """train, val: the programs; learnt, unseen: clouds (n, k, 3) of their shapes; shown: clouds (m, realism.POINTS, 3)
-    of the first shapes of train, which networks look at."""
+class ReferencePrograms:
+    """The programs of a category, and clouds of their shapes."""
 
     train: list[AssemblyProgram]
     val: list[AssemblyProgram]
-    learnt: FloatArray
-    unseen: FloatArray
-    shown: FloatArray
+    train_clouds: FloatArray
+    """(n, POINTS_PER_SHAPE, 3)"""
+    val_clouds: FloatArray
+    """(n, POINTS_PER_SHAPE, 3)"""
+    real: FloatArray
+    """(m, POINTS_PER_CLOUD, 3), of the first training shapes, for networks."""
 
     @cached_property
     def features(self) -> FloatArray | None:
-        """Of `shown`, as `features_of`."""
-        return features_of(self.shown)
+        """Network features of `real`, as `features_of`."""
+        return features_of(self.real)
 
 
-def read_reference(subject: DatasetRun, category: str, judged: int) -> Reference:
-    """Of a category of the dataset; judged: how many shapes networks look at."""
-    train, val = (category_programs(subject, category, split) for split in ("train", "val"))
-    learnt = boxes_of_programs(train)
-    return Reference(
+def read_reference(run: DatasetRun, category: str, max_real: int) -> ReferencePrograms:
+    """Read a category of the dataset. `max_real`: shapes for networks."""
+    train, val = (category_programs(run, category, split) for split in ("train", "val"))
+    train_boxes = boxes_of_programs(train)
+    return ReferencePrograms(
         train,
         val,
-        clouds_of(learnt),
+        clouds_of(train_boxes),
         clouds_of(boxes_of_programs(val)),
-        clouds_of(learnt[:judged], POINTS) if judged else np.empty((0, POINTS, 3)),
+        clouds_of(train_boxes[:max_real], POINTS_PER_CLOUD) if max_real else np.empty((0, POINTS_PER_CLOUD, 3)),
     )

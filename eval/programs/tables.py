@@ -1,12 +1,13 @@
-"""The tables of what models of ShapeAssembly programs write, beside those of the paper (shapeassembly §7)."""
+"""Tables of models of ShapeAssembly programs, with those of the paper (shapeassembly §7)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import astuple
 
 from eval.engine.table import Cell, ReferenceRow, Table
-from eval.programs.quality import POINTS, Physics, Variability
-from eval.programs.two_sample_test import Realism
+from eval.programs.quality import POINTS_PER_SHAPE, PhysicalShares, Variability
+from eval.programs.two_sample_test import TwoSampleScores
 from stages.shapeassembly.analysis.statistics import program_statistics
 from stages.shapeassembly.syntax.program import AssemblyProgram
 
@@ -16,12 +17,12 @@ _ABLATED = (*_METHODS[:2], "flat", "no order", "no align", "no macros", "no reje
 
 
 def quality_table(
-    rows: Mapping[str, Physics],
-    realisms: Mapping[str, Realism],
+    rows: Mapping[str, PhysicalShares],
+    scores: Mapping[str, TwoSampleScores],
     rejected: Mapping[str, float],
-    silent: Mapping[str, str],
+    failures: Mapping[str, str],
 ) -> Table:
-    """Table 2 of the paper. silent: of models that write next to nothing, why."""
+    """Return Table 2 of the paper. `failures`: why models generated almost nothing, by name."""
     figures: dict[str, Sequence[Sequence[Cell]]] = {
         "chair": ((73.1, 50.9, 12.6, 39.3), (89.7, 74.9, 4.04, 64.79), (95.0, 60.0, 11.58, 77.45),
                   (82.4, 58.4, 12.36, 64.17), (94.6, 84.6, 28.68, 29.32), (92.0, 77.9, 19.56, 36.78),
@@ -34,28 +35,28 @@ def quality_table(
                     (94.3, 80.9, 11.66, 31.69), (95.3, 83.7, 13.5, 31.72), (100.0, 87.0, "", "")),
     }  # fmt: skip
     cells: tuple[tuple[Cell, ...], ...] = tuple(
-        (name, each.rooted, each.stable, *_realism(realisms.get(name)), rejected.get(name, ""))
-        for name, each in rows.items()
+        (name, shares.rooted, shares.stable, *_score_cells(scores.get(name)), rejected.get(name, ""))
+        for name, shares in rows.items()
     )
     notes = (
-        "Rooted and stable: as in App. E; stability by settling on the convex hull and a push of a tenth of the weight "
-        "instead of a simulation. Rejected: programs that were begun and given up, and shapes without a cuboid.",
-        "Fool: percent of shapes, none of which it has learnt from, that a PointNet takes for real. FD: Fréchet "
-        "distance to train, of features of the encoder that comes with Shapemill for clouds of chairs. Both depend on "
-        "the networks: compare them with the row of val, not with the paper's.",
-        *(f"Not here: {name}, {reason}." for name, reason in silent.items()),
+        "Rooted and stable: as in App. E, with settling on the convex hull and a push of a tenth of the weight instead "
+        "of a simulation. Rejected: programs given up during generation, and shapes without a cuboid.",
+        "Fool: percentage of held-out generated shapes that a PointNet classifies as real. FD: Fréchet distance to "
+        "train of features of the pretrained recovery model of chairs. Both depend on the networks: compare them with "
+        "the row of val, not with the paper.",
+        *(f"Missing: {name}, {reason}." for name, reason in failures.items()),
     )
     columns = ("rooted %", "stable %", "fool %", "FD")
     published = _published("shapeassembly Table 2, by simulation", columns, figures, _ABLATED)
     return Table("Quality of shapes", ("shapes", *columns, "rejected %"), cells, notes, published)
 
 
-def _realism(seen: Realism | None) -> tuple[Cell, Cell]:
-    return ("", "") if seen is None else (seen.fool, seen.fd)
+def _score_cells(scores: TwoSampleScores | None) -> tuple[Cell, Cell]:
+    return ("", "") if scores is None else (scores.accepted, scores.frechet_distance)
 
 
 def editability_table(rows: Mapping[str, Sequence[AssemblyProgram]]) -> Table:
-    """Tables 3 of the paper: lines, and macros a line."""
+    """Return Table 3 of the paper: lines, and macros per line."""
     figures = {
         "chair": ((15.7, 0.11, 0.002, 0.024), (27.1, 0.06, 0.0004, 0.07), (20.4, 0.088, 0.0054, 0.092),
                   (24.4, 0.08, 0.009, 0.113)),
@@ -67,15 +68,15 @@ def editability_table(rows: Mapping[str, Sequence[AssemblyProgram]]) -> Table:
     columns = ("lines", "reflect", "translate", "squeeze")
     cells: list[tuple[Cell, ...]] = []
     for name, programs in rows.items():
-        found = program_statistics(programs)
-        cells.append((name, found.lines, found.reflects, found.translates, found.squeezes))
+        statistics = program_statistics(programs)
+        cells.append((name, statistics.lines, statistics.reflects, statistics.translates, statistics.squeezes))
     notes = ("Macros are shares of all lines.",)
     published = _published("shapeassembly Table 3", columns, figures)
     return Table("Editability of programs", ("programs", *columns), tuple(cells), notes, published)
 
 
 def variability_table(rows: Mapping[str, Variability], novel: Mapping[str, float]) -> Table:
-    """Tables 4 and 5 of the paper, and the structures that train has not (§7.1.3)."""
+    """Return Tables 4 and 5 of the paper, with the share of novel structures (§7.1.3)."""
     figures = {
         "chair": ((0.111, 0.123, 0.104, 8.6), (0.104, 0.119, 0.087, 8.7), (0.108, 0.118, 0.104, 7.9),
                   (0.105, "", 0.114, 9.7)),
@@ -86,20 +87,19 @@ def variability_table(rows: Mapping[str, Variability], novel: Mapping[str, float
     }  # fmt: skip
     columns = ("generalization", "coverage", "variety", "leaf parts")
     cells: tuple[tuple[Cell, ...], ...] = tuple(
-        (name, each.generalization, each.coverage, each.variety, each.leaf_parts, novel.get(name, ""))
-        for name, each in rows.items()
+        (name, *astuple(variability), novel.get(name, "")) for name, variability in rows.items()
     )
     notes = (
-        f"Mean Chamfer distances to the nearest, the mean of both ways between {POINTS} points of the surface; the "
-        "published ones were measured with other clouds. Novel: programs of structures that train has not; the paper "
-        "has 65, 85 and 53 % for chairs, tables and storages.",
+        "Mean Chamfer distances to the nearest shape, the mean of both directions between "
+        f"{POINTS_PER_SHAPE} points of the surface; published values used other clouds. Novel: programs with "
+        "structures that train does not have; the paper reports 65, 85 and 53 % for chairs, tables and storages.",
     )
     published = _published("shapeassembly Tables 4 and 5", columns, figures)
     return Table("Variability of shapes", ("shapes", *columns, "novel %"), cells, notes, published)
 
 
 def smoothness_table(rows: Mapping[str, tuple[Cell, Cell, float]]) -> Table:
-    """Table 6 of the paper."""
+    """Return Table 6 of the paper."""
     figures = {
         "chair": ((0.0384, 3.9), (0.0384, 1.33)),
         "table": ((0.0474, 4.75), (0.0389, 2.48)),
@@ -107,10 +107,10 @@ def smoothness_table(rows: Mapping[str, tuple[Cell, Cell, float]]) -> Table:
     }
     columns = ("geometry", "program")
     published = _published("shapeassembly Table 6", columns, figures, _METHODS[1:3])
-    cells: tuple[tuple[Cell, ...], ...] = tuple((name, *each) for name, each in rows.items())
+    cells: tuple[tuple[Cell, ...], ...] = tuple((name, *changes) for name, changes in rows.items())
     notes = (
-        "Mean change from step to step between random points: Chamfer distance by the diagonal, edit distance of the "
-        "programs' tokens. No shape: points that gave none.",
+        "Mean change per step between random latent points: Chamfer distance as a share of the diagonal, edit distance "
+        "of the programs' tokens. No shape: points that decode to none.",
     )
     return Table("Smoothness of the latent space", ("model", *columns, "no shape %"), cells, notes, published)
 

@@ -1,9 +1,9 @@
-"""How much a graph leaves open of its shape: what no model of edge categories can read from it (strings §6)."""
+"""Ambiguity of shape graphs: how many different shapes have one graph (strings §6)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
@@ -18,31 +18,34 @@ from stages.strings.encoder import Encoded, NotConnectedError
 from stages.strings.kit_strings import KitStrings
 
 NOTES = (
-    "The graph of each shape, from its canonical string, is put together anew several times by chance, and each valid "
-    "shape that comes out is read along the same string. Shapes: different ones of a graph, in the mean. Tokens, open: "
-    "those that have the category of the shape which the string was written of, as in the first table: what can be had "
-    "without having learnt which of the valid shapes of a graph is meant.",
+    "The graph of each shape is instantiated several times at random, and each valid result is labelled along the "
+    "shape's canonical string. Shapes: mean number of different results of a graph. Tokens, open: percentage with the "
+    "category of the original shape, as in the first table. No model can do better without knowing which of the valid "
+    "shapes of a graph is meant.",
 )
 
 
 @dataclass(frozen=True)
 class Ambiguity:
-    """graphs: those of which a valid shape was found; draws: how often each was put together; shapes: different ones
-    of a graph, in the mean; tokens, open: those with the category of the shape it was written of, in percent, as in
-    `Shares`."""
+    """How ambiguous the graphs of a kit are."""
 
     graphs: int
+    """Those with a valid instantiation."""
     draws: int
+    """Instantiations of each graph."""
     shapes: float
+    """Mean number of different shapes of a graph."""
     tokens: float
+    """Percentage of tokens with the category of the original shape."""
     open: float
+    """The same, of tokens with several possible categories."""
 
 
 def ambiguity(
-    maker: Instantiator, writer: KitStrings, shapes: Iterable[Assembly], draws: int, rng: np.random.Generator
+    instantiator: Instantiator, writer: KitStrings, shapes: Iterable[Assembly], draws: int, rng: np.random.Generator
 ) -> Ambiguity:
-    """Of some shapes of a kit; those without a string or categories are left out."""
-    space = CategorySpace(maker.kit)
+    """Measure some shapes of a kit; those without a string or categories are left out."""
+    space = CategorySpace(instantiator.kit)
     method = STANDARD_METHOD._replace(whole=writer.edges == "all")
     right, open_right, counts = [0, 0], [0, 0], list[int]()
     for shape in shapes:
@@ -53,33 +56,32 @@ def ambiguity(
         except (NotConnectedError, NoCategoryError):
             continue
         decoded = decode(string.string, writer.alphabet)
-        found: list[IntArray] = []
+        categories: list[IntArray] = []
         for _ in range(draws):
-            made = maker.instantiate(decoded.types, decoded.edges, rng, method).assembly
-            if made is not None:
-                found += [each.categories for each in _read(space, made, string)]
-        if not found:
+            instance = instantiator.instantiate(decoded.types, decoded.edges, rng, method).assembly
+            if instance is not None:
+                categories += [labelled.categories for labelled in _label(space, instance, string)]
+        if not categories:
             continue
-        counts.append(len({each.tobytes() for each in found}))
+        counts.append(len({row.tobytes() for row in categories}))
         is_open = space.allowed(truth.string).sum(axis=1) > 1
-        same = np.array(found) == truth.categories
+        same = np.array(categories) == truth.categories
         right = [right[0] + int(same.sum()), right[1] + same.size]
         open_right = [open_right[0] + int(same[:, is_open].sum()), open_right[1] + same[:, is_open].size]
     shares = (100 * part / max(whole, 1) for part, whole in (right, open_right))
     return Ambiguity(len(counts), draws, float(np.mean(counts)) if counts else 0.0, *shares)
 
 
-def _read(space: CategorySpace, made: Assembly, string: Encoded) -> list[CategorizedString]:
-    """A shape whose parts stand in the order of a string, along that string; nothing where parts stand as no shape of
-    the kit has them."""
+def _label(space: CategorySpace, instance: Assembly, string: Encoded) -> list[CategorizedString]:
+    """Label a shape whose parts are in the order of a string; nothing if a pair of parts has no category."""
     try:
-        return space.label(made, [Encoded(string.string, np.arange(len(made)))], either_hand=True)
+        return space.label(instance, [Encoded(string.string, np.arange(len(instance)))], either_hand=True)
     except NoCategoryError:
         return []
 
 
-def ambiguity_table(found: Sequence[tuple[str, Ambiguity]]) -> Table:
-    """One row for each kit."""
+def ambiguity_table(kits: Sequence[tuple[str, Ambiguity]]) -> Table:
+    """Return one row for each kit."""
     columns = ("kit", "graphs", "draws", "shapes", "tokens %", "open %")
-    rows = [(kit, each.graphs, each.draws, each.shapes, each.tokens, each.open) for kit, each in found]
-    return Table("What graphs leave open of their shapes", columns, tuple(rows), NOTES)
+    rows = [(kit, *astuple(measured)) for kit, measured in kits]
+    return Table("Ambiguity of shape graphs", columns, tuple(rows), NOTES)

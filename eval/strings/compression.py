@@ -1,4 +1,4 @@
-"""How few bytes a shape takes as string and categories, and whether it comes back exactly (strings §7)."""
+"""Compression: the bytes of a shape as a string with categories, and whether it is restored exactly (strings §7)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from stages.strings.settings import Edges
 
 COLUMNS = (
     "shapes of",
-    "strings tell of",
+    "edges",
     "shapes",
     "exact %",
     "worst gap",
@@ -34,19 +34,20 @@ COLUMNS = (
 )
 
 NOTES = (
-    "Bytes a shape, means. Bytes: its canonical string, the category of each edge and the pose of its first part, "
-    "packed, each shape by itself. Text gz: strings and categories of all shapes as text, without poses, in one gzip "
-    "file; record gz: their JSON records in one; GLB, GLB gz: the mesh file as it is, and each by itself in gzip. The "
-    "parts themselves stand in the GLB alone; strings and records borrow them from the kit.",
-    "Exact: unpacked and decoded, all parts have their types, the poses of the record within the kit's tolerance, and "
-    "the same contacts; those that a tree leaves out are found again by the kit's dockings. Worst gap: in tolerances. "
-    "Own poses: parts beside the first that no category places, a shape.",
+    "Mean bytes per shape. Bytes: its canonical string, the category of each edge and the pose of its first part, each "
+    "shape packed alone. Text gz: strings and categories of all shapes as text, without poses, in one gzip file. "
+    "Record gz: their JSON records in one gzip file. "
+    "GLB, GLB gz: the mesh file, plain and in its own gzip file. Only the GLB "
+    "holds the meshes of the parts; strings and records take them from the kit.",
+    "Exact: the decoded shape has the types, the poses within the kit's tolerance, and the contacts of the original. "
+    "Contacts that a spanning tree leaves out are found by the kit's dockings. Worst gap: in tolerances. Own poses: "
+    "parts per shape, after the first, that no category places.",
 )
 
 
 @dataclass(frozen=True)
-class Stored:
-    """A sample as it is stored now: its assembly, and the bytes of its record and its mesh file."""
+class StoredSample:
+    """A sample of a dataset: its assembly, and the bytes of its record and its GLB."""
 
     assembly: Assembly
     record: bytes
@@ -54,67 +55,69 @@ class Stored:
 
 
 @dataclass(frozen=True)
-class Trip:
-    """A shape that went to bytes and came back. text: string and categories for people; own_poses: of parts beside the
-    first; gap: the greatest displacement of a part, in tolerances of the kit; exact: whether nothing else differs."""
+class RoundTrip:
+    """A shape that was packed and restored."""
 
     packed: bytes
     text: str
+    """Its string and categories, readable."""
     own_poses: int
+    """Parts, after the first, with a pose of their own."""
     restored: Assembly
     gap: float
+    """Greatest displacement of a part, in tolerances of the kit."""
     exact: bool
 
 
-def round_trip(book: Codebook, assembly: Assembly) -> Trip:
-    """Bring an assembly to bytes and back. Raises NotConnectedError where it has no string."""
+def round_trip(book: Codebook, assembly: Assembly) -> RoundTrip:
+    """Pack an assembly and restore it. Raises NotConnectedError if it has no string."""
     canonical, *_ = book.writer.strings(book.writer.graph(assembly), 0, np.random.default_rng(0))
-    described = encode_shape(book, assembly, canonical)
-    packed = pack(book, described)
+    code = encode_shape(book, assembly, canonical)
+    packed = pack(book, code)
     restored = decode_shape(book, unpack(book, packed))
     gap = _gap(book.kit, assembly, canonical, restored)
     same = np.array_equal(restored.types, assembly.types[canonical.nodes])
     same = same and _pairs(canonical.nodes[restored.edges]) == _pairs(assembly.edges)
-    text = described.string + " " + " ".join(str(each) for each in described.categories if each >= 0)
-    return Trip(packed, text, len(described.poses) - 1, restored, gap, same and gap <= 1.0)
+    text = code.string + " " + " ".join(str(category) for category in code.categories if category >= 0)
+    return RoundTrip(packed, text, len(code.poses) - 1, restored, gap, same and gap <= 1.0)
 
 
 def compression_row(
-    name: str, kit: Kit, edges: Edges, stored: Sequence[Stored], trips: Sequence[Trip]
+    name: str, kit: Kit, edges: Edges, stored: Sequence[StoredSample], trips: Sequence[RoundTrip]
 ) -> tuple[Cell, ...]:
-    """The row of the samples of a kit and what has become of each."""
+    """Return the row of the samples of a kit and their round trips."""
     count = len(stored)
-    packed = fmean(len(each.packed) for each in trips)
-    record = len(gzip.compress(b"\n".join(each.record for each in stored), mtime=0)) / count
-    glb = fmean(len(each.glb) for each in stored)
+    packed = fmean(len(trip.packed) for trip in trips)
+    record = len(gzip.compress(b"\n".join(sample.record for sample in stored), mtime=0)) / count
+    glb = fmean(len(sample.glb) for sample in stored)
     return (
         name,
         edges,
         count,
-        100 * fmean(each.exact for each in trips),
-        max(each.gap for each in trips),
-        fmean(len(each.assembly) for each in stored),
-        fmean(each.own_poses for each in trips),
+        100 * fmean(trip.exact for trip in trips),
+        max(trip.gap for trip in trips),
+        fmean(len(sample.assembly) for sample in stored),
+        fmean(trip.own_poses for trip in trips),
         packed,
-        len(gzip.compress("\n".join(each.text for each in trips).encode(), mtime=0)) / count,
+        len(gzip.compress("\n".join(trip.text for trip in trips).encode(), mtime=0)) / count,
         record,
         glb,
-        fmean(len(gzip.compress(each.glb, mtime=0)) for each in stored),
+        fmean(len(gzip.compress(sample.glb, mtime=0)) for sample in stored),
         glb / packed,
         record / packed,
     )
 
 
 def compression_table(rows: Sequence[tuple[Cell, ...]]) -> Table:
-    """The rows of `compression_row`."""
+    """Return the table of rows of `compression_row`."""
     return Table("Shapes as strings and categories", COLUMNS, tuple(rows), NOTES)
 
 
 def _gap(kit: Kit, assembly: Assembly, encoded: Encoded, restored: Assembly) -> float:
     gaps = []
-    for kind, found, wanted in zip(restored.types, restored.poses, assembly.poses[encoded.nodes], strict=True):
+    for kind, pose, original in zip(restored.types, restored.poses, assembly.poses[encoded.nodes], strict=True):
         length = kit.types[kind].diagonal / 2
-        gaps.append(np.linalg.norm(pose_vectors(found[None], length) - pose_vectors(wanted[None], length)))
+        gaps.append(np.linalg.norm(pose_vectors(pose[None], length) - pose_vectors(original[None], length)))
     return float(max(gaps)) / kit.pose_tolerance
 
 

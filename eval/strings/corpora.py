@@ -1,4 +1,4 @@
-"""How long the strings of a kit's shapes are, and how many cycles they tell of, by what they leave out (strings §7)."""
+"""Length and cycles of strings, by the contacts that they contain (strings §7)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from stages.strings.statistics import measure_string
 
 COLUMNS = (
     "shapes of",
-    "strings tell of",
+    "edges",
     "shapes",
     "without",
     "parts",
@@ -31,48 +31,48 @@ COLUMNS = (
 PUBLISHED = (ReferenceRow("all scenes", "strings §6, §7", {"parts": "23 to 70", "canonical": "45 to 85"}),)
 
 NOTES = (
-    "Parts and cycle rank of the shapes, medians. Canonical, random: tokens of the canonical string and of a random "
-    "one, medians; longest: tokens of the longest. Cycles: edges that a canonical string tells of by cycle numbers, "
-    "median and most. Without: shapes that their contacts do not hold in one piece; they have no string. Published are "
-    "numbers of characters.",
+    "Edges: the contacts in the strings: all, faces, or a spanning tree. Parts and cycle rank of the shapes: medians. "
+    "Canonical, random: tokens of the canonical string and of a random one, medians. Longest: tokens of the longest. "
+    "Cycles: edges that a canonical string writes as cycle numbers, median and greatest. Without: shapes without a "
+    "string, whose graph is not connected. Published values count characters.",
 )
 
 
 def corpus_row(
     name: str, kit: Kit, shapes: Sequence[Assembly], edges: Edges, rng: np.random.Generator
 ) -> tuple[Cell, ...]:
-    """The row of some shapes of a kit, of each of which a canonical and a random string are written."""
+    """Return the row of some shapes of a kit, each with a canonical and a random string."""
     writer = KitStrings(kit, edges)
-    figures, ranks, parts = [], [], []
+    measured, ranks, parts = [], [], []
     for shape in shapes:
         try:
             strings = writer.strings(writer.graph(shape), 1, rng)
         except NotConnectedError:
             continue
-        figures.append([measure_string(each.string) for each in strings])
+        measured.append([measure_string(string.string) for string in strings])
         ranks.append(len(shape.edges) - len(shape) + 1)
         parts.append(len(shape))
-    if not figures:
+    if not measured:
         return (name, edges, 0, len(shapes), *[""] * (len(COLUMNS) - 4))
     return (
         name,
         edges,
-        len(figures),
-        len(shapes) - len(figures),
-        _whole(parts),
-        _whole(ranks),
-        _whole([each[0].tokens for each in figures]),
-        _whole([each[-1].tokens for each in figures]),
-        max(one.tokens for each in figures for one in each),
-        _whole([each[0].cycles for each in figures]),
-        max(each[0].cycles for each in figures),
+        len(measured),
+        len(shapes) - len(measured),
+        _median(parts),
+        _median(ranks),
+        _median([strings[0].tokens for strings in measured]),
+        _median([strings[-1].tokens for strings in measured]),
+        max(string.tokens for strings in measured for string in strings),
+        _median([strings[0].cycles for strings in measured]),
+        max(strings[0].cycles for strings in measured),
     )
 
 
 def corpora_table(rows: Sequence[tuple[Cell, ...]]) -> Table:
-    """The rows of `corpus_row`, with what the paper says of its own strings."""
+    """Return the table of rows of `corpus_row`, with the values of the paper."""
     return Table("Tokens and cycles of strings", COLUMNS, tuple(rows), NOTES, PUBLISHED)
 
 
-def _whole(values: Sequence[int]) -> int:
+def _median(values: Sequence[int]) -> int:
     return round(median(values))

@@ -1,4 +1,4 @@
-"""How a search grows a collection of shapes and strings out of its inputs, iteration by iteration (strings Table 1)."""
+"""Growth of a collection of shapes and strings during a search, round by round (strings Table 1)."""
 
 from __future__ import annotations
 
@@ -19,33 +19,37 @@ from stages.strings.settings import StringsConfig
 from stages.variations.search.pool import FoundVariants
 
 NOTES = (
-    "Shapes, distinct graphs and strings after each iteration: a round of the search, with parents from what "
-    "earlier rounds have found, and from its own. Strings: as many of each distinct graph as the config asks for. "
-    "Deepest: the greatest generation so far; a shape is one generation above its parents, inputs are generation 0.",
-    "The figures of strings Table 1 are not in the text of the paper that we have: none stand beside ours.",
+    "Shapes, distinct graphs and strings after each iteration, which is one round of the search. Its parents come from "
+    "earlier rounds and from the round itself. Strings: up to as many of each distinct graph as the config asks for. "
+    "Deepest: the greatest generation so far. A shape is one generation above its parents; inputs are generation 0.",
+    "The values of strings Table 1 are not in the text of the paper that we have, so there are no reference rows.",
 )
 
 
 @dataclass(frozen=True)
-class Find:
-    """A variant that a search has kept. round: counted from 1; generation: 1 of what was made of inputs alone;
-    graph: digest of its shape graph, 32 bytes; lane, index: where the search wrote it."""
+class KeptVariant:
+    """A variant that the search kept."""
 
     round: int
+    """Counted from 1."""
     generation: int
+    """1 for a variant of inputs alone."""
     graph: bytes
-    lane: FoundVariants
+    """Digest of its shape graph, 32 bytes."""
+    found: FoundVariants
+    """The variants of the search worker that found it."""
     index: int
+    """Among these."""
 
     @property
     def assembly(self) -> Assembly:
-        """The variant itself, its types being those of the kit."""
-        return self.lane.assembly(self.index)[0]
+        """The variant; its types are those of the kit."""
+        return self.found.assembly(self.index)[0]
 
 
 @dataclass(frozen=True)
-class Size:
-    """How large a collection is."""
+class CollectionSize:
+    """The size of a collection."""
 
     shapes: int
     graphs: int
@@ -54,112 +58,119 @@ class Size:
 
 
 @dataclass(frozen=True)
-class Grown:
-    """One search. triangles, parts: of its inputs; tries: so far, after each round; rounds, generations: the size of
-    the collection after each."""
+class SearchGrowth:
+    """The growth of one search."""
 
     triangles: int
+    """Of its inputs."""
     parts: int
-    inputs: Size
+    """Of its inputs."""
+    inputs: CollectionSize
     tries: Sequence[int]
-    rounds: Mapping[int, Size]
-    generations: Mapping[int, Size]
-    finds: Sequence[Find]
+    """Cumulative, by round."""
+    rounds: Mapping[int, CollectionSize]
+    """The collection after each round."""
+    generations: Mapping[int, CollectionSize]
+    """The collection up to each generation."""
+    variants: Sequence[KeptVariant]
 
 
-def read_finds(folder: Path, kit: str) -> list[Find]:
-    """What the search of a kit has kept, in order, read from the folder of stage `variations`."""
+def read_kept_variants(folder: Path, kit: str) -> list[KeptVariant]:
+    """Read the variants that the search of a kit kept, in order, from the folder of stage `variations`."""
     depths: dict[str, int] = {}
-    finds: list[Find] = []
+    variants: list[KeptVariant] = []
     pools = sorted(path.name for path in folder.glob(f"{kit}-r*-pool.kept.npy"))
-    for number, pool in enumerate(pools):
+    for number, pool in enumerate(pools, 1):
         stem = pool.removesuffix("pool.kept.npy")
         names = sorted(path.name.removesuffix(".keys.npy") for path in folder.glob(f"{stem}lane*.keys.npy"))
-        lanes = [_lane(folder, name) for name in names]
-        for lane in lanes:
-            for index in range(len(lane)):
-                parents = lane.described(index)["parents"]
-                depths[f"{lane.name}-{index}"] = 1 + max((depths.get(parent, 0) for parent in parents), default=0)
-        for place, index in np.load(folder / pool, allow_pickle=False).tolist():
-            lane = lanes[place]
-            depth = depths[f"{lane.name}-{index}"]
-            finds.append(Find(number + 1, depth, bytes(lane.digests[index, 0]), lane, index))
-    return finds
+        workers = [_read_worker(folder, name) for name in names]
+        for found in workers:
+            for index in range(len(found)):
+                parents = found.described(index)["parents"]
+                depths[f"{found.name}-{index}"] = 1 + max((depths.get(parent, 0) for parent in parents), default=0)
+        for worker, index in np.load(folder / pool, allow_pickle=False).tolist():
+            found = workers[worker]
+            depth = depths[f"{found.name}-{index}"]
+            variants.append(KeptVariant(number, depth, bytes(found.digests[index, 0]), found, index))
+    return variants
 
 
-def sizes_by(finds: Iterable[Find], step: Callable[[Find], int], strings: Mapping[bytes, int]) -> dict[int, Size]:
-    """The size of the collection after each step, `step` being that in which a find comes; strings: of each graph."""
-    by_step: dict[int, list[Find]] = {}
-    for each in finds:
-        by_step.setdefault(step(each), []).append(each)
+def _read_worker(folder: Path, name: str) -> FoundVariants:
+    members = [field.name for field in fields(FoundVariants) if field.name not in ("name", "lineage_path")]
+    arrays = {member: np.load(folder / f"{name}.{member}.npy", allow_pickle=False) for member in members}
+    return FoundVariants(name, lineage_path=folder / f"{name}.lineage.jsonl", **arrays)
+
+
+def sizes_by(
+    variants: Iterable[KeptVariant], step: Callable[[KeptVariant], int], strings: Mapping[bytes, int]
+) -> dict[int, CollectionSize]:
+    """Return the size of the collection after each step. `strings`: their number by graph."""
+    by_step: dict[int, list[KeptVariant]] = {}
+    for variant in variants:
+        by_step.setdefault(step(variant), []).append(variant)
     known: set[bytes] = set()
-    shapes = written = deepest = 0
+    num_shapes = num_strings = deepest = 0
     sizes = {}
     for number in sorted(by_step):
-        for each in by_step[number]:
-            shapes, deepest = shapes + 1, max(deepest, each.generation)
-            if each.graph not in known:
-                known.add(each.graph)
-                written += strings[each.graph]
-        sizes[number] = Size(shapes, len(known), written, deepest)
+        for variant in by_step[number]:
+            num_shapes, deepest = num_shapes + 1, max(deepest, variant.generation)
+            if variant.graph not in known:
+                known.add(variant.graph)
+                num_strings += strings[variant.graph]
+        sizes[number] = CollectionSize(num_shapes, len(known), num_strings, deepest)
     return sizes
 
 
-def grown(kit: Kit, folder: Path, config: StringsConfig, seed: int) -> Grown:
-    """How the search of `kit` has grown, read from the folder of stage `variations`; `config` says which strings shapes
-    get, and how many."""
-    finds, writer = read_finds(folder, kit.name), KitStrings(kit, config.edges)
+def measure_growth(kit: Kit, folder: Path, config: StringsConfig, seed: int) -> SearchGrowth:
+    """Measure the search of a kit, read from the folder of stage `variations`."""
+    variants, writer = read_kept_variants(folder, kit.name), KitStrings(kit, config.edges)
 
-    def strings(assembly: Assembly, name: str) -> int:
+    def count_strings(assembly: Assembly, name: str) -> int:
         rng = decision_rng(seed, "growth", kit.name, name)
         try:
             return len(writer.strings(writer.graph(assembly), config.strings_per_shape, rng))
         except NotConnectedError:
             return 0
 
-    written = {each.graph: strings(each.assembly, each.graph.hex()) for each in {f.graph: f for f in finds}.values()}
-    wholes = [each.whole for each in kit.exemplars]
-    graphs = {graph_digest(kit.label_of[each.assembly.types], each.assembly.edges) for each in kit.exemplars}
+    last_of_graph = {variant.graph: variant for variant in variants}
+    strings = {graph: count_strings(variant.assembly, graph.hex()) for graph, variant in last_of_graph.items()}
+    wholes = [exemplar.whole for exemplar in kit.exemplars]
+    assemblies = [exemplar.assembly for exemplar in kit.exemplars]
+    graphs = {graph_digest(kit.label_of[assembly.types], assembly.edges) for assembly in assemblies}
+    num_strings = sum(count_strings(exemplar.assembly, exemplar.name) for exemplar in kit.exemplars)
     last = read_record(max((folder / "records").glob(f"{kit.name}-r*-pool.json")))
-    return Grown(
+    return SearchGrowth(
         triangles=sum(len(kit.types[kind].faces) for whole in wholes for kind in whole.types.tolist()),
         parts=sum(map(len, wholes)),
-        inputs=Size(len(wholes), len(graphs), sum(strings(each.assembly, each.name) for each in kit.exemplars), 0),
+        inputs=CollectionSize(len(wholes), len(graphs), num_strings, 0),
         tries=[tries for tries, *_ in last.summary["curve"]] if last else [],
-        rounds=sizes_by(finds, lambda find: find.round, written),
-        generations=sizes_by(finds, lambda find: find.generation, written),
-        finds=finds,
+        rounds=sizes_by(variants, lambda variant: variant.round, strings),
+        generations=sizes_by(variants, lambda variant: variant.generation, strings),
+        variants=variants,
     )
 
 
-def growth_table(kits: Mapping[str, Grown]) -> Table:
-    """For each kit a row for its inputs and one after each round of its search."""
+def growth_table(kits: Mapping[str, SearchGrowth]) -> Table:
+    """Return one row for the inputs of each kit, and one for each round of its search."""
     rows: list[tuple[Cell, ...]] = []
-    for kit, each in kits.items():
-        rows.append((f"{kit}, inputs", each.triangles, each.parts, "", *_cells(each.inputs)))
-        for number, size in each.rounds.items():
-            rows.append((f"{kit}, iteration {number}", "", "", each.tries[number - 1], *_cells(size)))
+    for kit, growth in kits.items():
+        rows.append((f"{kit}, inputs", growth.triangles, growth.parts, "", *_cells(growth.inputs)))
+        for number, size in growth.rounds.items():
+            rows.append((f"{kit}, iteration {number}", "", "", growth.tries[number - 1], *_cells(size)))
     columns = ("collection", "triangles", "parts", "tries", "shapes", "graphs", "strings", "deepest")
     return Table("Growth by iteration", columns, tuple(rows), NOTES)
 
 
-def generation_table(kits: Mapping[str, Grown]) -> Table:
-    """A row for each generation: graphs and strings of each kit's collection without later ones; no figures where a kit
-    has no such generation."""
-    columns = [f"{kit} {what}" for kit in kits for what in ("graphs", "strings")]
+def generation_table(kits: Mapping[str, SearchGrowth]) -> Table:
+    """Return one row for each generation: graphs and strings of each kit up to it, empty if the kit has no such one."""
+    columns = [f"{kit} {quantity}" for kit in kits for quantity in ("graphs", "strings")]
     rows: list[tuple[Cell, ...]] = []
-    for number in sorted({number for each in kits.values() for number in each.generations}):
-        sizes = [each.generations.get(number) for each in kits.values()]
+    for number in sorted({number for growth in kits.values() for number in growth.generations}):
+        sizes = [growth.generations.get(number) for growth in kits.values()]
         cells = [cell for size in sizes for cell in ((size.graphs, size.strings) if size else ("", ""))]
         rows.append((f"generation {number}", *cells))
     return Table("Growth by generation", ("collection up to", *columns), tuple(rows))
 
 
-def _cells(size: Size) -> tuple[Cell, ...]:
+def _cells(size: CollectionSize) -> tuple[Cell, ...]:
     return size.shapes, size.graphs, size.strings, size.deepest
-
-
-def _lane(folder: Path, name: str) -> FoundVariants:
-    members = [each.name for each in fields(FoundVariants) if each.name not in ("name", "lineage_path")]
-    arrays = {each: np.load(folder / f"{name}.{each}.npy", allow_pickle=False) for each in members}
-    return FoundVariants(name, lineage_path=folder / f"{name}.lineage.jsonl", **arrays)

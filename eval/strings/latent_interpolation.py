@@ -1,4 +1,4 @@
-"""Ways between two shapes through the latent space of a string VAE, as rows of pictures (strings §5.2, §5.3)."""
+"""Latent interpolation between two shapes of a string VAE, as rows of pictures (strings §5.2, §5.3)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from eval.engine.evaluation import ImageRow
 from eval.engine.pictures import shape_picture
 from eval.generated.instantiation import attempts
-from eval.strings.string_vaes import NODES
+from eval.strings.string_vaes import MAX_GRAPH_NODES
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.shape import kit_shape
@@ -20,25 +20,30 @@ from stages.training.string_vae.latent_graph import interpolation, search_graph
 from stages.training.string_vae.latent_sampling import linear_points, path_points
 from stages.training.string_vae.trained import TrainedStringVae
 
-STOPS = 8
-"""Segments of a way along a line or a path; a power of two."""
+NUM_SEGMENTS = 8
+"""Of a line or path; a power of two."""
 
 
-def journeys(model: TrainedStringVae, strings: Sequence[str], rng: np.random.Generator) -> Mapping[str, list[str]]:
-    """Strings on the ways between the two of some training strings that are least alike by their parts, by the name of
-    the way: decoded at equal distances on a line, and at the corners of a path along training samples; and for the
-    search graph training strings, the nodes of the shortest path. At least two strings of different graphs."""
-    chosen = [strings[place] for place in rng.permutation(len(strings))[:NODES].tolist()]
-    graphs = [decode(each, model.vocabulary.alphabet) for each in chosen]
+def interpolations(
+    model: TrainedStringVae, strings: Sequence[str], rng: np.random.Generator
+) -> Mapping[str, list[str]]:
+    """Interpolate between the two least similar of some training strings, by their part histograms.
+
+    Return the strings along each way, by its name: decoded at equal distances on a line; at the corners of a path along
+    training samples; and, for the search graph, the training strings on its shortest path. `strings` must have at least
+    two different graphs.
+    """
+    chosen = [strings[index] for index in rng.permutation(len(strings))[:MAX_GRAPH_NODES].tolist()]
+    graphs = [decode(string, model.vocabulary.alphabet) for string in chosen]
     types = len(model.vocabulary.alphabet.tokens)
-    histograms = np.array([np.bincount(each.types, minlength=types) for each in graphs])
+    histograms = np.array([np.bincount(graph.types, minlength=types) for graph in graphs])
     first = 0
     second = int(np.argmax(histogram_metric(histograms, histograms[[first]])))
     points = model.encode(chosen)
-    names = [graph_digest(each.types, each.edges) for each in graphs]
-    nodes = interpolation(search_graph(points, names, histograms), first, second)
-    line = linear_points(points[first], points[second], STOPS - 1)
-    path = path_points(points[first], points[second], points, STOPS)[1:-1]
+    digests = [graph_digest(graph.types, graph.edges) for graph in graphs]
+    nodes = interpolation(search_graph(points, digests, histograms), first, second)
+    line = linear_points(points[first], points[second], NUM_SEGMENTS - 1)
+    path = path_points(points[first], points[second], points, NUM_SEGMENTS)[1:-1]
     ends = chosen[first], chosen[second]
     return {
         "on a line": [ends[0], *model.decode(line, None), ends[1]],
@@ -47,30 +52,31 @@ def journeys(model: TrainedStringVae, strings: Sequence[str], rng: np.random.Gen
     }
 
 
-def journey_strips(
+def interpolation_rows(
     model: TrainedStringVae,
     strings: Sequence[str],
-    maker: Instantiator,
+    instantiator: Instantiator,
     method: SolverMethod,
     folder: str,
     rng: np.random.Generator,
 ) -> Iterator[ImageRow]:
-    """A row of pictures for each way; stops of the graph of the stop before are left out, and those that become no
-    shape are told in its title."""
-    for way, along in journeys(model, strings, rng).items():
-        stops = list(_changing(decode(each, model.vocabulary.alphabet) for each in along if model.is_valid(each)))
+    """Yield a row of pictures for each interpolation, without repeated graphs; titles count failed instantiations."""
+    for name, along in interpolations(model, strings, rng).items():
+        decoded = (decode(string, model.vocabulary.alphabet) for string in along if model.is_valid(string))
+        stops = list(_without_repeats(decoded))
         pictures, failed = [], 0
-        for stop, found in zip(stops, attempts(maker, stops, method, 0), strict=True):
-            if found.good and found.assembly is not None:
-                pictures.append((f"{len(stop.types)} parts", shape_picture(kit_shape(maker.kit, found.assembly))))
+        for stop, attempt in zip(stops, attempts(instantiator, stops, method, 0), strict=True):
+            if attempt.is_valid and attempt.assembly is not None:
+                shape = kit_shape(instantiator.kit, attempt.assembly)
+                pictures.append((f"{len(stop.types)} parts", shape_picture(shape)))
             else:
                 failed += 1
-        told = f"; {failed} of {len(stops)} stops become no shape" if failed else ""
-        yield ImageRow(f"{folder}, from one shape to another {way}{told}", pictures)
+        failures = f"; {failed} of {len(stops)} stops become no shape" if failed else ""
+        yield ImageRow(f"{folder}, from one shape to another {name}{failures}", pictures)
 
 
-def _changing(graphs: Iterator[Decoded]) -> Iterator[Decoded]:
-    """Each graph that is another than the one before it."""
+def _without_repeats(graphs: Iterator[Decoded]) -> Iterator[Decoded]:
+    """Yield each graph that differs from the one before it."""
     before = ""
     for graph in graphs:
         digest = graph_digest(graph.types, graph.edges)

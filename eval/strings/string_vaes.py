@@ -1,6 +1,6 @@
-"""What string VAEs have learnt: do strings come back, how many new shapes are found, how far apart are they?
+"""Metrics of string VAEs: reconstruction, sampling of new shapes, and distances in latent graphs.
 
-The ways of sampling are those of strings §5.2, the graphs of latent points those of §5.3 and Table 2.
+The sampling methods are those of strings §5.2, the graphs of latent points those of §5.3 and Table 2.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from stages.training.string_vae.latent_graph import PathFigures, naive_graph, pa
 from stages.training.string_vae.latent_sampling import SAMPLING_TEMPERATURE, sample
 from stages.training.string_vae.trained import TrainedStringVae, load_string_vae
 
-NODES = 1000
-"""Nodes of the graphs of latent points (strings Table 2)."""
+MAX_GRAPH_NODES = 1000
+"""Of the graphs of latent points (strings Table 2)."""
 
 PUBLISHED = tuple(
     ReferenceRow(
@@ -40,74 +40,84 @@ PUBLISHED = tuple(
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """Shares in percent of tokens, strings and graphs that came back where they were; of valid strings."""
+    """Percentages of what is reconstructed."""
 
     strings: int
+    """Their number."""
     tokens: float
     same: float
+    """Strings."""
     graphs: float
     valid: float
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """Shares in percent: valid, of all strings decoded; found, of the searches; unique, distinct graphs of what was
-    found; novel, of these those that are not in train."""
+    """Percentages of a sampling method."""
 
     searches: int
+    """Their number."""
     valid: float
+    """Of all decoded strings."""
     found: float
+    """Of the searches."""
     unique: float
+    """Distinct graphs, of what was found."""
     novel: float
+    """Graphs not in train, of the distinct ones."""
 
 
 def string_vaes(folder: Path) -> list[TrainedModel[TrainedStringVae]]:
-    """The string VAEs in a folder of published models, by kit, name and seed. Raises ConfigError for weights that are
-    not what they should be."""
+    """Load the string VAEs in a folder of published models, by kit, name and seed.
+
+    Raises ConfigError for weights that cannot be read.
+    """
     return trained_models(folder, "string_vae", lambda path, _: load_string_vae(path))
 
 
 def corpus_strings(folder: Path, kit: str, split: str, model: TrainedStringVae) -> list[str]:
-    """The strings of a published corpus that a model can read: no longer than those it knows, and no more cycles."""
+    """Return the strings of a published corpus whose length and cycles a model can represent."""
     lines = (folder / f"{kit}-{split}.txt").read_text().splitlines()
-    return [each for each in lines if model.is_valid(each)]
+    return [line for line in lines if model.is_valid(line)]
 
 
 def reconstruction(model: TrainedStringVae, strings: Sequence[str]) -> Reconstruction:
-    """Encode strings, at least one, and decode the means, the likeliest token each time.
-
-    What comes back is held against what the decoder has learnt to write for the string.
-    """
+    """Encode at least one string, decode the mean greedily, and compare with the string that the decoder targets."""
     decoded = model.decode(model.encode(strings), None)
     right, total, same, graphs, valid = 0, 0, 0, 0, 0
-    for one, other in zip(map(model.target_of, strings), decoded, strict=True):
-        first, second = _codes(model, one), _codes(model, other)
-        right += sum(a == b for a, b in zip(first, second, strict=False))
-        total += max(len(first), len(second))
-        same += one == other
-        if model.is_valid(other):
+    for target, output in zip(map(model.target_of, strings), decoded, strict=True):
+        target_codes, output_codes = _codes(model, target), _codes(model, output)
+        right += sum(a == b for a, b in zip(target_codes, output_codes, strict=False))
+        total += max(len(target_codes), len(output_codes))
+        same += target == output
+        if model.is_valid(output):
             valid += 1
-            graphs += _graph(model, one) == _graph(model, other)
+            graphs += _graph(model, target) == _graph(model, output)
     count = len(strings)
     return Reconstruction(count, 100 * right / total, 100 * same / count, 100 * graphs / count, 100 * valid / count)
 
 
 def shape_graphs(model: TrainedStringVae, strings: Iterable[str]) -> set[str]:
-    """The shape graphs that strings stand for, by their digests."""
-    return {_graph(model, each) for each in strings}
+    """Return the digests of the shape graphs of strings."""
+    return {_graph(model, string) for string in strings}
 
 
 def sampling(
-    model: TrainedStringVae, way: str, strings: Sequence[str], known: set[str], searches: int, rng: np.random.Generator
+    model: TrainedStringVae,
+    method: str,
+    strings: Sequence[str],
+    known: set[str],
+    searches: int,
+    rng: np.random.Generator,
 ) -> Sampling:
-    """`searches` searches of one of WAYS among training strings, whose shape graphs are `known`."""
-    found = sample(model, way, strings, searches, rng)
-    graphs = [_graph(model, each.string) for each in found if each.string is not None]
-    asked = sum(each.decoded for each in found)
+    """Run searches of one sampling method among training strings, whose shape graphs are `known`."""
+    results = sample(model, method, strings, searches, rng)
+    graphs = [_graph(model, result.string) for result in results if result.string is not None]
+    decoded = sum(result.decoded for result in results)
     distinct = set(graphs)
     return Sampling(
         searches=searches,
-        valid=100 * sum(each.valid for each in found) / asked,
+        valid=100 * sum(result.valid for result in results) / decoded,
         found=100 * len(graphs) / searches,
         unique=100 * len(distinct) / len(graphs) if graphs else 0.0,
         novel=100 * len(distinct - known) / len(distinct) if distinct else 0.0,
@@ -117,80 +127,83 @@ def sampling(
 def structure(
     model: TrainedStringVae, strings: Sequence[str], rng: np.random.Generator
 ) -> tuple[int, dict[str, PathFigures]]:
-    """How many nodes, and the figures of the naive and the search graph of at most NODES training strings.
+    """Return the number of nodes, and the figures of the naive graph and the search graph.
 
-    A node is the point of a training string that decodes to a valid string, and that string.
+    A node is a training string that decodes to a valid string, with its latent point; there are at most
+    MAX_GRAPH_NODES.
     """
-    chosen = [strings[place] for place in rng.permutation(len(strings))[:NODES].tolist()]
+    chosen = [strings[index] for index in rng.permutation(len(strings))[:MAX_GRAPH_NODES].tolist()]
     points = model.encode(chosen)
     decoded = model.decode(points, None)
-    valid = [place for place, each in enumerate(decoded) if model.is_valid(each)]
-    nodes = [decoded[place] for place in valid]
+    valid = [index for index, string in enumerate(decoded) if model.is_valid(string)]
+    nodes = [decoded[index] for index in valid]
     if len(nodes) < 2:
         return len(nodes), {}
-    graphs = [_graph(model, each) for each in nodes]
+    graphs = [_graph(model, node) for node in nodes]
     types = len(model.vocabulary.alphabet.tokens)
-    histograms = np.array([np.bincount(_codes(model, each), minlength=types + 1)[1 : types + 1] for each in nodes])
+    histograms = np.array([np.bincount(_codes(model, node), minlength=types + 1)[1 : types + 1] for node in nodes])
     figures = {
-        "naive": path_figures(naive_graph([model.vocabulary.codes(each) for each in nodes], graphs, histograms)),
+        "naive": path_figures(naive_graph([model.vocabulary.codes(node) for node in nodes], graphs, histograms)),
         "search graph": path_figures(search_graph(points[valid], graphs, histograms)),
     }
     return len(nodes), figures
 
 
-def reconstruction_table(found: Iterable[tuple[TrainedModel[TrainedStringVae], Reconstruction]]) -> Table:
-    """One row for the models of a name and a kit, over their seeds."""
+def reconstruction_table(results: Iterable[tuple[TrainedModel[TrainedStringVae], Reconstruction]]) -> Table:
+    """Return one row for the models of a name and a kit, over their seeds."""
     columns = ("model", "seeds", "strings", "tokens %", "strings %", "graphs %", "valid %")
     rows = [
-        (group, len(each), each[0].strings, *over_seeds(each, ("tokens", "same", "graphs", "valid")))
-        for group, each in by_group(found).items()
+        (group, len(seeds), seeds[0].strings, *over_seeds(seeds, ("tokens", "same", "graphs", "valid")))
+        for group, seeds in by_group(results).items()
     ]
     notes = (
-        "Strings that training has not seen, encoded and decoded, the likeliest token each time. Tokens: the same at "
-        "the same place as in the string that was to be written, which is the canonical one of its graph unless the "
-        "model's `target` is `same`; graphs: the string stands for the same shape graph; valid: the grammar admits it.",
+        "Strings that training has not seen, encoded and decoded greedily. Tokens: equal, at the same position, to the "
+        "target string, which is the canonical one of the graph unless the model's `target` is `same`. Graphs: the "
+        "string has the same shape graph. Valid: the grammar admits the string.",
     )
     return Table("String VAE: reconstruction", columns, tuple(rows), notes)
 
 
-def sampling_table(found: Iterable[tuple[TrainedModel[TrainedStringVae], str, Sampling]]) -> Table:
-    """One row for the models of a name and a kit and a way, over their seeds."""
-    columns = ("model", "way", "seeds", "searches", "valid %", "found %", "unique %", "novel %")
+def sampling_table(results: Iterable[tuple[TrainedModel[TrainedStringVae], str, Sampling]]) -> Table:
+    """Return one row for the models of a name and a kit and a sampling method, over their seeds."""
+    columns = ("model", "method", "seeds", "searches", "valid %", "found %", "unique %", "novel %")
     groups: dict[tuple[str, str], list[Sampling]] = {}
-    for trained, way, each in found:
-        groups.setdefault((trained.group, way), []).append(each)
+    for trained, method, result in results:
+        groups.setdefault((trained.group, method), []).append(result)
     rows = [
-        (group, way, len(each), each[0].searches, *over_seeds(each, ("valid", "found", "unique", "novel")))
-        for (group, way), each in groups.items()
+        (group, method, len(seeds), seeds[0].searches, *over_seeds(seeds, ("valid", "found", "unique", "novel")))
+        for (group, method), seeds in groups.items()
     ]
     notes = (
-        "Ways of strings §5.2, each as published; prior, gaussian: points drawn from the prior, or from the Gaussian "
-        f"of the training strings, decoded once at token temperature {SAMPLING_TEMPERATURE}. Valid: of all strings "
-        "that were decoded. Found: searches that end with a valid string other than where they began. Unique: distinct "
-        "shape graphs of what was found; novel: of these not in train. "
-        "The paper has no figures; its order is path, linear, perturbation.",
+        "Methods of strings §5.2, as published. Prior, gaussian: points drawn from the prior, or from the Gaussian of "
+        f"the training strings, decoded once at a temperature of {SAMPLING_TEMPERATURE}. "
+        "Valid: of all decoded strings. "
+        "Found: searches that end with a valid string other than their start. Unique: distinct shape graphs of these. "
+        "Novel: those not in train. The paper has no values; its order is path, linear, perturbation.",
     )
-    return Table("String VAE: new shapes by way of sampling", columns, tuple(rows), notes)
+    return Table("String VAE: new shapes by sampling method", columns, tuple(rows), notes)
 
 
-def structure_table(found: Iterable[tuple[TrainedModel[TrainedStringVae], int, Mapping[str, PathFigures]]]) -> Table:
-    """One row for each model and graph; the published rows below."""
+def structure_table(
+    results: Iterable[tuple[TrainedModel[TrainedStringVae], int, Mapping[str, PathFigures]]],
+) -> Table:
+    """Return one row for each model and latent graph, with the published rows."""
     rows: list[tuple[Cell, ...]] = []
-    for trained, nodes, figures in found:
-        for kind, each in figures.items():
+    for trained, nodes, figures in results:
+        for kind, paths in figures.items():
             name = f"{trained.folder}, {kind}"
-            rows.append((name, nodes, each.components, each.mean, each.greatest))
+            rows.append((name, nodes, paths.components, paths.mean, paths.greatest))
     notes = (
         "Graphs of latent points of training strings (strings §5.3): connected components, mean and greatest "
-        "accumulated weight of the shortest paths. Naive: the 3 nearest strings by edit distance of their tokens; "
-        "search graph: the 4 nearest points; both: all strings of the same shape graph.",
+        "accumulated weight of the shortest paths. Naive: the 3 nearest strings by edit distance of their tokens. "
+        "Search graph: the 4 nearest points. Both join all strings of one shape graph.",
     )
     columns = ("graph", "nodes", "components", "mean", "greatest")
     return Table("String VAE: shortest paths", columns, tuple(rows), notes, PUBLISHED)
 
 
 def model_rng(seed: int, trained: TrainedModel[TrainedStringVae], decision: str) -> np.random.Generator:
-    """The random stream of one decision about a model."""
+    """Return the random stream of one decision about a model."""
     return decision_rng(seed, "eval", "strings", trained.group, trained.seed, decision)
 
 

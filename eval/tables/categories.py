@@ -1,21 +1,28 @@
-"""`make eval TABLE=categories`: how well is it read from a string where its parts stand? (strings §6)"""
+"""`make eval TABLE=categories`: how well are the poses of parts predicted from a string? (strings §6)"""
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from pydantic import Field
 
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import Chart, Evaluation, ImageRow, TableResult
 from eval.engine.requirements import EDGE_CATEGORIES, KITS
+from pipeline.config import StrictModel
 from stages.training.checkpoint import weights_of_kind
 
-DRAWS = 3
-"""How often each graph is put together by chance, to see what it leaves open."""
-SHOWN = 3
-"""So many shapes are drawn beside what was read of them."""
+DRAWS_PER_GRAPH = 3
+"""Random instantiations of each graph that measure its ambiguity."""
+SHAPES_SHOWN = 3
 
 
-def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
+class Options(StrictModel):
+    """How many shapes and strings are measured."""
+
+    graphs: int = Field(100, ge=1, description="shapes of each kit and split")
+    voters: int = Field(7, ge=0, description="random strings of each shape, besides its canonical one")
+
+
+def _compute(run: DatasetRun, options: Options) -> TableResult:
     from itertools import islice
 
     from eval.engine.models import training_curve
@@ -24,12 +31,12 @@ def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
         categories_table,
         category_models,
         clusters_table,
-        judge,
-        made_shapes,
-        read_back,
+        reconstruct_shape,
+        score_model,
+        split_assemblies,
     )
     from eval.generated.instantiation import instantiator_of
-    from eval.generated.pose_clusters import clusters_of
+    from eval.generated.pose_clusters import cluster_poses
     from eval.strings.ambiguity import ambiguity, ambiguity_table
     from pipeline.randomness import decision_rng
     from stages.exemplars.language import dataset_kits
@@ -38,49 +45,44 @@ def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from stages.strings.kit_strings import KitStrings
     from stages.strings.settings import StringsConfig
 
-    kits = dataset_kits(subject.paths)
-    edges = subject.config.section(StringsConfig).edges
+    kits = dataset_kits(run.paths)
+    edges = run.config.section(StringsConfig).edges
     writers = {name: KitStrings(kit, edges) for name, kit in kits.items()}
-    judged, clusters, open_graphs, lines, strips = [], [], [], {}, []
-    for each in category_models(subject.models, kits):
+    scores, clusters, ambiguities, lines, image_rows = [], [], [], {}, []
+    for trained in category_models(run.models, kits):
+        kit, writer = trained.kit, writers[trained.kit]
         for split in ("val", "test"):
-            rng = decision_rng(subject.config.seed, "eval", "categories", each.kit, split)
-            shapes = islice(made_shapes(subject, each.kit, split), asked.graphs)
-            judged.append((each, split, judge(each.model, writers[each.kit], shapes, asked.voters, rng)))
+            rng = decision_rng(run.config.seed, "eval", "categories", kit, split)
+            shapes = islice(split_assemblies(run, kit, split), options.graphs)
+            scores.append((trained, split, score_model(trained.model, writer, shapes, options.voters, rng)))
         pictures = []
-        for number, shape in enumerate(islice(made_shapes(subject, each.kit, "test"), SHOWN)):
-            rng = decision_rng(subject.config.seed, "eval", "categories", each.kit, "shown", number)
-            found = read_back(each.model, writers[each.kit], shape, asked.voters, rng)
-            pictures.append((f"{each.kit}, {len(shape)} parts", shape_picture(kit_shape(kits[each.kit], shape))))
-            if found is not None:
-                pictures.append((f"as {each.folder} reads it", shape_picture(kit_shape(kits[each.kit], found))))
-        strips.append(ImageRow(f"Shapes of test, and what {each.folder} reads from their strings", pictures))
-        lines[each.folder] = [
-            (step, 100 * share) for step, share in training_curve(subject.models / each.folder, "val_tokens")
-        ]
-    for name in dict.fromkeys(each.kit for each, _, _ in judged):
-        learnt = list(islice(made_shapes(subject, name, "train"), asked.graphs))
-        clusters.append((name, len(learnt), clusters_of(CategorySpace(kits[name]), learnt)))
-        rng = decision_rng(subject.config.seed, "eval", "categories", name, "ambiguity")
-        unseen = islice(made_shapes(subject, name, "test"), asked.graphs)
-        maker = instantiator_of(subject, kits[name])
-        open_graphs.append((name, ambiguity(maker, writers[name], unseen, DRAWS, rng)))
+        for number, shape in enumerate(islice(split_assemblies(run, kit, "test"), SHAPES_SHOWN)):
+            rng = decision_rng(run.config.seed, "eval", "categories", kit, "shown", number)
+            predicted = reconstruct_shape(trained.model, writer, shape, options.voters, rng)
+            pictures.append((f"{kit}, {len(shape)} parts", shape_picture(kit_shape(kits[kit], shape))))
+            if predicted is not None:
+                pictures.append((f"as predicted by {trained.folder}", shape_picture(kit_shape(kits[kit], predicted))))
+        image_rows.append(ImageRow(f"Test shapes, and what {trained.folder} predicts from their strings", pictures))
+        curve = training_curve(run.models / trained.folder, "val_tokens")
+        lines[trained.folder] = [(step, 100 * share) for step, share in curve]
+    for name in dict.fromkeys(trained.kit for trained, _, _ in scores):
+        train = list(islice(split_assemblies(run, name, "train"), options.graphs))
+        clusters.append((name, len(train), cluster_poses(CategorySpace(kits[name]), train)))
+        rng = decision_rng(run.config.seed, "eval", "categories", name, "ambiguity")
+        test = islice(split_assemblies(run, name, "test"), options.graphs)
+        instantiator = instantiator_of(run, kits[name])
+        ambiguities.append((name, ambiguity(instantiator, writers[name], test, DRAWS_PER_GRAPH, rng)))
     return TableResult(
-        [categories_table(judged), ambiguity_table(open_graphs), clusters_table(clusters)],
-        [Chart("Tokens with the right category, each after the right ones before it", "steps", "% of val", lines)],
-        strips,
+        [categories_table(scores), ambiguity_table(ambiguities), clusters_table(clusters)],
+        [Chart("Validation tokens with the right category, given the true ones before them", "steps", "%", lines)],
+        image_rows,
     )
 
 
-def _options(parser: ArgumentParser) -> None:
-    parser.add_argument("--graphs", type=int, default=100, help="shapes of a kit and split that are looked at")
-    parser.add_argument("--voters", type=int, default=7, help="strings of a shape beside its canonical one")
-
-
 TABLE = Evaluation(
-    question="How often is it read from a string where each of its parts stands, and does it help to ask several?",
-    needs=(KITS, EDGE_CATEGORIES),
-    seconds=lambda subject: 5 + 110.0 * len(weights_of_kind(subject.models, "edge_categories")),
-    answer=_answer,
-    options=_options,
+    question="How often are the poses of parts predicted right from a string, and does a vote of several strings help?",
+    requirements=(KITS, EDGE_CATEGORIES),
+    estimate_seconds=lambda run: 5 + 110.0 * len(weights_of_kind(run.models, "edge_categories")),
+    compute=_compute,
+    options=Options,
 )

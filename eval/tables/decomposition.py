@@ -1,29 +1,34 @@
-"""`python -m eval decomposition a.glb`: are parts found again that were merged to one mesh, and what may be exchanged?
-(symmetry)"""
+"""`make eval TABLE=decomposition a.glb`: are merged parts found again, and what can be exchanged? (symmetry)"""
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
 
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import Evaluation, Requirement, TableResult
+from pipeline.config import StrictModel
 from pipeline.errors import ConfigError
 
-CUTS = ("symmetry", "sections", "components")
-FILES = "models whose parts are known, as files: python -m eval decomposition a.glb b.glb"
+FILES = "models with known parts, as files: decomposition a.glb b.glb"
 
 
-def _options(parser: ArgumentParser) -> None:
-    parser.add_argument("--cuts", nargs="+", choices=CUTS, default=["symmetry"], help="how merged models are cut")
+class Options(StrictModel):
+    """How merged models are segmented."""
+
+    segmentations: tuple[Literal["symmetry", "sections", "components"], ...] = Field(
+        ("symmetry",), min_length=1, description="as exemplars.kits.parts"
+    )
 
 
-def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
+def _compute(run: DatasetRun, options: Options) -> TableResult:
     raise ConfigError(f"this table takes {FILES}")
 
 
-def _of_files(paths: Sequence[Path], asked: Namespace) -> TableResult:
+def _compute_from_files(paths: Sequence[Path], options: Options) -> TableResult:
     from eval.engine.shapes import model_kits
     from eval.grammars.decomposition import decomposition_table
     from eval.grammars.grammar_recall import grammar_table
@@ -32,16 +37,16 @@ def _of_files(paths: Sequence[Path], asked: Namespace) -> TableResult:
     for path in paths:
         if not path.is_file():
             raise ConfigError(f"there is no file {path}")
-    kits = [each for path in paths for each in model_kits(path, "y")]
+    kits = [named for path in paths for named in model_kits(path, "y")]
     shapes = [(name, kit_shape(kit, kit.exemplars[0].assembly)) for name, kit in kits]
-    return TableResult([decomposition_table(shapes, asked.cuts), grammar_table(kits)])
+    return TableResult([decomposition_table(shapes, options.segmentations), grammar_table(kits)])
 
 
 TABLE = Evaluation(
-    question="Are parts found again that were merged to one mesh, and what may be exchanged?",
-    needs=(Requirement("model files", lambda subject: f"it takes {FILES}"),),  # a minute or two each: no part of `all`
-    seconds=lambda subject: 120.0,
-    answer=_answer,
-    of_files=_of_files,
-    options=_options,
+    question="Are the parts of merged models found again, and how much of their grammar?",
+    requirements=(Requirement("model files", lambda run: f"it takes {FILES}"),),  # a minute or two each: not in `all`
+    estimate_seconds=lambda run: 120.0,
+    compute=_compute,
+    compute_from_files=_compute_from_files,
+    options=Options,
 )

@@ -3,35 +3,44 @@
 from __future__ import annotations
 
 import json
-from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
-from typing import get_args
+
+from pydantic import Field
 
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import Evaluation, ImageRow, TableResult
 from eval.engine.requirements import CORPUS, KITS
+from pipeline.config import StrictModel
 from stages.string_sampling.settings import SamplingMethod
 
-SHOWN = 4
-"""Pictures of what each model dreamt."""
-WARMING = 8
-"""Graphs that are put together before anybody looks at a clock: contacts are learnt first."""
+SHAPES_SHOWN = 4
+WARM_UP_GRAPHS = 8
+"""Graphs instantiated before time is measured, which fill the cache of contacts."""
 
 
-def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
+class Options(StrictModel):
+    """What is instantiated, and how."""
+
+    graphs: int = Field(100, ge=1, description="graphs of each kit and of each model")
+    sampling: SamplingMethod = Field("gaussian", description="as string_sampling.sources.sampling")
+    max_repairs: int = Field(24, ge=0, description="as string_sampling.max_repairs")
+    max_placements: int = Field(4000, ge=1, description="as string_sampling.max_placements")
+
+
+def _compute(run: DatasetRun, options: Options) -> TableResult:
     from eval.engine.pictures import shape_picture
     from eval.generated.instantiation import (
-        DRAWS,
+        DRAWS_PER_GRAPH,
         METHODS,
-        Attempt,
+        InstantiationAttempt,
         attempts,
         distinct_graphs,
-        dream_rng,
         edge_categories,
         guides_of,
         instantiator_of,
         methods_table,
         outcome_table,
+        sampling_rng,
     )
     from eval.strings.string_vaes import string_vaes
     from stages.exemplars.language import dataset_kits
@@ -42,76 +51,72 @@ def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from stages.strings.decoder import decode
     from stages.training.string_vae.latent_sampling import sample
 
-    outcomes: list[tuple[str, Sequence[Attempt]]] = []
-    compared: list[tuple[str, str, Sequence[Attempt]]] = []
-    strips: list[ImageRow] = []
-    models, seed = [each for each in string_vaes(subject.models) if each.seed == 0], subject.config.seed
-    for name, kit in dataset_kits(subject.paths).items():
-        train, test = (_lines(subject, name, split) for split in ("train", "test"))
+    outcomes: list[tuple[str, Sequence[InstantiationAttempt]]] = []
+    compared: list[tuple[str, str, Sequence[InstantiationAttempt]]] = []
+    image_rows: list[ImageRow] = []
+    models, seed = [trained for trained in string_vaes(run.models) if trained.seed == 0], run.config.seed
+    for name, kit in dataset_kits(run.paths).items():
+        train, test = (_lines(run, name, split) for split in ("train", "test"))
         if not test:
             continue
-        maker, alphabet = instantiator_of(subject, kit), make_alphabet(kit.labels)
-        limits = {"budget": asked.parts, "whole": _tells_all(subject, name)}
-        standard = METHODS["all steps"]._replace(**limits)
-        unseen = distinct_graphs(test, alphabet, asked.instantiated)
-        attempts(maker, unseen[:WARMING], standard, seed)
-        for title, method in METHODS.items():
-            compared.append((name, title, attempts(maker, unseen, method._replace(**limits), seed)))
+        instantiator, alphabet = instantiator_of(run, kit), make_alphabet(kit.labels)
+        whole = _has_all_contacts(run, name)
+        by_name = {
+            title: method._replace(budget=options.max_placements, whole=whole) for title, method in METHODS.items()
+        }
+        standard = by_name["all steps"]
+        unseen = distinct_graphs(test, alphabet, options.graphs)
+        attempts(instantiator, unseen[:WARM_UP_GRAPHS], standard, seed)
+        for title, method in by_name.items():
+            compared.append((name, title, attempts(instantiator, unseen, method, seed)))
         outcomes.append((f"{name}, unseen variations", compared[-len(METHODS)][2]))
-        for learnt in edge_categories(subject.models, kit):
-            found = attempts(maker, unseen, standard, seed, guides_of(learnt.model, unseen))
-            compared.append((name, f"all steps, guided by {learnt.name}", found))
-        known = {graph_digest(each.types, each.edges) for each in (decode(line, alphabet) for line in train)}
-        for trained in [each for each in models if each.kit == name]:
-            learnt_from = [line for line in train if trained.model.is_valid(line)]
-            rng = dream_rng(seed, trained.folder)
-            drawn = sample(trained.model, asked.way, learnt_from, DRAWS * asked.instantiated, rng)
-            mends = repair_strings(trained.model, drawn[: asked.instantiated], maker, standard, asked.mends, seed)
-            tried: list[Attempt] = []
-            for title, strings in (
-                ("new graphs of", [each.string for each in drawn]),
-                ("new graphs, repair_strings, of", mends),
-            ):
-                written = [each for each in strings if each is not None]
-                dreamt = distinct_graphs(written, alphabet, asked.instantiated, known)
-                if dreamt:
-                    tried = attempts(maker, dreamt, standard, seed)
+        for guide in edge_categories(run.models, kit):
+            guided = attempts(instantiator, unseen, standard, seed, guides_of(guide.model, unseen))
+            compared.append((name, f"all steps, guided by {guide.name}", guided))
+        known = {graph_digest(graph.types, graph.edges) for graph in (decode(line, alphabet) for line in train)}
+        for trained in [model for model in models if model.kit == name]:
+            readable = [line for line in train if trained.model.is_valid(line)]
+            rng = sampling_rng(seed, trained.folder)
+            results = sample(trained.model, options.sampling, readable, DRAWS_PER_GRAPH * options.graphs, rng)
+            repaired = repair_strings(
+                trained.model, results[: options.graphs], instantiator, standard, options.max_repairs, seed
+            )
+            tried: list[InstantiationAttempt] = []
+            sampled = [result.string for result in results]
+            for title, strings in (("new graphs of", sampled), ("new graphs, repaired, of", repaired)):
+                found = [string for string in strings if string is not None]
+                graphs = distinct_graphs(found, alphabet, options.graphs, known)
+                if graphs:
+                    tried = attempts(instantiator, graphs, standard, seed)
                     outcomes.append((f"{name}, {title} {trained.name}", tried))
-            good = [each.assembly for each in tried if each.good and each.assembly is not None]
-            pictures = [(f"{len(each)} parts", shape_picture(kit_shape(kit, each))) for each in good[:SHOWN]]
-            strips.append(ImageRow(f"What {trained.folder} dreamt", pictures))
-    return TableResult([outcome_table(outcomes), methods_table(compared)], strips=strips)
+            valid = [attempt.assembly for attempt in tried if attempt.is_valid and attempt.assembly is not None]
+            pictures = [
+                (f"{len(assembly)} parts", shape_picture(kit_shape(kit, assembly))) for assembly in valid[:SHAPES_SHOWN]
+            ]
+            image_rows.append(ImageRow(f"Shapes generated by {trained.folder}", pictures))
+    return TableResult([outcome_table(outcomes), methods_table(compared)], image_rows=image_rows)
 
 
-def _lines(subject: DatasetRun, kit: str, split: str) -> list[str]:
-    path = subject.corpus / f"{kit}-{split}.txt"
+def _lines(run: DatasetRun, kit: str, split: str) -> list[str]:
+    path = run.corpus / f"{kit}-{split}.txt"
     return path.read_text().splitlines() if path.is_file() else []
 
 
-def _tells_all(subject: DatasetRun, kit: str) -> bool:
-    """Whether the strings of a kit tell of all contacts."""
-    vocabulary = json.loads((subject.corpus / "vocabulary.json").read_bytes())
+def _has_all_contacts(run: DatasetRun, kit: str) -> bool:
+    """Return whether the strings of a kit contain all contacts."""
+    vocabulary = json.loads((run.corpus / "vocabulary.json").read_bytes())
     return bool(vocabulary[kit]["edges"] == "all")
 
 
-def _seconds(subject: DatasetRun) -> float:
-    kits, models = (len(list(folder)) for folder in (subject.corpus.glob("*-test.txt"), subject.models.glob("*")))
+def _estimate_seconds(run: DatasetRun) -> float:
+    kits, models = (len(list(folder)) for folder in (run.corpus.glob("*-test.txt"), run.models.glob("*")))
     return 30.0 + 90.0 * kits + 150.0 * models
 
 
-def _options(parser: ArgumentParser) -> None:
-    parser.add_argument("--instantiated", type=int, default=100, help="graphs of each kit and each model")
-    parser.add_argument(
-        "--way", choices=get_args(SamplingMethod), default="gaussian", help="as in string_sampling.sources"
-    )
-    parser.add_argument("--mends", type=int, default=24, help="as in synthesis")
-    parser.add_argument("--parts", type=int, default=4000, help="parts put down at most for a graph")
-
-
 TABLE = Evaluation(
-    question="How many graphs become shapes, and what is each step on the way worth?",
-    needs=(KITS, CORPUS),
-    seconds=_seconds,
-    answer=_answer,
-    options=_options,
+    question="How many graphs become shapes, and what does each step of the solver contribute?",
+    requirements=(KITS, CORPUS),
+    estimate_seconds=_estimate_seconds,
+    compute=_compute,
+    options=Options,
 )

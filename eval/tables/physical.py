@@ -1,47 +1,49 @@
-"""`make eval TABLE=physical`: does it stand?"""
+"""`make eval TABLE=physical`: are the shapes physically stable?"""
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import Field
 
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import Chart, Evaluation, ImageRow, TableResult
 from eval.engine.requirements import FINISHED_DATASET
+from pipeline.config import StrictModel
 from pipeline.errors import ConfigError
 from stages.shape.shape import Shape
 
 if TYPE_CHECKING:
-    from eval.dataset.physical_validity import Judged
+    from eval.dataset.physical_validity import PhysicalResults
 
-MOST = 200
-SHOWN = 6
-"""So many of the weakest shapes are drawn."""
-
-
-def _options(parser: ArgumentParser) -> None:
-    parser.add_argument("--most", type=_at_least(1), default=MOST, help="shapes of a dataset that are measured at most")
-    parser.add_argument(
-        "--dry", type=_at_least(0), default=10, help="shapes of a kind that are judged as dry blocks, too"
-    )
-    parser.add_argument("--up", choices=("y", "z"), default="y", help="the axis that points up in the files")
+MAX_SHAPES = 200
+SHAPES_SHOWN = 6
 
 
-def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
-    from eval.dataset.physical_validity import PUBLISHED, judged_by_name, physical_table
+class Options(StrictModel):
+    """How many shapes are judged, and how."""
+
+    max_shapes: int = Field(MAX_SHAPES, ge=1, description="shapes of the dataset that are judged")
+    dry_shapes: int = Field(10, ge=0, description="shapes of each kind that are also judged as dry blocks")
+    up: Literal["y", "z"] = Field("y", description="the axis that points up in files")
+
+
+def _compute(run: DatasetRun, options: Options) -> TableResult:
+    from eval.dataset.physical_validity import PUBLISHED, judge_by_name, physical_table
     from eval.engine.shapes import dataset_shapes
     from stages.shape.physics.settings import PhysicsConfig
 
-    config = subject.config.section(PhysicsConfig)
-    judged = judged_by_name(dataset_shapes(subject.folder, asked.most), config)
-    table = physical_table(judged, config, asked.dry, PUBLISHED)
-    return TableResult([table], [_margins(judged)], [ImageRow("The weakest, by the push they bear", _weakest(judged))])
+    config = run.config.section(PhysicsConfig)
+    results = judge_by_name(dataset_shapes(run.folder, options.max_shapes), config)
+    table = physical_table(results, config, options.dry_shapes, PUBLISHED)
+    weakest = ImageRow("The weakest shapes, by the push that they bear", _weakest(results))
+    return TableResult([table], [_margins(results)], [weakest])
 
 
-def _of_files(paths: Sequence[Path], asked: Namespace) -> TableResult:
-    from eval.dataset.physical_validity import PUBLISHED, judged_by_name, physical_table
+def _compute_from_files(paths: Sequence[Path], options: Options) -> TableResult:
+    from eval.dataset.physical_validity import PUBLISHED, judge_by_name, physical_table
     from eval.engine.shapes import box_shapes, model_shapes
     from stages.shape.physics.settings import PhysicsConfig
 
@@ -49,53 +51,43 @@ def _of_files(paths: Sequence[Path], asked: Namespace) -> TableResult:
         for path in paths:
             if not path.is_file():
                 raise ConfigError(f"there is no file {path}")
-            yield from (box_shapes if path.suffix == ".npz" else model_shapes)(path, asked.up)
+            yield from (box_shapes if path.suffix == ".npz" else model_shapes)(path, options.up)
 
     boxes = [path.stem for path in paths if path.suffix == ".npz"]
-    published = [each for each in PUBLISHED if any(each.name.partition(",")[0] in stem for stem in boxes)]
+    published = [row for row in PUBLISHED if any(row.name.partition(",")[0] in stem for stem in boxes)]
     config = PhysicsConfig()
-    return TableResult([physical_table(judged_by_name(shapes(), config), config, asked.dry, published)])
+    return TableResult([physical_table(judge_by_name(shapes(), config), config, options.dry_shapes, published)])
 
 
-def _margins(judged: Mapping[str, Judged]) -> Chart:
-    """The share of shapes that bear a push of so many weights."""
+def _margins(results: Mapping[str, PhysicalResults]) -> Chart:
     lines = {}
-    for name, each in judged.items():
-        margins = [validity.margin for validity in each.rigid]
-        steps = sorted({0.0, *(margin for margin in margins if margin >= 0)})
-        lines[name] = [(step, 100 * sum(margin >= step for margin in margins) / len(margins)) for step in steps]
-    return Chart("How large a push they bear", "push, in weights", "% that bear it", lines)
+    for name, result in results.items():
+        margins = [validity.margin for validity in result.rigid]
+        pushes = sorted({0.0, *(margin for margin in margins if margin >= 0)})
+        lines[name] = [(push, 100 * sum(margin >= push for margin in margins) / len(margins)) for push in pushes]
+    return Chart("Stability under a push", "push, in weights", "% of shapes that bear it", lines)
 
 
-def _weakest(judged: Mapping[str, Judged]) -> list[tuple[str, bytes]]:
+def _weakest(results: Mapping[str, PhysicalResults]) -> list[tuple[str, bytes]]:
     from eval.engine.pictures import shape_picture
 
     ranked = sorted(
-        (validity.margin, name, place) for name, each in judged.items() for place, validity in enumerate(each.rigid)
+        (validity.margin, name, index)
+        for name, result in results.items()
+        for index, validity in enumerate(result.rigid)
     )
     pictures = []
-    for margin, name, place in ranked[:SHOWN]:
-        told = f"bears {margin:.2f}" if margin >= 0 else "does not stand"
-        pictures.append((f"{name}, {told}", shape_picture(judged[name].shapes[place])))
+    for margin, name, index in ranked[:SHAPES_SHOWN]:
+        verdict = f"bears {margin:.2f}" if margin >= 0 else "falls"
+        pictures.append((f"{name}, {verdict}", shape_picture(results[name].shapes[index])))
     return pictures
 
 
-def _at_least(least: int) -> Callable[[str], int]:
-    """How an option reads a whole number."""
-
-    def number(text: str) -> int:
-        if int(text) < least:
-            raise ArgumentTypeError(f"must be at least {least}")
-        return int(text)
-
-    return number
-
-
 TABLE = Evaluation(
-    question="Does what the dataset holds stand, and how large a push does it bear?",
-    needs=(FINISHED_DATASET,),
-    seconds=lambda subject: 10 + 0.2 * min(subject.samples, MOST),
-    answer=_answer,
-    of_files=_of_files,
-    options=_options,
+    question="Are the shapes physically stable, and how large a push do they bear?",
+    requirements=(FINISHED_DATASET,),
+    estimate_seconds=lambda run: 10 + 0.2 * min(run.samples, MAX_SHAPES),
+    compute=_compute,
+    compute_from_files=_compute_from_files,
+    options=Options,
 )

@@ -1,40 +1,45 @@
-"""`make eval TABLE=recovery_baselines`: ways in which a network may answer, at equal training (geocode Table 3)."""
+"""`make eval TABLE=recovery_baselines`: kinds of network outputs, at equal training (geocode Table 3)."""
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from pydantic import Field
 
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import Evaluation, TableResult
 from eval.engine.requirements import RECOVERY
+from pipeline.config import StrictModel
 from stages.training.checkpoint import weights_of_kind
 
 
-def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
-    from eval.recovery.accuracy import baselines_table, held_out, methods, tried
+class Options(StrictModel):
+    """How much is recovered."""
+
+    shapes: int = Field(100, ge=1, description="shapes recovered by each model")
+
+
+def _compute(run: DatasetRun, options: Options) -> TableResult:
+    from eval.recovery.methods import apply_method, held_out, methods
+    from eval.recovery.tables import baselines_table
     from pipeline.randomness import decision_rng
     from stages.training.recovery.trained import load_recovery
 
-    rows, steps, seed = [], {}, subject.config.seed
-    paths = {path: load_recovery(path) for path in weights_of_kind(subject.models, "recovery")}
-    # what is no baseline first, with which the others are compared
-    for path, model in sorted(paths.items(), key=lambda each: each[1].entry.is_baseline):
-        guess = methods(model, 1, seed)["network"]
-        for name, shapes, inputs in held_out(model, asked.compared, decision_rng(seed, "recovery", model.program.name)):
+    rows, steps, seed = [], {}, run.config.seed
+    models = {path: load_recovery(path) for path in weights_of_kind(run.models, "recovery")}
+    # the model that is no baseline comes first: the others are compared with it
+    for path, model in sorted(models.items(), key=lambda pair: pair[1].entry.is_baseline):
+        estimate = methods(model, 1, seed)["network"]
+        rng = decision_rng(seed, "recovery", model.program.name)
+        for name, shapes, inputs in held_out(model, options.shapes, rng):
             label = f"{path.parent.name}, {name}"
-            rows.append(tried(label, model.program, guess, shapes, inputs))
+            rows.append(apply_method(label, model.program, estimate, shapes, inputs))
             steps[label] = model.entry.steps * model.entry.max_rounds
     return TableResult([baselines_table(rows, steps)])
 
 
-def _options(parser: ArgumentParser) -> None:
-    parser.add_argument("--compared", type=int, default=100, help="shapes that are recovered by each model")
-
-
 TABLE = Evaluation(
-    question="Do classes recover better than values, with the existence label than without, one network than two?",
-    needs=(RECOVERY,),
-    seconds=lambda subject: 60.0 * len(weights_of_kind(subject.models, "recovery")),
-    answer=_answer,
-    options=_options,
+    question="Do class outputs, the existence label and a single network recover shapes better than the alternatives?",
+    requirements=(RECOVERY,),
+    estimate_seconds=lambda run: 60.0 * len(weights_of_kind(run.models, "recovery")),
+    compute=_compute,
+    options=Options,
 )

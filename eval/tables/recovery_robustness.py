@@ -1,17 +1,19 @@
-"""`make eval TABLE=recovery_robustness`: recovery out of the distribution (geocode §4.4)."""
+"""`make eval TABLE=recovery_robustness`: recovery outside the training distribution (geocode §4.4)."""
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pydantic import Field
+
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import Evaluation, ImageRow, TableResult
 from eval.engine.requirements import CURVE_PROGRAM
 from eval.engine.results_cache import TableSection, cached_sections
+from pipeline.config import StrictModel
 from stages.training.checkpoint import weights_of_kind
 
 if TYPE_CHECKING:
@@ -19,84 +21,82 @@ if TYPE_CHECKING:
     from stages.recovery.result import RecoveryResult
     from stages.training.recovery.trained import TrainedRecovery
 
-SHOWN = 8
-"""Recoveries of each kind that the report shows."""
+RESULTS_SHOWN = 8
+"""Of each kind of input."""
 
 
-def _parts(subject: DatasetRun, asked: Namespace) -> Iterator[TableSection]:
-    """One for each program and way to spoil, and one for each program and folder from elsewhere."""
-    from eval.recovery.accuracy import usable_models
-    from eval.recovery.robustness import foreign_inputs, ways_to_spoil
+class Options(StrictModel):
+    """What is recovered, and how long the search is."""
+
+    programs: tuple[str, ...] = Field((), description="programs whose models are measured; all unless given")
+    corrupted: int = Field(4, ge=0, description="held-out shapes for each corruption; 0 for external ones alone")
+    search_budget: int = Field(300, ge=1, description="shapes that a search evaluates")
+    external: tuple[Path, ...] = Field((), description="folders with clouds, meshes and drawings from other sources")
+
+
+def _sections(run: DatasetRun, options: Options) -> Iterator[TableSection]:
+    """Yield a section for each program and corruption, and for each program and external folder."""
+    from eval.recovery.methods import usable_models
+    from eval.recovery.robustness import corruption_names, external_inputs
     from stages.programs.program import program_module
     from stages.training.recovery.trained import PRETRAINED_FOLDER
 
-    weights = [*weights_of_kind(subject.models, "recovery"), *weights_of_kind(PRETRAINED_FOLDER, "recovery")]
-    models, seed = usable_models(subject.models, asked.programs), subject.config.seed
-    brought = {(folder, kind): foreign_inputs(folder, kind) for folder in asked.foreign for _, kind in models}
+    weights = [*weights_of_kind(run.models, "recovery"), *weights_of_kind(PRETRAINED_FOLDER, "recovery")]
+    models, seed = usable_models(run.models, options.programs), run.config.seed
+    external = {(folder, kind): external_inputs(folder, kind) for folder in options.external for _, kind in models}
     for (program, kind), model in sorted(models.items()):
-        code = (program_module(program),)
-        for how in ways_to_spoil(kind) if asked.spoilt else ():
-            make = partial(_of_spoilt, model, how, asked, seed)
-            yield TableSection(f"{program}, {kind}, {how}", weights, make, code, ("spoilt", "tries"))
-        for folder in asked.foreign:
-            if brought[folder, kind]:
-                make = partial(_of_folder, model, folder.name, brought[folder, kind], asked, seed)
-                reads = [*weights, *sorted(each for each in (folder, *folder.glob("*")) if each.is_file())]
-                yield TableSection(f"{program}, {kind}, from {folder.name}", reads, make, code, ("tries",))
+        modules = (program_module(program),)
+        for corruption in corruption_names(kind) if options.corrupted else ():
+            compute = partial(_of_corruption, model, corruption, options, seed)
+            names = ("corrupted", "search_budget")
+            yield TableSection(f"{program}, {kind}, {corruption}", weights, compute, modules, names)
+        for folder in options.external:
+            if inputs := external[folder, kind]:
+                compute = partial(_of_folder, model, folder.name, inputs, options, seed)
+                files = [*weights, *sorted(path for path in (folder, *folder.glob("*")) if path.is_file())]
+                name = f"{program}, {kind}, from {folder.name}"
+                yield TableSection(name, files, compute, modules, ("search_budget",))
 
 
-def _of_spoilt(model: TrainedRecovery, how: str, asked: Namespace, seed: int) -> TableResult:
-    from eval.recovery.accuracy import held_out, methods, tried
-    from eval.recovery.robustness import WAYS, spoilt_inputs, spoilt_table
+def _of_corruption(model: TrainedRecovery, corruption: str, options: Options, seed: int) -> TableResult:
+    from eval.recovery.methods import apply_method, held_out, methods
+    from eval.recovery.robustness import METHOD_NAMES, corrupted_inputs, corruption_table
     from pipeline.randomness import decision_rng
 
-    ways, rng = methods(model, asked.tries, seed), decision_rng(seed, "recovery", model.header["program"])
-    # the novel angle comes after the trained ones
-    name, shapes, inputs = next(held_out(model, asked.spoilt, rng))
-    given = spoilt_inputs(model, how, shapes, inputs, seed)
-    label = f"{model.program.name}, {name}, {how}"
-    found = [tried(f"{label}: {way}", model.program, ways[way], shapes, given) for way in WAYS]
-    return TableResult([spoilt_table(found)], strips=[_strip(label, given, found[-1].results)])
+    by_name, rng = methods(model, options.search_budget, seed), decision_rng(seed, "recovery", model.header["program"])
+    # trained views come first
+    name, shapes, inputs = next(held_out(model, options.corrupted, rng))
+    given = corrupted_inputs(model, corruption, shapes, inputs, seed)
+    label = f"{model.program.name}, {name}, {corruption}"
+    results = [
+        apply_method(f"{label}: {method}", model.program, by_name[method], shapes, given) for method in METHOD_NAMES
+    ]
+    return TableResult([corruption_table(results)], image_rows=[_image_row(label, given, results[-1].results)])
 
 
 def _of_folder(
-    model: TrainedRecovery, folder: str, inputs: Sequence[RecoveryInput], asked: Namespace, seed: int
+    model: TrainedRecovery, folder: str, inputs: Sequence[RecoveryInput], options: Options, seed: int
 ) -> TableResult:
-    from eval.recovery.robustness import foreign_rows, foreign_table
+    from eval.recovery.robustness import external_rows, external_table
 
-    label, found = f"{model.program.name}, {folder}", foreign_rows(model, inputs, asked.tries, seed)
-    table = foreign_table([(f"{label}: {way}", distances, results) for way, distances, results in found])
-    return TableResult([table], strips=[_strip(label, inputs, found[-1][2])])
+    label, rows = f"{model.program.name}, {folder}", external_rows(model, inputs, options.search_budget, seed)
+    table = external_table([(f"{label}: {method}", distances, results) for method, distances, results in rows])
+    return TableResult([table], image_rows=[_image_row(label, inputs, rows[-1][2])])
 
 
-def _strip(label: str, inputs: Sequence[RecoveryInput], results: Sequence[RecoveryResult]) -> ImageRow:
+def _image_row(label: str, inputs: Sequence[RecoveryInput], results: Sequence[RecoveryResult]) -> ImageRow:
     from stages.recovery.files import recovery_picture
     from stages.shape.views.sheet import picture_png
 
-    pairs = list(zip(inputs, results, strict=True))[:SHOWN]
+    pairs = list(zip(inputs, results, strict=True))[:RESULTS_SHOWN]
     pictures = [(given.name, picture_png(recovery_picture(given, result))) for given, result in pairs]
     return ImageRow(f"Input and result, {label}", pictures)
 
 
-def _options(parser: ArgumentParser) -> None:
-    parser.add_argument(
-        "--spoilt", type=int, default=4, help="shapes that are recovered, of each kind of input; 0: foreign ones alone"
-    )
-    parser.add_argument("--tries", type=int, default=300, help="shapes that a refinement of them makes at most")
-    parser.add_argument(
-        "--foreign",
-        type=Path,
-        nargs="*",
-        default=[],
-        metavar="FOLDER",
-        help="clouds, meshes and drawings from elsewhere",
-    )
-
-
 TABLE = Evaluation(
-    question="How near does recovery come where inputs are noisy, torn, drawn otherwise, or of no program at all?",
-    needs=(CURVE_PROGRAM,),
-    seconds=lambda subject: 900.0,
-    answer=cached_sections(_parts, _options),
-    options=_options,
+    question="How close does recovery come for noisy, partial or redrawn inputs, and for shapes from other sources?",
+    requirements=(CURVE_PROGRAM,),
+    estimate_seconds=lambda run: 900.0,
+    compute=cached_sections(_sections),
+    options=Options,
 )

@@ -2,79 +2,86 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from pydantic import Field
 
 from eval.engine.dataset_run import DatasetRun
-from eval.engine.evaluation import Evaluation, Requirement, TableResult
-from eval.engine.requirements import PROGRAMS
-from stages.training.checkpoint import weights_of_kind
+from eval.engine.evaluation import Evaluation, TableResult
+from eval.engine.requirements import PROGRAMS, trained
+from pipeline.config import StrictModel
+from stages.shapeassembly.settings import DEFAULT_TOP_P
 
-KINDS = ("program_vae", "part_graph_vae")
-DENSE = 8
-"""So many times as many points as a cloud has say where its surface is, when F1 is measured."""
-DRAWN = 5
-"""Clouds that figure 13 shows."""
-
-
-def _spaces(subject: DatasetRun) -> str:
-    there = any(weights_of_kind(subject.models, kind) for kind in KINDS)
-    return "" if there else f"no trained {' or '.join(KINDS)} in {subject.models}; make train"
+LATENT_KINDS = ("program_vae", "part_graph_vae")
+DENSITY_FACTOR = 8
+"""Points of the surface, for F1, per point of a cloud."""
+CLOUDS_SHOWN = 5
 
 
-def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
+class Options(StrictModel):
+    """Which clouds are reconstructed, and how."""
+
+    categories: tuple[str, ...] = Field(("chair",), description="categories of the clouds")
+    clouds: int = Field(60, ge=1, description="clouds of each category")
+    training_programs: int = Field(10_000, ge=1, description="programs at most that encoders are trained on")
+    descent_steps: int = Field(200, ge=0, description="steps of each fit")
+    top_p: float = Field(DEFAULT_TOP_P, gt=0, le=1, description="as shapeassembly.sampled.top_p")
+
+
+def _compute(run: DatasetRun, options: Options) -> TableResult:
     from eval.engine.pictures import cloud_portrait
-    from eval.programs.cloud_reconstruction import Rebuilt, clouds_table, described, reconstructions, trained_encoder
-    from eval.programs.figures import drawn, sheet_of
-    from eval.programs.models import program_models, read_by_all, told_without
+    from eval.programs.cloud_reconstruction import (
+        ReconstructedShapes,
+        cloud_descriptors,
+        clouds_table,
+        reconstructions,
+        train_cloud_encoder,
+    )
+    from eval.programs.figures import boxes_portrait, picture_figure
+    from eval.programs.models import ablation_of, commonly_readable_programs, program_models
     from eval.programs.quality import boxes_of_programs, clouds_of
-    from eval.programs.two_sample_test import POINTS
+    from eval.programs.two_sample_test import POINTS_PER_CLOUD
     from pipeline.randomness import decision_rng
     from stages.shapeassembly.execution.interpreter import execute_all
     from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 
-    models = [each for each in program_models(subject, asked.top_p) if told_without(each) == "nothing"]
-    models = [each for each in models if each.model.header["kind"] in KINDS]
-    rows: dict[str, Rebuilt] = {}
-    sheets = []
-    for category in sorted({each.kit for each in models} & set(asked.categories.split(","))):
-        rng = decision_rng(subject.config.seed, "shapeassembly_clouds", category)
-        train = read_by_all(subject, category, "train", asked.learnt, rng)
-        val = read_by_all(subject, category, "val", asked.clouds, rng)
-        seen = described(clouds_of(boxes_of_programs(train), POINTS))
-        dense = clouds_of(boxes_of_programs(val), DENSE * POINTS)
-        clouds = dense[:, ::DENSE]
-        targets = described(clouds)
-        shown = [[("input points", cloud_portrait(cloud))] for cloud in clouds[:DRAWN]]
-        for each in models:
-            if each.kit != category:
+    models = [
+        model
+        for model in program_models(run, options.top_p)
+        if ablation_of(model) == "nothing" and model.model.header["kind"] in LATENT_KINDS
+    ]
+    rows: dict[str, ReconstructedShapes] = {}
+    figures = []
+    for category in sorted({model.kit for model in models} & set(options.categories)):
+        rng = decision_rng(run.config.seed, "shapeassembly_clouds", category)
+        train = commonly_readable_programs(run, category, "train", options.training_programs, rng)
+        val = commonly_readable_programs(run, category, "val", options.clouds, rng)
+        descriptors = cloud_descriptors(clouds_of(boxes_of_programs(train), POINTS_PER_CLOUD))
+        dense = clouds_of(boxes_of_programs(val), DENSITY_FACTOR * POINTS_PER_CLOUD)
+        clouds = dense[:, ::DENSITY_FACTOR]
+        targets = cloud_descriptors(clouds)
+        shown = [[("input points", cloud_portrait(cloud))] for cloud in clouds[:CLOUDS_SHOWN]]
+        for model in models:
+            if model.kit != category:
                 continue
-            learnt = execute_all(train) if isinstance(each.model, TrainedPartGraphVae) else train
-            places = trained_encoder(seen, each.model.encode(learnt), subject.config.seed)(targets)
-            for number, (place, cloud) in enumerate(zip(places, clouds, strict=True)):
-                for name, boxes in reconstructions(each.model, place, cloud, rng, asked.descent):
-                    row = rows.setdefault(f"{each.folder}{name}", Rebuilt([], []))
+            inputs = execute_all(train) if isinstance(model.model, TrainedPartGraphVae) else train
+            encoder = train_cloud_encoder(descriptors, model.model.encode(inputs), run.config.seed)
+            for number, (point, cloud) in enumerate(zip(encoder(targets), clouds, strict=True)):
+                for suffix, boxes in reconstructions(model.model, point, cloud, rng, options.descent_steps):
+                    name = f"{model.folder}{suffix}"
+                    row = rows.setdefault(name, ReconstructedShapes([], []))
                     row.boxes.append(boxes)
                     row.clouds.append(dense[number])
-                    if number < DRAWN:
-                        shown[number].append((f"{each.folder}{name}", drawn(boxes)))
-        title = f"Figure 13, {category}: from clouds to cuboids and programs, shapes not chosen"
-        sheets.append(sheet_of(f"figure13_{category}", title, {f"{n}.": row for n, row in enumerate(shown, 1)}))
-    return TableResult([clouds_table(rows)], sheets=sheets)
-
-
-def _options(parser: ArgumentParser) -> None:
-    parser.add_argument("--categories", default="chair", help="categories whose clouds are looked at, with commas")
-    parser.add_argument("--clouds", type=int, default=60, help="clouds of each category")
-    parser.add_argument(
-        "--learnt", type=int, default=10_000, help="programs at most that encoders of clouds learn from"
-    )
-    parser.add_argument("--descent", type=int, default=200, help="steps of each fit")
+                    if number < CLOUDS_SHOWN:
+                        shown[number].append((name, boxes_portrait(boxes)))
+        title = f"Figure 13, {category}: from clouds to cuboids and programs, random shapes"
+        of_clouds = {f"{number}.": row for number, row in enumerate(shown, 1)}
+        figures.append(picture_figure(f"figure13_{category}", title, of_clouds))
+    return TableResult([clouds_table(rows)], figures=figures)
 
 
 TABLE = Evaluation(
-    question="What programs do models find of point clouds, and how near do fits of cuboids or of programs come?",
-    needs=(Requirement("a trained model of programs, or of their cuboids, with a latent space", _spaces), PROGRAMS),
-    seconds=lambda subject: 1200.0,
-    answer=_answer,
-    options=_options,
+    question="Which programs do models find for point clouds, and how close do fits of cuboids or programs come?",
+    requirements=(trained("model of programs or of their cuboids with a latent space", *LATENT_KINDS), PROGRAMS),
+    estimate_seconds=lambda run: 1200.0,
+    compute=_compute,
+    options=Options,
 )

@@ -1,16 +1,18 @@
-"""`make eval TABLE=strings`: what string VAEs have learnt (strings §5 and Table 2)."""
+"""`make eval TABLE=strings`: how well do string VAEs reconstruct, sample and interpolate? (strings §5 and Table 2)"""
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
+from pydantic import Field
+
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import Chart, Evaluation, ImageRow, TableResult
 from eval.engine.requirements import CORPUS, STRING_VAE
+from pipeline.config import StrictModel
 from stages.training.checkpoint import weights_of_kind
 
 if TYPE_CHECKING:
@@ -20,73 +22,81 @@ if TYPE_CHECKING:
     from stages.training.string_vae.trained import TrainedStringVae
 
 
-def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
+class Options(StrictModel):
+    """How much is sampled."""
+
+    searches: int = Field(1000, ge=1, description="searches of each sampling method")
+
+
+def _compute(run: DatasetRun, options: Options) -> TableResult:
     from eval.engine.models import training_curve
     from eval.engine.parallel_map import parallel_map
     from eval.strings.string_vaes import reconstruction_table, sampling_table, string_vaes, structure_table
 
-    rebuilt, sampled, joined, lines = [], [], [], {}
-    strips: list[ImageRow] = []
-    models = string_vaes(subject.models)
-    for each, seen in parallel_map(partial(_look_at, subject, asked.searches), models, asked.workers, "models"):
-        if seen.rebuilt is not None:
-            rebuilt.append((each, seen.rebuilt))
-        sampled += [(each, way, figures) for way, figures in seen.sampled.items()]
-        joined.append((each, seen.nodes, seen.joined))
-        strips += seen.strips
-        lines[each.folder] = training_curve(subject.models / each.folder, "val_nats")
+    reconstructions, samplings, structures, lines = [], [], [], {}
+    image_rows: list[ImageRow] = []
+    measure = partial(_measure, run, options.searches)
+    for trained, measured in parallel_map(measure, string_vaes(run.models), run.workers, "models"):
+        if measured.reconstruction is not None:
+            reconstructions.append((trained, measured.reconstruction))
+        samplings += [(trained, method, sampling) for method, sampling in measured.samplings.items()]
+        structures.append((trained, measured.nodes, measured.paths))
+        image_rows += measured.image_rows
+        lines[trained.folder] = training_curve(run.models / trained.folder, "val_nats")
     return TableResult(
-        [reconstruction_table(rebuilt), sampling_table(sampled), structure_table(joined)],
-        [Chart("What a string that was not learnt takes", "steps of training", "nats a string", lines)],
-        strips,
+        [reconstruction_table(reconstructions), sampling_table(samplings), structure_table(structures)],
+        [Chart("Validation loss", "training steps", "nats per string", lines)],
+        image_rows,
     )
 
 
 @dataclass(frozen=True)
-class _Seen:
-    """All about one model. joined: of so many nodes."""
+class _Measured:
+    """The results of one model."""
 
-    rebuilt: Reconstruction | None
-    sampled: Mapping[str, Sampling]
+    reconstruction: Reconstruction | None
+    samplings: Mapping[str, Sampling]
+    """By sampling method."""
     nodes: int
-    joined: Mapping[str, PathFigures]
-    strips: Sequence[ImageRow]
+    """Of the latent graphs."""
+    paths: Mapping[str, PathFigures]
+    """By latent graph."""
+    image_rows: Sequence[ImageRow]
 
 
-def _look_at(subject: DatasetRun, searches: int, trained: TrainedModel[TrainedStringVae]) -> _Seen:
+def _measure(run: DatasetRun, searches: int, trained: TrainedModel[TrainedStringVae]) -> _Measured:
     from eval.generated.instantiation import instantiator_of
-    from eval.strings.latent_interpolation import journey_strips
+    from eval.strings.latent_interpolation import interpolation_rows
     from eval.strings.string_vaes import corpus_strings, model_rng, reconstruction, sampling, shape_graphs, structure
     from stages.exemplars.language import dataset_kits
     from stages.string_sampling.instantiation.state import STANDARD_METHOD
     from stages.strings.settings import StringsConfig
     from stages.training.string_vae.latent_sampling import SAMPLING_METHODS
 
-    model, seed, kits = trained.model, subject.config.seed, dataset_kits(subject.paths)
-    train, test = (corpus_strings(subject.corpus, trained.kit, split, model) for split in ("train", "test"))
-    strips: list[ImageRow] = []
+    model, seed, kits = trained.model, run.config.seed, dataset_kits(run.paths)
+    train, test = (corpus_strings(run.corpus, trained.kit, split, model) for split in ("train", "test"))
+    image_rows: list[ImageRow] = []
     if not trained.seed and trained.kit in kits:
-        maker = instantiator_of(subject, kits[trained.kit])
-        method = STANDARD_METHOD._replace(whole=subject.config.section(StringsConfig).edges == "all")
+        instantiator = instantiator_of(run, kits[trained.kit])
+        method = STANDARD_METHOD._replace(whole=run.config.section(StringsConfig).edges == "all")
         rng = model_rng(seed, trained, "journeys")
-        strips += journey_strips(model, train, maker, method, trained.folder, rng)
+        image_rows += interpolation_rows(model, train, instantiator, method, trained.folder, rng)
     known = shape_graphs(model, train)
-    return _Seen(
+    return _Measured(
         reconstruction(model, test) if test else None,
-        {way: sampling(model, way, train, known, searches, model_rng(seed, trained, way)) for way in SAMPLING_METHODS},
+        {
+            name: sampling(model, name, train, known, searches, model_rng(seed, trained, name))
+            for name in SAMPLING_METHODS
+        },
         *structure(model, train, model_rng(seed, trained, "structure")),
-        strips,
+        image_rows,
     )
 
 
-def _options(parser: ArgumentParser) -> None:
-    parser.add_argument("--searches", type=int, default=1000, help="searches of each way of sampling")
-
-
 TABLE = Evaluation(
-    question="Do strings come back from a string VAE, and how many new shapes does each way of sampling find?",
-    needs=(STRING_VAE, CORPUS),
-    seconds=lambda subject: 140.0 * len(weights_of_kind(subject.models, "string_vae")),
-    answer=_answer,
-    options=_options,
+    question="Do string VAEs reconstruct strings, and how many new shapes does each sampling method find?",
+    requirements=(STRING_VAE, CORPUS),
+    estimate_seconds=lambda run: 140.0 * len(weights_of_kind(run.models, "string_vae")),
+    compute=_compute,
+    options=Options,
 )

@@ -1,4 +1,4 @@
-"""Tables are found, say what they need, and carry published rows."""
+"""Tables are found, name their requirements, and have reference rows."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from pathlib import Path
 
 import pytest
 
-from eval.__main__ import main
 from eval.engine.dataset_run import DatasetRun, load_dataset_run
 from eval.engine.evaluation import Evaluation
 from eval.engine.registry import find_tables
 from eval.engine.requirements import FINISHED_DATASET, KITS, STRING_VAE
 from eval.engine.table import ReferenceRow, Table
+from tests.command import shapemill
 
 ROOT = Path(__file__).resolve().parents[2]
 DEFAULT, CHAIRS = ROOT / "configs" / "default.yaml", ROOT / "configs" / "chairs.yaml"
 
 
-def test_every_module_of_the_folder_is_a_table_with_a_question_and_needs() -> None:
-    found = find_tables()
-    assert list(found) == sorted(each.stem for each in (ROOT / "eval" / "tables").glob("[!_]*.py"))
-    for each in found.values():
-        assert isinstance(each, Evaluation)
-        assert each.question.endswith("?")
-        assert each.needs
+def test_every_module_is_a_table_with_question_and_requirements() -> None:
+    tables = find_tables()
+    assert list(tables) == sorted(path.stem for path in (ROOT / "eval" / "tables").glob("[!_]*.py"))
+    for table in tables.values():
+        assert isinstance(table, Evaluation)
+        assert table.question.endswith("?")
+        assert table.requirements
 
 
-def test_a_module_without_a_table_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_module_without_table_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "stray").mkdir()
     (tmp_path / "stray" / "__init__.py").touch()
     (tmp_path / "stray" / "wrong.py").write_text("TABLE = 3\n")
@@ -44,14 +44,14 @@ def test_a_module_without_a_table_is_named(tmp_path: Path, monkeypatch: pytest.M
 
 
 def finished(out: Path, config: Path) -> DatasetRun:
-    """The subject of a dataset of which only the manifest is there."""
-    subject = load_dataset_run(config, out)
-    subject.folder.mkdir(parents=True)
-    (subject.folder / "manifest.json").write_text(json.dumps({"samples": 1200}))
-    return subject
+    """Return the run of a dataset that has only a manifest."""
+    run = load_dataset_run(config, out)
+    run.folder.mkdir(parents=True)
+    (run.folder / "manifest.json").write_text(json.dumps({"samples": 1200}))
+    return run
 
 
-def test_what_is_missing_is_named_with_what_makes_it(tmp_path: Path) -> None:
+def test_missing_requirement_names_the_command_that_makes_it(tmp_path: Path) -> None:
     nothing = load_dataset_run(DEFAULT, tmp_path)
     assert "make dataset" in FINISHED_DATASET.missing(nothing)
     assert "make exemplars" in KITS.missing(nothing)
@@ -64,32 +64,36 @@ def test_what_is_missing_is_named_with_what_makes_it(tmp_path: Path) -> None:
     assert STRING_VAE.missing(nothing) == ""
 
 
-def test_without_a_table_all_are_listed_with_what_they_lack(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    asked = ["--config", str(DEFAULT), "--out", str(tmp_path)]
-    assert main(asked) == 0
-    before = capsys.readouterr().out
-    for name, each in find_tables().items():
+def test_list_of_tables_shows_missing_requirements(tmp_path: Path) -> None:
+    arguments = ["--config", str(DEFAULT), "--out", str(tmp_path)]
+    code, printed = shapemill("eval", *arguments)
+    assert code == 0
+    before = printed
+    for name, table in find_tables().items():
         assert f"  {name} " in before
-        assert each.question in before
+        assert table.question in before
     assert before.count("missing:") == len(find_tables())
     finished(tmp_path, DEFAULT)
-    assert main([*asked, "--", ""]) == 0
-    after = capsys.readouterr().out
+    code, printed = shapemill("eval", *arguments, "--", "")
+    assert code == 0
+    after = printed
     assert "1,200 shapes" in after
     assert after.count("can be made, takes about") >= 2
 
 
-def test_a_table_that_is_not_there_is_told_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["physicl"]) == 2
-    assert "did you mean physical?" in capsys.readouterr().err
+def test_unknown_table_names_the_nearest() -> None:
+    code, printed = shapemill("eval", "physicl")
+    assert code == 2
+    assert "did you mean physical?" in printed
 
 
-def test_a_table_about_datasets_takes_no_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["near_twins", str(tmp_path / "a.glb")]) == 2
-    assert "not about files" in capsys.readouterr().err
+def test_table_about_datasets_refuses_files(tmp_path: Path) -> None:
+    code, printed = shapemill("eval", "near_duplicates", str(tmp_path / "a.glb"))
+    assert code == 2
+    assert "not about files" in printed
 
 
-def test_published_rows_stand_below_ours_with_their_source_in_every_format() -> None:
+def test_reference_rows_follow_ours_with_their_source_in_every_format() -> None:
     published = (
         ReferenceRow("sand castle, naive", "strings Table 2", {"average": 4.71, "greatest": 12.17}),
         ReferenceRow("chair", "shapeassembly Table 5", {"average": 9.7}),
@@ -103,29 +107,42 @@ def test_published_rows_stand_below_ours_with_their_source_in_every_format() -> 
     ]
     assert "| sand castle, naive (strings Table 2) |  | 4.71 | 12.2 |" in table.markdown()
     assert table.latex().count(r"\midrule") == 2
-    assert list(table.published_by_source()) == ["strings Table 2", "shapeassembly Table 5"]
+    assert list(table.references_by_source()) == ["strings Table 2", "shapeassembly Table 5"]
 
 
-def test_published_figures_must_have_a_column() -> None:
+def test_reference_value_needs_a_column() -> None:
     with pytest.raises(ValueError, match="strings Table 2 has depth, which is no column of T"):
         Table("T", ("kit", "size"), (), (), (ReferenceRow("a", "strings Table 2", {"depth": 1}),))
 
 
-def test_a_table_that_fails_is_told_and_takes_no_other_with_it(tmp_path: Path) -> None:
-    """Tables of a house beside the project's, one of which fails, and the project's own, which lack their dataset."""
-    house = tmp_path / "house" / "eval" / "tables"
-    house.mkdir(parents=True)
+def test_failing_table_is_reported_and_others_are_made(tmp_path: Path) -> None:
+    """Tables of an extension, one of which fails, and those of the project, whose dataset is missing."""
+    tables = tmp_path / "extension" / "eval" / "tables"
+    tables.mkdir(parents=True)
     text = (
-        "from eval.engine.evaluation import Answer, Evaluation, Need, Sheet\nfrom eval.engine.table import Table\n"
-        "def answer(subject, asked):\n    {}\n"
-        "TABLE = Evaluation('Is it?', (Need('nothing', lambda _: ''),), lambda _: 1.0, answer)\n"
+        "from eval.engine.evaluation import Evaluation, Figure, Requirement, TableResult\n"
+        "from eval.engine.table import Table\n"
+        "def compute(run, options):\n    {}\n"
+        "TABLE = Evaluation('Is it?', (Requirement('nothing', lambda _: ''),), lambda _: 1.0, compute)\n"
     )
-    (house / "broken.py").write_text(text.format("raise ValueError('no such luck')"))
-    (house / "sound.py").write_text(
-        text.format("return Answer([Table('T', ('a', 'b'), (('one', 2),))], sheets=[Sheet('drawn', 'D', b'png')])")
+    (tables / "broken.py").write_text(text.format("raise ValueError('no such luck')"))
+    (tables / "sound.py").write_text(
+        text.format(
+            "return TableResult([Table('T', ('a', 'b'), (('one', 2),))], figures=[Figure('drawn', 'D', b'png')])"
+        )
     )
-    command = [sys.executable, "-m", "eval", "all", "--config", str(DEFAULT), "--out", str(tmp_path / "out")]
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "house")}
+    command = [
+        sys.executable,
+        "-m",
+        "pipeline",
+        "eval",
+        "all",
+        "--config",
+        str(DEFAULT),
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "extension")}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 1, done.stderr
     assert "ValueError: no such luck" in done.stderr
@@ -137,7 +154,7 @@ def test_a_table_that_fails_is_told_and_takes_no_other_with_it(tmp_path: Path) -
     assert 'id="sound"' in report
     assert all(f"<td>{name}</td>" in report for name in find_tables()), "what was not made is listed"
     alone = subprocess.run(
-        [*command[:3], "sound", *command[4:]], cwd=ROOT, env=environment, capture_output=True, text=True
+        [*command[:4], "sound", *command[5:]], cwd=ROOT, env=environment, capture_output=True, text=True
     )
     assert alone.returncode == 0, alone.stderr
     page = (results / "sound.html").read_text()

@@ -1,20 +1,20 @@
-"""Near-twins are found wherever they stand, and what differs is none."""
+"""Near-duplicates are found at any position and quarter turn."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from eval.dataset.near_duplicates import (
-    cloud_distance,
-    near_twins,
-    near_twins_table,
+    aligned_distance,
+    near_duplicates,
+    near_duplicates_table,
     nearest_by_split,
     nearest_in_train,
 )
 
 
 def boxes(rng: np.random.Generator, *boxes: tuple[float, ...]) -> np.ndarray:
-    """A cloud of 1,024 points on the faces of boxes (x, y, z, width, height, depth), as many on each."""
+    """Return a cloud of 1,024 points on the faces of boxes (x, y, z, width, height, depth), equally many on each."""
     count = 1024 // len(boxes)
     clouds = []
     for x, y, z, *sides in boxes:
@@ -25,42 +25,42 @@ def boxes(rng: np.random.Generator, *boxes: tuple[float, ...]) -> np.ndarray:
     return np.concatenate(clouds)
 
 
-HOUSE = ((0.0, 0.0, 0.0, 2.0, 1.0, 1.0), (0.0, 1.0, 0.0, 1.0, 1.0, 1.0))
+L_SHAPE = ((0.0, 0.0, 0.0, 2.0, 1.0, 1.0), (0.0, 1.0, 0.0, 1.0, 1.0, 1.0))
 TOWER = ((0.0, 0.0, 0.0, 1.0, 1.0, 1.0), (0.0, 1.0, 0.0, 1.0, 1.0, 1.0), (0.0, 2.0, 0.0, 1.0, 1.0, 1.0))
-SHED = ((0.0, 0.0, 0.0, 3.0, 1.0, 1.0),)
+LOW_BOX = ((0.0, 0.0, 0.0, 3.0, 1.0, 1.0),)
 
 
-def test_a_house_turned_and_carried_off_is_a_twin_and_a_shed_is_none() -> None:
+def test_turned_and_moved_copy_is_near_duplicate() -> None:
     rng = np.random.default_rng(0)
     quarter = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
-    train = [boxes(rng, *TOWER), boxes(rng, *HOUSE) @ quarter.T + 5.0]
-    asked = [(boxes(rng, *shape), boxes(rng, *shape)) for shape in (HOUSE, SHED)]
-    found = nearest_in_train(asked, train)
-    assert near_twins(found).tolist() == [True, False]
-    assert found[0].place == 1
+    train = [boxes(rng, *TOWER), boxes(rng, *L_SHAPE) @ quarter.T + 5.0]
+    pairs = [(boxes(rng, *shape), boxes(rng, *shape)) for shape in (L_SHAPE, LOW_BOX)]
+    found = nearest_in_train(pairs, train)
+    assert near_duplicates(found).tolist() == [True, False]
+    assert found[0].index == 1
     assert 0.8 < found[0].distance < 1.2
     assert found[1].distance > 2.0
 
 
-def test_clouds_meet_where_most_of_them_is_the_same_though_their_centroids_do_not() -> None:
+def test_alignment_follows_common_part_rather_than_centroids() -> None:
     rng = np.random.default_rng(1)
     apart = (12.0, 0.0, 0.0, 1.0, 1.0, 1.0)
     first, second = boxes(rng, *TOWER, *TOWER, apart), boxes(rng, *TOWER, *TOWER, TOWER[0])
     centred = abs(first.mean(axis=0) - second.mean(axis=0)).max()
     assert centred > 1.0
-    assert cloud_distance(first, second) < 1.0
+    assert aligned_distance(first - first.mean(axis=0), second - second.mean(axis=0), 3) < 1.0
 
 
-def test_the_table_counts_twins_of_each_split_but_train() -> None:
+def test_table_counts_near_duplicates_of_validation_and_test() -> None:
     rng = np.random.default_rng(2)
 
     def pairs(*shapes: tuple[tuple[float, ...], ...]) -> list[tuple[np.ndarray, np.ndarray]]:
         return [(boxes(rng, *shape), boxes(rng, *shape)) for shape in shapes]
 
     clouds = {
-        ("huts", "train"): pairs(HOUSE, TOWER),
-        ("huts", "val"): pairs(SHED),
-        ("huts", "test"): pairs(HOUSE, SHED),
+        ("towers", "train"): pairs(L_SHAPE, TOWER),
+        ("towers", "val"): pairs(LOW_BOX),
+        ("towers", "test"): pairs(L_SHAPE, LOW_BOX),
     }
-    table = near_twins_table(nearest_by_split(clouds))
-    assert [row[:5] for row in table.rows] == [("huts", "val", 1, 0, 0.0), ("huts", "test", 2, 1, 50.0)]
+    table = near_duplicates_table(nearest_by_split(clouds))
+    assert [row[:5] for row in table.rows] == [("towers", "val", 1, 0, 0.0), ("towers", "test", 2, 1, 50.0)]

@@ -1,4 +1,4 @@
-"""Work in several processes."""
+"""Parallel map over processes."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import torch
 from eval.engine.parallel_map import parallel_map
 
 
-def _where(item: int) -> tuple[int, int, int]:
+def _square(item: int) -> tuple[int, int, int]:
     return item * item, torch.get_num_threads(), os.getpid()
 
 
-def test_results_come_in_order_each_from_one_thread_of_another_process() -> None:
-    found = list(parallel_map(_where, [3, 1, 2, 0], 2, "numbers"))
-    assert [item for item, _ in found] == [3, 1, 2, 0]
-    assert [square for _, (square, _, _) in found] == [9, 1, 4, 0]
-    assert {threads for _, (_, threads, _) in found} == {1}
-    assert os.getpid() not in {process for _, (_, _, process) in found}
+def test_results_are_ordered_and_from_single_threaded_processes() -> None:
+    results = list(parallel_map(_square, [3, 1, 2, 0], 2, "numbers"))
+    assert [item for item, _ in results] == [3, 1, 2, 0]
+    assert [square for _, (square, _, _) in results] == [9, 1, 4, 0]
+    assert {threads for _, (_, threads, _) in results} == {1}
+    assert os.getpid() not in {process for _, (_, _, process) in results}
 
 
-def test_nothing_to_do_and_more_workers_than_work() -> None:
-    assert list(parallel_map(_where, [], 8, "numbers")) == []
-    assert [square for _, (square, _, _) in parallel_map(_where, [5], 8, "numbers")] == [25]
+def test_empty_work_and_more_workers_than_items() -> None:
+    assert list(parallel_map(_square, [], 8, "numbers")) == []
+    assert [square for _, (square, _, _) in parallel_map(_square, [5], 8, "numbers")] == [25]

@@ -1,4 +1,4 @@
-"""Realism: the Fréchet distance against its closed form, features of the network that ships, and a judge's verdicts."""
+"""The Fréchet distance against its closed form, features of the pretrained network, and the classifier test."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.linalg import sqrtm
 
-from eval.programs.two_sample_test import features_of, fooled, frechet_distance
+from eval.programs.two_sample_test import classifier_acceptance, features_of, frechet_distance
 
 
-def test_the_frechet_distance_is_that_of_two_normal_distributions() -> None:
+def test_frechet_distance_of_normal_distributions() -> None:
     rng = np.random.default_rng(0)
     first, second = rng.standard_normal((60, 5)), 1.5 * rng.standard_normal((80, 5)) + 0.3
-    covariances = [np.cov(each, rowvar=False) for each in (first, second)]
+    covariances = [np.cov(rows, rowvar=False) for rows in (first, second)]
     means = first.mean(axis=0) - second.mean(axis=0)
     root = np.real(sqrtm(covariances[0] @ covariances[1]))
     expected = means @ means + np.trace(covariances[0] + covariances[1] - 2 * root)
@@ -22,13 +22,13 @@ def test_the_frechet_distance_is_that_of_two_normal_distributions() -> None:
     assert frechet_distance(first, first) == pytest.approx(0, abs=1e-9)
 
 
-def test_the_frechet_distance_needs_no_more_samples_than_features() -> None:
+def test_frechet_distance_with_fewer_samples_than_features() -> None:
     rng = np.random.default_rng(1)
     first = rng.standard_normal((10, 40))
     assert frechet_distance(first, first + 1.0) == pytest.approx(40.0)
 
 
-def test_features_do_not_depend_on_place_and_size() -> None:
+def test_features_do_not_depend_on_position_and_size() -> None:
     rng = np.random.default_rng(2)
     boxes = rng.uniform(-1, 1, (3, 1500, 3)) * [[[1.0, 1.0, 1.0]], [[1.0, 0.1, 1.0]], [[0.1, 1.0, 0.1]]]
     found, moved = features_of(boxes), features_of(4.0 * boxes + 2.0)
@@ -39,11 +39,11 @@ def test_features_do_not_depend_on_place_and_size() -> None:
     assert features_of(boxes, Path("nowhere")) is None
 
 
-def test_a_judge_tells_flat_boxes_from_cubes_and_not_cubes_from_cubes() -> None:
+def test_classifier_separates_flat_boxes_from_cubes_but_not_cubes() -> None:
     rng = np.random.default_rng(3)
     cubes = rng.uniform(-1, 1, (120, 64, 3))
     others = rng.uniform(-1, 1, (120, 64, 3))
     flat = others * [1.0, 0.2, 1.0]
-    assert fooled(flat, cubes, 0) == 0
-    assert 20 < fooled(others, cubes, 0) < 80
-    assert fooled(others, cubes, 0) == fooled(others, cubes, 0)
+    assert classifier_acceptance(flat, cubes, 0) == 0
+    assert 20 < classifier_acceptance(others, cubes, 0) < 80
+    assert classifier_acceptance(others, cubes, 0) == classifier_acceptance(others, cubes, 0)

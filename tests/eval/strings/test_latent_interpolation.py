@@ -1,11 +1,11 @@
-"""Ways through a latent space, on rings that are known by heart."""
+"""Latent interpolation, on small rings."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from eval.strings.latent_interpolation import journey_strips, journeys
+from eval.strings.latent_interpolation import interpolation_rows, interpolations
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.canonical import graph_digest
 from stages.string_sampling.instantiation.instantiate import Instantiator
@@ -20,35 +20,35 @@ from stages.training.string_vae.training import new_model
 from stages.training.string_vae.vocabulary import Vocabulary
 from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
-MOST = 40
+MAX_TOKENS = 40
 
 
 @pytest.fixture(scope="module")
-def maker() -> Instantiator:
+def instantiator() -> Instantiator:
     return Instantiator(ContactOracle(kit_of(ROAD, [ring(1, 1), ring(2, 3)])))
 
 
 @pytest.fixture(scope="module")
-def strings(maker: Instantiator) -> list[str]:
-    writer, rng = KitStrings(maker.kit, "all"), np.random.default_rng(0)
-    graphs = [writer.graph(each.assembly) for each in maker.kit.exemplars]
-    return [each.string for graph in graphs for each in writer.strings(graph, 2, rng)]
+def strings(instantiator: Instantiator) -> list[str]:
+    writer, rng = KitStrings(instantiator.kit, "all"), np.random.default_rng(0)
+    graphs = [writer.graph(exemplar.assembly) for exemplar in instantiator.kit.exemplars]
+    return [encoded.string for graph in graphs for encoded in writer.strings(graph, 2, rng)]
 
 
 @pytest.fixture(scope="module")
-def model(maker: Instantiator) -> TrainedStringVae:
-    vocabulary = Vocabulary(make_alphabet(maker.kit.labels), 2)
-    rules = compile_grammar(maker.kit.grammar, len(maker.kit.labels), 2)
+def model(instantiator: Instantiator) -> TrainedStringVae:
+    vocabulary = Vocabulary(make_alphabet(instantiator.kit.labels), 2)
+    grammar = compile_grammar(instantiator.kit.grammar, len(instantiator.kit.labels), 2)
     settings = StringVaeConfig(name="tiny", latent=4, embedding=4, hidden=16)
     header = {
         "settings": settings.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
-        "max_tokens": MOST,
-        "patterns": patterns_json(rules),
-        "names": list(maker.kit.labels),
+        "max_tokens": MAX_TOKENS,
+        "patterns": patterns_json(grammar),
+        "names": list(instantiator.kit.labels),
         "cycles": 2,
         "canonical": True,
     }
-    return TrainedStringVae(new_model(settings, vocabulary, MOST, 0).eval(), vocabulary, rules, header)
+    return TrainedStringVae(new_model(settings, vocabulary, MAX_TOKENS, 0).eval(), vocabulary, grammar, header)
 
 
 def digest(model: TrainedStringVae, string: str) -> str:
@@ -56,27 +56,29 @@ def digest(model: TrainedStringVae, string: str) -> str:
     return graph_digest(graph.types, graph.edges)
 
 
-def test_all_ways_lead_from_one_shape_to_the_one_that_is_least_alike(
-    model: TrainedStringVae, strings: list[str]
-) -> None:
-    ways = journeys(model, strings, np.random.default_rng(1))
-    assert len(ways) == 3
-    for along in ways.values():
+def test_interpolations_join_different_training_shapes(model: TrainedStringVae, strings: list[str]) -> None:
+    by_name = interpolations(model, strings, np.random.default_rng(1))
+    assert len(by_name) == 3
+    for along in by_name.values():
         assert {along[0], along[-1]} <= set(strings)
         assert digest(model, along[0]) != digest(model, along[-1])
-    assert set(ways["through the search graph"]) <= set(strings)
+    assert set(by_name["through the search graph"]) <= set(strings)
 
 
-def test_what_stands_side_by_side_differs_and_what_fails_is_told(
-    model: TrainedStringVae, strings: list[str], maker: Instantiator
+def test_interpolation_rows_skip_repeats_and_count_failures(
+    model: TrainedStringVae, strings: list[str], instantiator: Instantiator
 ) -> None:
-    strips = list(journey_strips(model, strings, maker, STANDARD_METHOD, "tiny", np.random.default_rng(1)))
-    through = strips[-1]
+    image_rows = list(
+        interpolation_rows(model, strings, instantiator, STANDARD_METHOD, "tiny", np.random.default_rng(1))
+    )
+    through = image_rows[-1]
     assert len(through.pictures) == 2
     assert "become no shape" not in through.title
-    assert all(png.startswith(b"\x89PNG") for each in strips for _, png in each.pictures)
+    assert all(png.startswith(b"\x89PNG") for row in image_rows for _, png in row.pictures)
     nothing = list(
-        journey_strips(model, strings, maker, STANDARD_METHOD._replace(budget=1), "tiny", np.random.default_rng(1))
+        interpolation_rows(
+            model, strings, instantiator, STANDARD_METHOD._replace(budget=1), "tiny", np.random.default_rng(1)
+        )
     )
     assert not nothing[-1].pictures
     assert "2 of 2 stops become no shape" in nothing[-1].title

@@ -1,4 +1,4 @@
-"""The figures of string VAEs, on models small enough to know."""
+"""Metrics of string VAEs, on small models."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ from tests.stages.training.string_vae.models import MOST, random_vae, toy_string
 
 
 @pytest.mark.slow
-def test_what_was_learnt_by_heart_comes_back_and_what_was_not_does_not() -> None:
+def test_overfitted_model_reconstructs_and_random_model_does_not() -> None:
     strings = toy_strings()
-    learnt, random = (reconstruction(model, strings) for model in (trained_vae("transformer"), random_vae("masked")))
-    assert learnt.strings == len(strings)
-    assert learnt.valid == random.valid == 100
-    assert learnt.graphs >= learnt.same > 30 > random.same
-    assert learnt.tokens > learnt.same
+    trained, random = (reconstruction(model, strings) for model in (trained_vae("transformer"), random_vae("masked")))
+    assert trained.strings == len(strings)
+    assert trained.valid == random.valid == 100
+    assert trained.graphs >= trained.same > 30 > random.same
+    assert trained.tokens > trained.same
 
 
-@pytest.mark.parametrize("way", SAMPLING_METHODS)
-def test_figures_of_a_way_are_shares_of_what_it_found(way: str) -> None:
+@pytest.mark.parametrize("method", SAMPLING_METHODS)
+def test_sampling_shares_are_percentages(method: str) -> None:
     strings = toy_strings()
     model = random_vae("masked")
-    figures = sampling(model, way, strings, shape_graphs(model, strings), 30, np.random.default_rng(0))
+    figures = sampling(model, method, strings, shape_graphs(model, strings), 30, np.random.default_rng(0))
     assert figures.valid == 100
     assert 0 < figures.found <= 100
     assert 0 < figures.unique <= 100
@@ -53,28 +53,28 @@ def test_figures_of_a_way_are_shares_of_what_it_found(way: str) -> None:
     assert plain.valid < 50
 
 
-def test_strings_that_are_all_known_are_not_novel() -> None:
+def test_known_strings_are_not_novel() -> None:
     model = random_vae("masked")
     found = sample(model, "prior", toy_strings(), 60, np.random.default_rng(7))
-    dreamt = [each.string for each in found if each.string]
+    sampled = [result.string for result in found if result.string]
     toys = shape_graphs(model, toy_strings())
     known, fresh = (
         sampling(model, "prior", toy_strings(), graphs, 60, np.random.default_rng(7))
-        for graphs in (toys | shape_graphs(model, dreamt), toys)
+        for graphs in (toys | shape_graphs(model, sampled), toys)
     )
     assert known.novel == 0
     assert fresh.novel > 0
 
 
 @pytest.mark.slow
-def test_search_graph_of_a_trained_model_holds_together() -> None:
+def test_search_graph_of_trained_model_is_more_connected() -> None:
     nodes, figures = structure(trained_vae("transformer"), toy_strings(), np.random.default_rng(0))
     assert nodes == len(toy_strings())
     assert set(figures) == {"naive", "search graph"}
     assert figures["search graph"].components <= figures["naive"].components
 
 
-def test_models_are_found_with_their_kit_and_seed(tmp_path: Path) -> None:
+def test_models_are_loaded_with_kit_and_seed(tmp_path: Path) -> None:
     model = random_vae("masked")
     for name in ("masked-space-base-0", "masked-space-base-1", "plain-toy-0"):
         kit = "toy" if "toy" in name else "space-base"
@@ -85,26 +85,26 @@ def test_models_are_found_with_their_kit_and_seed(tmp_path: Path) -> None:
     (tmp_path / "other-toy-0").mkdir()
     content = checkpoint_bytes(model.module.state_dict(), {"kind": "another", "kit": "toy", "name": "other-toy-0"})
     (tmp_path / "other-toy-0" / "weights.safetensors").write_bytes(content)
-    found = [(each.name, each.kit, each.seed) for each in string_vaes(tmp_path)]
+    found = [(trained.name, trained.kit, trained.seed) for trained in string_vaes(tmp_path)]
     assert found == [("masked", "space-base", 0), ("masked", "space-base", 1), ("plain", "toy", 0)]
 
 
-def test_weights_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+def test_unreadable_weights_are_reported(tmp_path: Path) -> None:
     (tmp_path / "masked-toy-0").mkdir()
     (tmp_path / "masked-toy-0" / "weights.safetensors").write_bytes(b"\x80\x04 a pickle")
     with pytest.raises(ConfigError, match=r"masked-toy-0/weights\.safetensors is a pickle.*make train"):
         string_vaes(tmp_path)
 
 
-def test_curve_is_what_the_training_wrote(tmp_path: Path) -> None:
+def test_training_curve_reads_the_log(tmp_path: Path) -> None:
     rows = [{"round": number, "step": 10 * number, "val_nats": 9.0 - number} for number in range(3)]
     (tmp_path / "curves.csv").write_text(curves_csv(rows))
     assert training_curve(tmp_path, "val_nats") == [(0.0, 9.0), (10.0, 8.0), (20.0, 7.0)]
 
 
-def test_strings_that_a_model_cannot_read_are_left_out(tmp_path: Path) -> None:
+def test_unreadable_strings_are_left_out(tmp_path: Path) -> None:
     model = random_vae("masked")
-    (tmp_path / "toy-test.txt").write_text("".join(f"{each}\n" for each in [*toy_strings()[:3], "AZ", "B(B)"]))
+    (tmp_path / "toy-test.txt").write_text("".join(f"{line}\n" for line in [*toy_strings()[:3], "AZ", "B(B)"]))
     assert corpus_strings(tmp_path, "toy", "test", model) == list(toy_strings()[:3])
     assert max(map(len, toy_strings())) <= MOST
 
@@ -113,27 +113,27 @@ def as_trained(model: TrainedStringVae, seed: int) -> TrainedModel[TrainedString
     return TrainedModel("masked", "toy", seed, model)
 
 
-def test_several_seeds_are_one_row_with_their_spread() -> None:
+def test_seeds_share_a_row_with_mean_and_deviation() -> None:
     model = random_vae("masked")
     found = [(as_trained(model, seed), Reconstruction(9, 90.0 + seed, 50.0, 60.0, 100.0)) for seed in range(3)]
     (row,) = reconstruction_table(found).rows
     assert row == ("masked-toy", 3, 9, "91.0 ± 1.0", "50.0 ± 0.0", "60.0 ± 0.0", "100.0 ± 0.0")
     (row,) = reconstruction_table(found[:1]).rows
     assert row == ("masked-toy", 1, 9, 90.0, 50.0, 60.0, 100.0)
-    searches = [(as_trained(model, 0), way, Sampling(5, 100.0, 80.0, 70.0, 60.0)) for way in ("path", "prior")]
+    searches = [(as_trained(model, 0), method, Sampling(5, 100.0, 80.0, 70.0, 60.0)) for method in ("path", "prior")]
     assert [row[:4] for row in sampling_table(searches).rows] == [
         ("masked-toy", "path", 1, 5),
         ("masked-toy", "prior", 1, 5),
     ]
 
 
-def test_table_of_paths_has_the_published_rows() -> None:
+def test_structure_table_has_reference_rows() -> None:
     table = structure_table([(as_trained(random_vae("masked"), 0), 7, {"naive": PathFigures(2, 0.5, 1.5)})])
     assert table.rows == (("masked-toy-0, naive", 7, 2, 0.5, 1.5),)
     assert "| sand castle, naive (strings, Table 2) |  | 102 | 4.71 | 12.2 |" in table.markdown()
 
 
-def test_each_decision_about_each_model_has_its_own_stream() -> None:
+def test_each_decision_of_each_model_has_its_own_rng() -> None:
     model = random_vae("masked")
     streams = [
         model_rng(1, as_trained(model, seed), decision).random() for seed in (0, 1) for decision in ("path", "prior")

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import yaml
 
-from eval.__main__ import main as evaluate
 from stages.shape.sample import read_samples
 from stages.shapeassembly import parse
 from stages.training.checkpoint import CheckpointError
@@ -91,8 +90,9 @@ def test_models_of_programs_are_trained_and_read_again(tmp_path: Path) -> None:
     assert found[0] == found[1] != found[2]
     with pytest.raises(CheckpointError, match="another kit"):
         load_program_lm(out / "toy-models/words-furniture-0/weights.safetensors", {"kit": "chair"})
-    asked = ["--config", str(config), "--out", str(out), "--samples", "2", "--sequences", "1", "--steps", "4"]
-    assert evaluate(["shapeassembly", *asked]) == 0
+    settings = [f"--set={option}" for option in ("samples=2", "sequences=1", "steps=4")]
+    code, printed = shapemill("eval", "shapeassembly", "--config", config, "--out", out, *settings)
+    assert code == 0, printed
     table = (out / "toy-eval/shapeassembly.md").read_text()
     assert all(
         row in table

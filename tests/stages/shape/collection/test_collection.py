@@ -132,7 +132,7 @@ def test_records_index_card_and_table_say_the_same_of_physics(made: tuple[Path, 
     assert {row["key"]: row["stable"] for row in rows} == stable
     share = 100 * sum(stable.values()) / len(stable)
     assert f"| {share:.1f}% |" in (made[0] / "toy" / "README.md").read_text()
-    command = [sys.executable, "-m", "eval", "physical", *made[1]]
+    command = [sys.executable, "-m", "pipeline", "eval", "physical", *made[1]]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     row = next(line for line in done.stdout.splitlines() if line.startswith("| tests.stages.programs.stool"))
