@@ -41,7 +41,7 @@ def read_kit(models: str | Path | Sequence[str | Path], name: str = "kit", **set
     except ValidationError as error:
         raise ConfigError(str(error)) from error
     reading = read_and_resolve(config, ExemplarsConfig().limits, AutoconfigConfig().max_tries, ())
-    observed = reading.observe(reading.choices.values)
+    observed = reading.observe(reading.resolution.values)
     if observed.refusals:
         raise ConfigError("\n".join(observed.refusals))
     return observed.kit

@@ -50,12 +50,7 @@ def read_scene(path: Path) -> ModelScene:
             f"{path}: {path.suffix or 'a name without an extension'} is no model format; {hint}"
             f"Shapemill reads {', '.join(READERS)}"
         )
-    if not os.access(path, os.F_OK):  # Path.exists() raises where a folder on the way may not be entered
-        neighbours: list[str] = []
-        with contextlib.suppress(OSError):
-            neighbours = [file.name for file in path.parent.iterdir()]
-        near = difflib.get_close_matches(path.name, neighbours, n=1)
-        raise ConfigError(f"{path}: no such file" + (f"; did you mean {near[0]}?" if near else ""))
+    check_exists(path)
     if not path.is_file():
         raise ConfigError(f"{path}: is {'a folder' if path.is_dir() else 'no regular file'}; name one model file")
     if not os.access(path, os.R_OK):
@@ -74,6 +69,16 @@ def read_scene(path: Path) -> ModelScene:
     except RecursionError:
         raise ConfigError(f"{path}: {enclosure.at} nests too deeply; export it again, flatter") from None
     return _solid_placements(path, scene)
+
+
+def check_exists(path: Path) -> None:
+    """Raise ConfigError, with the nearest name, for a file that does not exist."""
+    if not os.access(path, os.F_OK):  # Path.exists() raises where a folder on the way may not be entered
+        neighbours: list[str] = []
+        with contextlib.suppress(OSError):
+            neighbours = [file.name for file in path.parent.iterdir()]
+        near = difflib.get_close_matches(path.name, neighbours, n=1)
+        raise ConfigError(f"{path}: no such file" + (f"; did you mean {near[0]}?" if near else ""))
 
 
 def check_size(path: Path, scene: ModelScene, limits: ReadLimits) -> None:

@@ -106,6 +106,26 @@ class InspectionReport:
             ]
         return lines
 
+    def table_cells(self) -> dict[str, str]:
+        """Return the cells of a table row by their headers."""
+        settings, kit = self.config.resolved(), self.observed.kit
+        trial = self.layouts.trial if self.layouts is not None else None
+        return {
+            "parts": str(sum(len(exemplar.assembly) for exemplar in kit.exemplars)),
+            "types": str(len(kit.types)),
+            "up": settings.up,
+            "tolerance": f"{settings.tolerance:g}",
+            "kinds": ", ".join(settings.kinds),
+            "grammar": settings.grammar,
+            "hubs": ", ".join(settings.hubs) or "none",
+            "kept": f"{self.resolution.kept_share:.0%}",
+            "graphs": f"{trial.graphs:,}" if trial else "0",
+            "histograms": f"{trial.histograms:,}" if trial else "0",
+            "distance": f"{trial.distance:.2f}" if trial else "",
+            "CPU s": f"{self.seconds:.0f}",
+            "yield estimate": self.sentence,
+        }
+
 
 def inspect_models(
     config: KitConfig, models: Sequence[Model], tries: int, limits: ReadLimits | None = None

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import yaml
 
-from stages.inspection.inspect import main
 from stages.shape.sample import read_samples
 from tests.command import shapemill
 from tests.stages.variations.test_stage import write_model
@@ -91,7 +90,7 @@ def test_near_copies_are_rejected_if_auto_finds_enough_other_variants(tmp_path: 
 
 
 def test_exemplars_are_resized_if_there_are_too_few_layouts_as_inspect_predicts(
-    made: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    made: tuple[Path, str], tmp_path: Path
 ) -> None:
     paths = [str(made[0] / f"ring{k}.glb") for k in (0, 1)]
     config = {
@@ -108,9 +107,9 @@ def test_exemplars_are_resized_if_there_are_too_few_layouts_as_inspect_predicts(
     samples = [sample for shard in (work / "proportions").glob("toy-*.tar") for sample in read_samples(shard)]
     assert sorted(sample.split for sample in samples) == ["test"] + 8 * ["train"] + 3 * ["val"]
     assert {sample.lineage["method"] for sample in samples} == {"proportions"}
-    capsys.readouterr()
-    assert main([*paths, "--json", "--tries", "200"]) == 0
-    result = json.loads(capsys.readouterr().out)
+    code, text = shapemill("inspect", *paths, "--json", "--tries", 200)
+    assert code == 0, text
+    result = json.loads(text)
     assert result["autoconfig"]["resolved"] == record(tmp_path, "autoconfig", "rings")["summary"]["resolved"]
     assert result["autoconfig"]["resolved"]["proportions.require.stable"] is True
     config["variations"] |= {"fallback": "nothing"}
@@ -122,7 +121,8 @@ def test_exemplars_are_resized_if_there_are_too_few_layouts_as_inspect_predicts(
 def test_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path) -> None:
     """Two rings have 16 other layouts, too few for a dataset, so resizing is proposed; layouts work, too."""
     paths = [str(made[0] / f"ring{k}.glb") for k in (0, 1)]
-    assert main([*paths, "--tries", "200", "--out", str(tmp_path)]) == 0
+    code, text = shapemill("inspect", *paths, "--tries", 200, "--out", tmp_path)
+    assert code == 0, text
     written = yaml.safe_load((tmp_path / "ring0.yaml").read_text())
     written["name"] = "toy"
     assert written["variations"] == {"samples_per_kit": 0}

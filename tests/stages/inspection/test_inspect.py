@@ -13,8 +13,17 @@ import pytest
 import yaml
 from PIL import Image
 
-from stages.inspection.inspect import main
+from pipeline.cli import main as shapemill
 from tests.stages.exemplars.model_files import box, write_obj
+
+
+def inspect(*arguments: object) -> int:
+    """Run `shapemill inspect` in this process and return its exit code."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["shapemill", "inspect", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            shapemill()
+    return int(str(ended.value.code or 0))
 
 
 def ring(folder: Path, name: str = "ring.obj") -> Path:
@@ -25,7 +34,7 @@ def ring(folder: Path, name: str = "ring.obj") -> Path:
 
 def inspected(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
     """Return what `--json` prints after a short search: one object on one line, and nothing else."""
-    assert main([*map(str, arguments), "--json", "--tries", "100"]) == 0
+    assert inspect(*arguments, "--json", "--tries", "100") == 0
     printed = capsys.readouterr()
     assert printed.err == ""
     assert printed.out.count("\n") == 1
@@ -133,7 +142,7 @@ class TestRefusedModels:
 class TestText:
     def test_text_has_a_table_and_a_picture_is_written(self, tmp_path: Path, capsys: Any) -> None:
         out = tmp_path / "new"
-        assert main([str(ring(tmp_path)), "--out", str(out), "--up", "z", "--tries", "100"]) == 0
+        assert inspect(ring(tmp_path), "--out", out, "--up", "z", "--tries", "100") == 0
         lines = capsys.readouterr().out.splitlines()
         assert lines[0] == str(tmp_path / "ring.obj")
         text = "\n".join(" ".join(line.split()) for line in lines)
@@ -150,12 +159,12 @@ class TestText:
     def test_files_go_to_the_default_folder(self, tmp_path: Path, capsys: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         path = ring(tmp_path)
         monkeypatch.chdir(tmp_path)
-        assert main([str(path), "--tries", "100"]) == 0
+        assert inspect(path, "--tries", "100") == 0
         assert {file.name for file in (tmp_path / "datasets" / "inspect").iterdir()} >= {"ring.png", "ring.yaml"}
 
     def test_several_models_have_one_column_each(self, tmp_path: Path, capsys: Any) -> None:
         pair = f"{ring(tmp_path)} {ring(tmp_path, 'again.obj')}"  # as in MESH="ring.obj again.obj"
-        assert main([pair, "--out", str(tmp_path / "out"), "--tries", "100"]) == 0
+        assert inspect(pair, "--out", tmp_path / "out", "--tries", "100") == 0
         text = " ".join(capsys.readouterr().out.split())
         assert "type in 1 in 2 triangles symmetries cube 4 4 12 24" in text
 
@@ -163,23 +172,23 @@ class TestText:
 class TestWrongInput:
     def test_missing_file_is_named_with_the_nearest(self, tmp_path: Path, capsys: Any) -> None:
         ring(tmp_path)
-        assert main([str(tmp_path / "rin.obj"), "--json"]) == 2
+        assert inspect(tmp_path / "rin.obj", "--json") == 2
         printed = capsys.readouterr()
         assert printed.out == ""
         assert "no such file; did you mean ring.obj?" in printed.err
 
     def test_broken_file_is_named(self, tmp_path: Path, capsys: Any) -> None:
         (tmp_path / "cut.glb").write_bytes(b"glTF\x02\0\0\0")
-        assert main([str(tmp_path / "cut.glb")]) == 2
+        assert inspect(tmp_path / "cut.glb") == 2
         assert "cut.glb" in capsys.readouterr().err
 
     def test_tolerance_out_of_range_is_refused(self, tmp_path: Path, capsys: Any) -> None:
-        assert main([str(ring(tmp_path)), "--tolerance", "3"]) == 2
+        assert inspect(ring(tmp_path), "--tolerance", "3") == 2
         assert "--tolerance" in capsys.readouterr().err
 
     def test_unwritable_output_folder_is_refused(self, tmp_path: Path, capsys: Any) -> None:
         path = ring(tmp_path)
-        assert main([str(path), "--out", str(path), "--tries", "100"]) == 2
+        assert inspect(path, "--out", path, "--tries", "100") == 2
         assert "cannot be written" in capsys.readouterr().err
 
     @pytest.mark.parametrize(
@@ -187,10 +196,8 @@ class TestWrongInput:
     )
     def test_wrong_option_shows_the_usage(self, arguments: list[str], tmp_path: Path, capsys: Any) -> None:
         models = [str(ring(tmp_path))] if arguments else []
-        with pytest.raises(SystemExit) as stopped:
-            main([*models, *arguments])
-        assert stopped.value.code == 2
-        assert "usage: pipeline inspect" in capsys.readouterr().err
+        assert inspect(*models, *arguments) == 2
+        assert "Usage: shapemill inspect" in capsys.readouterr().err
 
 
 def test_command_prints_one_json_object_and_nothing_else(tmp_path: Path) -> None:
@@ -202,3 +209,13 @@ def test_command_prints_one_json_object_and_nothing_else(tmp_path: Path) -> None
     assert (out / "ring.png").stat().st_size > 10_000
     missing = subprocess.run([*command[:4], str(tmp_path / "no.obj")], capture_output=True, text=True, check=False)
     assert (missing.returncode, missing.stdout) == (2, "")
+
+
+def test_table_has_a_row_for_each_readable_model(tmp_path: Path, capsys: Any) -> None:
+    (tmp_path / "cut.glb").write_bytes(b"glTF\x02\0\0\0")
+    assert inspect(ring(tmp_path), tmp_path / "cut.glb", "--table", "--tries", 100) == 0
+    printed = capsys.readouterr()
+    header, _, row = printed.out.splitlines()
+    assert header.startswith("| model | parts | types | up |")
+    assert row.startswith("| ring | 4 | 1 |")
+    assert "cut.glb" in printed.err
