@@ -1,4 +1,4 @@
-"""Points on surfaces, uniform by area: on one mesh, or on all parts of a shape without building its whole mesh."""
+"""Sample points uniformly by area on one mesh, or on all parts of a shape without building its whole mesh."""
 
 from __future__ import annotations
 
@@ -18,10 +18,13 @@ from stages.shape.shape import Shape
 
 @dataclass(frozen=True)
 class SurfaceTable:
-    """The triangles of one or more meshes, laid out so that a random number finds a triangle by its area.
+    """The triangles of one or more meshes, with running areas for sampling.
 
-    vertices: float64 (v, 3); faces: int64 (f, 3), rows of `vertices`; reach: float64 (f,), running sum of the areas
-    inside each mesh; first: int64 (m + 1,), where each mesh's triangles start; area: float64 (m,), of each mesh.
+    vertices: float64 (v, 3)
+    faces: rows of `vertices`, int64 (f, 3)
+    reach: running sum of the areas inside each mesh, float64 (f,)
+    first: where each mesh's triangles start, int64 (m + 1,)
+    area: area of each mesh, float64 (m,)
     """
 
     vertices: FloatArray
@@ -33,8 +36,12 @@ class SurfaceTable:
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Points on a shape: points and normals float64 (n, 3); labels int16 (n,), the index of the part's label;
-    instances int16 (n,), the index of the part."""
+    """Points on a shape.
+
+    points, normals: float64 (n, 3)
+    labels: class of the part, int16 (n,)
+    instances: index of the part, int16 (n,)
+    """
 
     points: FloatArray
     normals: FloatArray
@@ -42,11 +49,11 @@ class SurfacePoints:
     instances: TypeArray
 
     def take(self, chosen: npt.NDArray[np.int64]) -> SurfacePoints:
-        """The points of these indices, in their order."""
+        """Return the points of these indices, in their order."""
         return SurfacePoints(self.points[chosen], self.normals[chosen], self.labels[chosen], self.instances[chosen])
 
     def followed_by(self, other: SurfacePoints) -> SurfacePoints:
-        """These points, then those of `other`."""
+        """Return these points, then those of `other`."""
         return SurfacePoints(
             np.concatenate([self.points, other.points]),
             np.concatenate([self.normals, other.normals]),
@@ -56,7 +63,7 @@ class SurfacePoints:
 
 
 def surface_table(meshes: Sequence[tuple[FloatArray, IntArray]]) -> SurfaceTable:
-    """The table of `meshes`, each `(vertices float64 (v, 3), faces int32 (f, 3))`.
+    """Return the table of `meshes`, each `(vertices float64 (v, 3), faces int32 (f, 3))`.
 
     Raises ValueError if a mesh has no triangle of positive area, or one that is not finite.
     """
@@ -77,19 +84,22 @@ def surface_table(meshes: Sequence[tuple[FloatArray, IntArray]]) -> SurfaceTable
 def sample_surface(
     vertices: FloatArray, faces: IntArray, n: int, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.int64]]:
-    """`n` independent points on a mesh, uniform by area; triangles of zero area are never hit.
+    """Return `n` independent points on a mesh, uniform by area; triangles of zero area are never hit.
 
-    vertices: float64 (v, 3); faces: int32 (f, 3). Returns points float64 (n, 3), unit face normals by the winding
-    float64 (n, 3), and the index of each point's face int64 (n,). Raises ValueError if the mesh has no area.
+    vertices: float64 (v, 3)
+    faces: int32 (f, 3)
+
+    Returns points float64 (n, 3), unit face normals by the winding float64 (n, 3), and each point's face int64 (n,).
+    Raises ValueError if the mesh has no area.
     """
     table = surface_table([(vertices, faces)])
     return _points_of_meshes(table, np.zeros(n, dtype=np.int64), rng)
 
 
 def sample_shape(shape: Shape, n: int, rng: np.random.Generator) -> SurfacePoints:
-    """`n` independent points on all parts of `shape`, uniform by area over the parts together.
+    """Return `n` independent points on all parts of `shape`, uniform by area over the parts together.
 
-    Surface that lies inside another part, or where two parts meet, counts like any other: nothing is removed.
+    Surface inside another part, or where two parts meet, counts like any other.
     """
     table, meshes, poses = mesh_table(shape.meshes), shape.assembly.types, shape.assembly.poses
     part_reach = np.cumsum(table.area[meshes])
@@ -104,15 +114,17 @@ def sample_shape(shape: Shape, n: int, rng: np.random.Generator) -> SurfacePoint
 
 @lru_cache(maxsize=16)
 def mesh_table(meshes: tuple[PartMesh, ...]) -> SurfaceTable:
-    """The surface table of a shape's meshes, in their order; made once for each set of meshes."""
+    """Return the cached surface table of a shape's meshes, in their order."""
     return surface_table([(mesh.vertices, mesh.faces) for mesh in meshes])
 
 
 def _points_of_meshes(
     table: SurfaceTable, meshes: npt.NDArray[np.int64], rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.int64]]:
-    """A random point on each of the meshes `meshes` (n,): points, normals (n, 3), and faces counted from the mesh's
-    first (n,)."""
+    """Draw a random point on each of the meshes `meshes` (n,).
+
+    Returns points and normals (n, 3), and faces counted from the mesh's first (n,).
+    """
     points, normals = np.empty((len(meshes), 3)), np.empty((len(meshes), 3))
     hit = np.empty(len(meshes), dtype=np.int64)
     draws = rng.random((3, len(meshes)))
@@ -122,7 +134,7 @@ def _points_of_meshes(
 
 @numba.njit(cache=True, inline="always")
 def _edges(vertices, face):
-    """First and second edge of a triangle, and their cross product."""
+    """Return the first and second edge of a triangle, and their cross product."""
     o, p, q = face[0], face[1], face[2]
     ax, ay, az = vertices[p, 0] - vertices[o, 0], vertices[p, 1] - vertices[o, 1], vertices[p, 2] - vertices[o, 2]
     bx, by, bz = vertices[q, 0] - vertices[o, 0], vertices[q, 1] - vertices[o, 1], vertices[q, 2] - vertices[o, 2]
@@ -131,7 +143,7 @@ def _edges(vertices, face):
 
 @numba.njit(cache=True)
 def _reach(vertices, faces, first):
-    """Running sums of the triangles' areas, each mesh from zero."""
+    """Return running sums of the triangles' areas, from zero for each mesh."""
     reach = np.empty(len(faces))
     for mesh in range(len(first) - 1):
         total = 0.0
@@ -144,7 +156,9 @@ def _reach(vertices, faces, first):
 
 @numba.njit(cache=True)
 def _draw(vertices, faces, reach, first, meshes, draws, points, normals, hit):
-    """Fill `points`, `normals`, `hit`: the first triangle whose running sum exceeds the draw, so none of zero area."""
+    """Fill `points`, `normals`, `hit` with the first triangle whose running sum exceeds the draw: never one of zero
+    area.
+    """
     for i in range(len(meshes)):
         low, high = first[meshes[i]], first[meshes[i] + 1] - 1
         # a draw that rounds up to the whole area belongs to the last triangle that has any

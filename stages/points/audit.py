@@ -1,4 +1,4 @@
-"""Are the points of a sample points of its shape? Looked up with Open3D, which had no part in making them."""
+"""Check that the points of a sample are points of its shape, with Open3D, which did not make them."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from stages.shape.collection.packaged import PackagedSample
 from stages.shape.geometry.triangles import area_vectors, unit_normals
 
 MAX_SURFACE_GAP_SHARE = 1e-5
-"""Points are 32-bit numbers: as a share of the shape's size they lie as near to its surface as this."""
+"""Largest distance of the 32-bit points from the surface, as a share of the shape's size."""
 MAX_COSINE_ERROR = 1e-3
-"""As much the cosine of a normal and that of its triangle may differ from 1."""
+"""Largest deviation from 1 of the cosine between a normal and that of its triangle."""
 
 
 def point_faults(sample: PackagedSample) -> Iterator[str]:
-    """A sentence for points that are not on the part that they name, and for normals that are not its own."""
+    """Yield a sentence for points that are not on their part, and for normals that are not its own."""
     described = sample.record["points"]
     points = sample.arrays["points.npy"].astype(np.float64) / described["scale"] + described["centre"]
     normals = sample.arrays["normals.npy"].astype(np.float64)
     instances = sample.arrays["instances.npy"].astype(np.int32)
     if not np.isfinite(points).all() or not np.isfinite(normals).all():
-        return  # named already: arrays that hold what is no number
+        return  # other checks report arrays that are not finite
     if len(points) != described["farthest"] + described["uniform"]:
-        yield "its point arrays have other lengths than its json counts"
+        yield "the lengths of its point arrays differ from the counts in its json"
         return
     if np.abs(np.linalg.norm(normals, axis=1) - 1.0).max() > MAX_SURFACE_GAP_SHARE:
         yield "its normals are not of unit length"
     if instances.min() < 0 or instances.max() >= len(sample.shape):
-        yield "its points name parts that are not there"
+        yield "its points name parts that do not exist"
         return
     if (sample.shape.part_classes[instances] != sample.arrays["labels.npy"]).any():
         yield "its point labels are not the classes of their parts"
     near = MAX_SURFACE_GAP_SHARE * max(sample.size, float(np.abs(sample.record["bounds"]).max()))
-    off, turned = _strangers(sample, points, normals, instances, near)
+    off, turned = _misplaced(sample, points, normals, instances, near)
     if off:
         yield f"{off} of its {len(points):,} points are not on the surface of their part"
     if turned:
@@ -47,13 +47,13 @@ def point_faults(sample: PackagedSample) -> Iterator[str]:
         yield f"{unseen} of its {len(points):,} points cannot be seen from outside"
 
 
-def _strangers(
+def _misplaced(
     sample: PackagedSample, points: FloatArray, normals: FloatArray, instances: IntArray, near: float
 ) -> tuple[int, int]:
-    """How many points are off the surface of their part, and how many of the others have a normal of no triangle there.
+    """Return how many points are off the surface of their part, and how many others have a normal of no triangle there.
 
-    The nearest triangle of all answers for nearly all points; the others, where parts meet or at edges, are held
-    against each triangle of their part.
+    The nearest triangle of all decides for nearly all points. The others, where parts meet or at edges, are compared
+    with each triangle of their part.
     """
     corners, parts = sample.rays.triangles
     nearest, distances = sample.rays.nearest(points)
@@ -73,12 +73,12 @@ def _strangers(
 
 
 def _unseen(sample: PackagedSample, points: FloatArray) -> int:
-    """How many points nobody sees who looks at the shape from outside; they were found by looking outwards."""
+    """Return how many points are invisible from outside, looking inwards; they were found by looking outwards."""
     away = 2.0 * sample.size
     for view in view_directions():
         ways = np.broadcast_to(-view, points.shape)
         points = points[
-            sample.rays.hit(points + away * view, ways, most=away - 2.0 * MIN_HIT_DISTANCE_SHARE * sample.size)
+            sample.rays.hit(points + away * view, ways, farthest=away - 2.0 * MIN_HIT_DISTANCE_SHARE * sample.size)
         ]
         if not len(points):
             break
@@ -86,7 +86,7 @@ def _unseen(sample: PackagedSample, points: FloatArray) -> int:
 
 
 def _distances(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Distance of each of n points from each of t triangles, float64 (n, t), by barycentric regions."""
+    """Return the distance of each of n points from each of t triangles, float64 (n, t), by barycentric regions."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     inside = _plane_distances(points, corners)
     edges = np.minimum.reduce([_segment_distances(points, *ends) for ends in ((a, b), (b, c), (c, a))])
@@ -94,7 +94,7 @@ def _distances(points: FloatArray, corners: FloatArray) -> FloatArray:
 
 
 def _plane_distances(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Distance from the plane of a triangle where the foot of the point lies inside, else infinite."""
+    """Return the distance from the plane of a triangle if the foot of the point lies inside, else infinity."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     normals = area_vectors(corners)
     area = np.einsum("ij,ij->i", normals, normals)

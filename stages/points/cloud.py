@@ -11,35 +11,36 @@ from stages.shape.geometry.ray_casting import RayCaster
 from stages.shape.shape import Shape
 
 MAX_DRAW_ROUNDS = 1000
-"""So many times as many points as asked are drawn at most, until enough of them are seen."""
+"""Maximum rounds of drawing the requested number of points until enough of them are visible."""
 
 
 def sample_cloud(
     shape: Shape, uniform: int, farthest: int, pool: int, surface: SampledSurface, rng: np.random.Generator
 ) -> SurfacePoints:
-    """`farthest` points picked out of `pool` uniform ones, in the order of picking, then `uniform` further points;
-    all of them on the whole surface or on what is visible of it.
+    """Return `farthest` points picked out of `pool` uniform ones, in the order of picking, then `uniform` further
+    points.
 
-    The two kinds have streams of their own: the uniform points are the same whatever `farthest` and `pool` are. At
-    least one of the two counts is positive. Raises ValueError for a shape of which next to nothing is visible.
+    All are on the whole surface or on what is visible of it. The two kinds have separate streams: the uniform points do
+    not depend on `farthest` and `pool`. At least one of the two counts is positive. Raises ValueError for a shape of
+    which next to nothing is visible.
     """
-    casting = RayCaster(shape) if surface == "visible" else None
+    rays = RayCaster(shape) if surface == "visible" else None
     farthest_rng, uniform_rng = rng.spawn(2)
     if farthest == 0:
-        return _drawn(shape, uniform, casting, uniform_rng)
-    pooled = _drawn(shape, pool, casting, farthest_rng)
+        return _draw_points(shape, uniform, rays, uniform_rng)
+    pooled = _draw_points(shape, pool, rays, farthest_rng)
     picked = _spread(pooled, farthest, farthest_rng)
-    return picked if uniform == 0 else picked.followed_by(_drawn(shape, uniform, casting, uniform_rng))
+    return picked if uniform == 0 else picked.followed_by(_draw_points(shape, uniform, rays, uniform_rng))
 
 
-def _drawn(shape: Shape, n: int, casting: RayCaster | None, rng: np.random.Generator) -> SurfacePoints:
-    """`n` points uniform by area, those that `casting` does not see left out."""
-    if casting is None:
+def _draw_points(shape: Shape, n: int, rays: RayCaster | None, rng: np.random.Generator) -> SurfacePoints:
+    """Return `n` points uniform by area, without those that `rays` cannot see."""
+    if rays is None:
         return sample_shape(shape, n, rng)
     kept: SurfacePoints | None = None
     for _ in range(MAX_DRAW_ROUNDS):
-        drawn = sample_shape(shape, n, rng)
-        seen = drawn.take(np.flatnonzero(seen_from_outside(casting, drawn.points, drawn.normals)))
+        points = sample_shape(shape, n, rng)
+        seen = points.take(np.flatnonzero(seen_from_outside(rays, points.points, points.normals)))
         kept = seen if kept is None else kept.followed_by(seen)
         if len(kept.points) >= n:
             return kept.take(np.arange(n))

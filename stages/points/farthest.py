@@ -1,9 +1,8 @@
 """Farthest-point sampling, exact: the points that brute force would pick, found with far fewer distances.
 
-The points are sorted into boxes. A box whose nearest corner lies farther from the newest pick than every point of
-the box lies from its own nearest pick cannot change and is skipped. (fpsample's fast variants ignore the start they
-are given, so their picks cannot be checked against brute force, and refuse small inputs; its plain variant, which
-does neither, takes ten times as long.)
+The points are sorted into boxes. A box is skipped if its nearest corner lies farther from the newest pick than every
+point of the box lies from its nearest pick. fpsample's fast variants ignore the given start, so their picks cannot be
+checked against brute force, and refuse small inputs. Its plain variant takes ten times as long.
 """
 
 from __future__ import annotations
@@ -18,10 +17,12 @@ BOX_POINTS = 64
 
 
 def farthest_points(points: npt.NDArray[np.floating], n: int, start: int) -> npt.NDArray[np.int64]:
-    """Indices int64 (n,) of `n` points, each the farthest from all picked before it, beginning with `start`.
+    """Return `n` indices int64 (n,), each of the point farthest from all picked before it, beginning with `start`.
 
-    points: float (m, 3), n <= m. Of points that are equally far the one with the lowest index is picked; no index
-    is picked twice. Raises ValueError if `n` or `start` is out of range.
+    points: float (m, 3), n <= m
+
+    Of equally far points the one with the lowest index is picked; no index is picked twice. Raises ValueError if `n` or
+    `start` is out of range.
     """
     if not 1 <= n <= len(points):
         raise ValueError(f"cannot pick {n} of {len(points)} points")
@@ -34,7 +35,8 @@ def farthest_points(points: npt.NDArray[np.floating], n: int, start: int) -> npt
 
 
 def _boxes(points: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """The points' indices sorted by the cells of a cubic grid, and where each occupied cell starts (and the end).
+    """Return the points' indices sorted by the cells of a cubic grid, and where each occupied cell starts (and the
+    end).
 
     A surface passes through about `3 r^2` of the `r^3` cells, so `r` is chosen to leave BOX_POINTS in each.
     """
@@ -51,7 +53,7 @@ def _boxes(points: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.int64], npt.
 
 @numba.njit(cache=True)
 def _pick(points, order, first, n, start):
-    """The picks, in the points' original indices. `points` (m, 3) and `order` (m,) are in box order."""
+    """Return the picks in the points' original indices. `points` (m, 3) and `order` (m,) are in box order."""
     boxes = len(first) - 1
     low = np.empty((boxes, 3))
     high = np.empty((boxes, 3))

@@ -1,4 +1,4 @@
-"""How a cloud is brought to a standard place and size."""
+"""Normalise a cloud to a standard position and size."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ NormalizeMode = Literal["none", "unit_sphere", "unit_box"]
 
 @dataclass(frozen=True)
 class Normalization:
-    """`(points - centre) * scale` moves points of the dataset's coordinates to where a stage puts them."""
+    """`(points - centre) * scale` moves points from the dataset's coordinates to the normalised ones."""
 
     centre: tuple[float, float, float]
     scale: float
 
 
 def normalization(shape: Shape, mode: NormalizeMode) -> Normalization:
-    """How to bring `shape` to a standard place and size.
+    """Return how to bring `shape` to a standard position and size.
 
-    `unit_box`: the centre of its box to the origin, its longest side to 1. `unit_sphere`: the same centre to the
-    origin, its farthest vertex to distance 1. `none`: nothing moves.
+    `unit_box`: centre of its box to the origin, longest side to 1. `unit_sphere`: the same centre to the origin,
+    farthest vertex to distance 1. `none`: unchanged.
     """
     if mode == "none":
         return Normalization((0.0, 0.0, 0.0), 1.0)

@@ -21,13 +21,13 @@ class PointsConfig(StrictModel):
         0,
         ge=0,
         le=100_000,
-        description="points picked by farthest-point sampling out of `pool`; they stand before the uniform ones; "
+        description="points picked by farthest-point sampling out of `pool`; they come before the uniform ones; "
         "unit: points (0: none of this kind)",
     )
     surface: SampledSurface = Field(
         "all",
-        description="all: every surface, also what lies inside other parts; visible: what a scanner sees: points from "
-        "which a way leads straight out of the shape in one of 64 directions",
+        description="all: every surface, also inside other parts; visible: what a scanner sees, points from "
+        "which a straight line in one of 64 directions leaves the shape",
     )
     pool: int = Field(
         30_000, ge=1, le=10_000_000, description="uniform points that the farthest are picked from; unit: points"

@@ -17,7 +17,7 @@ from stages.shape.sample import Sample
 
 
 def run_shard(task: Task) -> Outcome:
-    """The members of each sample that `members.py` declares."""
+    """Make the members of each sample that `members.py` declares."""
     config = task.config.section(PointsConfig)
 
     def cloud_members(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
@@ -44,7 +44,7 @@ def run_shard(task: Task) -> Outcome:
 
 
 def estimate_bytes(plan: Plan) -> int:
-    """Bytes of all clouds: 28 a point, and the tar's headers and padding."""
+    """Return the bytes of all clouds: 28 a point, and the tar's headers and padding."""
     config = plan.config.section(PointsConfig)
     return sample_count(plan) * (28 * (config.uniform + config.farthest) + 6144)
 

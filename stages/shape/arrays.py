@@ -1,4 +1,4 @@
-"""Array aliases. Shapes stand in the docstrings."""
+"""Array aliases; docstrings give the shapes."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Is a sample's geometry what its record says? Contacts, grammar and penetration, computed anew from meshes.
+"""Check that a sample's geometry is what its record says: contacts, grammar and penetration, recomputed from meshes.
 
-Nothing here uses the search's contact test or its tables: of a finished sample meshes and poses are read back from its
-GLB with trimesh, and FCL answers for every pair of parts whose boxes overlap.
+Nothing here uses the contact test of the search or its tables. Meshes and poses of a finished sample are read back from
+its GLB with trimesh, and FCL tests every pair of parts whose boxes overlap.
 """
 
 from __future__ import annotations
@@ -28,31 +28,33 @@ from stages.shape.shape import Shape, kit_shape, mesh_name
 from stages.shape.stretch import STRETCHED_DEPTH, StretchedMesh, split
 
 BORDERLINE_SHARE = 0.03
-"""A distance that differs from the contact tolerance by less than this share of it is no evidence either way: poses
-in a GLB are 32-bit numbers."""
+"""Distances that differ from the contact tolerance by less than this share of it are not judged.
+
+Poses in a GLB are 32-bit numbers.
+"""
 
 
 def geometry_faults(kit: Kit, members: Mapping[str, bytes]) -> list[str]:
-    """What is wrong with the sample whose `members` these are; an empty list where nothing is.
+    """Return the faults of the sample with these members; empty if there are none.
 
-    Contacts equal the record's, every neighbourhood is in the grammar, every pair in contact was observed, and no
-    pair of parts reaches deeper into each other than any pair of its types does in the exemplars, or, where one of them
-    is stretched, by STRETCHED_DEPTH more.
+    Contacts equal the record's. Every neighbourhood is in the grammar. Every pair in contact was observed. No pair of
+    parts reaches deeper into each other than pairs of its types in the exemplars; a stretched part may reach
+    STRETCHED_DEPTH deeper.
     """
     record = json.loads(members["json"])
     names = [part["name"] for part in record["parts"]]
-    places = {name: place for place, name in enumerate(kit.type_names())}
-    types = np.array([places[mesh_name(name)] for name in names], dtype=np.int16)
+    type_of = {name: index for index, name in enumerate(kit.type_names())}
+    types = np.array([type_of[mesh_name(name)] for name in names], dtype=np.int16)
     meshes, poses = _parts_of(members["glb"], names)
     _, stretches = split(np.array([part["pose"] for part in record["parts"]], dtype=np.float64))
     return _faults(kit, Assembly(types, poses, pairs_of(members[CONTACTS]), stretches), meshes, names)
 
 
 def assembly_faults(kit: Kit, assembly: Assembly, upright: bool = True) -> list[str]:
-    """What is wrong with an assembly that is in no file yet; an empty list where nothing is.
+    """Return the faults of an assembly that is in no file yet; empty if there are none.
 
-    It is asked what `geometry_faults` asks, and besides: it is in one piece, each contact is a docking of the kit, and,
-    if it is to be `upright`, each part stands as one of its type stood in an exemplar.
+    Checks what `geometry_faults` checks. In addition, the assembly is connected, each contact is a docking of the kit,
+    and, if it must be `upright`, each part stands as one of its type stood in an exemplar.
     """
     names = [f"{kit.types[kind].name}.{part:03d}" for part, kind in enumerate(assembly.types.tolist())]
     faults = _faults(kit, assembly, [kit.types[kind] for kind in assembly.types.tolist()], names)
@@ -72,11 +74,11 @@ def assembly_faults(kit: Kit, assembly: Assembly, upright: bool = True) -> list[
 
 
 def _is_docked(kit: Kit, a: int, b: int, pose: FloatArray) -> bool:
-    """Whether a part of type `b` at `pose` (4, 4) beside one of type `a` is in one of the kit's dockings."""
+    """Return whether a part of type `b` at `pose` (4, 4) to one of type `a` is in a docking of the kit."""
     if a > b:
         a, b, pose = b, a, invert(pose)
     length = kit.types[b].diagonal / 2
-    wanted = [pose_vectors(seen[None], length) for seen in ((pose, invert(pose)) if a == b else (pose,))]
+    wanted = [pose_vectors(view[None], length) for view in ((pose, invert(pose)) if a == b else (pose,))]
     for docking in kit.grammar.dockings:
         if (docking.a, docking.b) == (a, b):
             images = pose_vectors(symmetric_images(kit.types[a], kit.types[b], docking.pose), length)
@@ -87,7 +89,7 @@ def _is_docked(kit: Kit, a: int, b: int, pose: FloatArray) -> bool:
 
 
 def _fallen(kit: Kit, assembly: Assembly) -> list[int]:
-    """The parts that stand with other sides up than any part of their type in an exemplar."""
+    """Return the parts that stand with another side up than any part of their type in an exemplar."""
     axis = {"y": 1, "z": 2}[kit.up]
     fallen = []
     for part, kind in enumerate(assembly.types.tolist()):
@@ -106,13 +108,13 @@ def _faults(kit: Kit, assembly: Assembly, meshes: Sequence[Any], names: Sequence
     boxes = np.stack([_world_box(mesh, pose) for mesh, pose in zip(meshes, poses, strict=True)])
     pairs = overlapping_boxes(boxes, 1.1 * kit.contact_tolerance)
     stored = {(i, j) for i, j in assembly.edges.tolist()}
-    found, doubtful = _contacts(meshes, poses, pairs, kit.contact_tolerance)
+    touching, doubtful = _contacts(meshes, poses, pairs, kit.contact_tolerance)
     contact = ContactTest(shape.meshes, kit.contact_tolerance)
     faults: list[str] = []
-    for i, j in sorted(stored - found - doubtful):
+    for i, j in sorted(stored - touching - doubtful):
         faults.append(f"{names[i]} and {names[j]} are recorded as neighbours and do not touch")
-    for i, j in sorted(found - stored):
-        # what is a short line seen from one part and a point from the other is too near to either to say
+    for i, j in sorted(touching - stored):
+        # a contact that is a short line from one part and a point from the other is not judged
         a, b, pose = int(types[i]), int(types[j]), invert(poses[i]) @ poses[j]
         if {contact.kind(a, b, pose), contact.kind(b, a, invert(pose))} <= set(kit.contact_kinds):
             faults.append(f"{names[i]} and {names[j]} touch and are not recorded as neighbours")
@@ -122,7 +124,7 @@ def _faults(kit: Kit, assembly: Assembly, meshes: Sequence[Any], names: Sequence
 
 
 def _parts_of(content: bytes, names: Sequence[str]) -> tuple[list[Any], FloatArray]:
-    """Mesh and pose (n, 4, 4) of each named node of a GLB."""
+    """Return the mesh and the pose (n, 4, 4) of each named node of a GLB."""
     import trimesh
 
     scene = trimesh.load_scene(io.BytesIO(content), file_type="glb", process=False)
@@ -138,7 +140,7 @@ def _world_box(mesh: Any, pose: FloatArray) -> FloatArray:
 def _contacts(
     meshes: Sequence[Any], poses: FloatArray, pairs: IntArray, tolerance: float
 ) -> tuple[set[tuple[int, ...]], set[tuple[int, ...]]]:
-    """The pairs in contact by FCL, and the pairs whose distance is too near the tolerance to say."""
+    """Return the pairs in contact by FCL, and the pairs whose distance is too near the tolerance to judge."""
     import fcl
 
     models: dict[int, Any] = {}
@@ -153,18 +155,18 @@ def _contacts(
         fcl.CollisionObject(models[id(mesh)], fcl.Transform(pose[:3, :3], pose[:3, 3]))
         for mesh, pose in zip(meshes, poses, strict=True)
     ]
-    found: set[tuple[int, ...]] = set()
+    touching: set[tuple[int, ...]] = set()
     doubtful: set[tuple[int, ...]] = set()
     for i, j in pairs.tolist():
         if fcl.collide(bodies[i], bodies[j], fcl.CollisionRequest(), fcl.CollisionResult()):
-            found.add((i, j))
+            touching.add((i, j))
             continue
         distance = fcl.distance(bodies[i], bodies[j], fcl.DistanceRequest(), fcl.DistanceResult())
         if abs(distance - tolerance) <= BORDERLINE_SHARE * tolerance:
             doubtful.add((i, j))
         elif distance < tolerance:
-            found.add((i, j))
-    return found, doubtful
+            touching.add((i, j))
+    return touching, doubtful
 
 
 def _grammar_faults(kit: Kit, assembly: Assembly, names: Sequence[str]) -> list[str]:
@@ -180,8 +182,10 @@ def _grammar_faults(kit: Kit, assembly: Assembly, names: Sequence[str]) -> list[
 
 
 def _slot_misfits(kit: Kit, assembly: Assembly) -> list[int]:
-    """Parts around which slots are filled as the grammar does not admit, neither as parts stood in the exemplars nor
-    however they may be turned: a search need not be upright."""
+    """Return the parts whose slots are filled as the grammar does not admit, however the parts are turned.
+
+    A search need not keep parts upright.
+    """
     dockings = DockingTable.of(kit)
     misfits = SlotGrammar(kit, dockings, upright=True).misfits(assembly)
     if not misfits:

@@ -15,7 +15,7 @@ from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType
 
 
 def kit_json(kit: Kit) -> dict[str, Any]:
-    """The kit as JSON that a person can read: types, exemplars, neighbourhoods by label, dockings by type name."""
+    """Return the kit as readable JSON: types, exemplars, neighbourhoods by label, dockings by type name."""
     names, labels = kit.type_names(), kit.labels
     table = DockingTable.of(kit)
     return {
@@ -72,7 +72,7 @@ def kit_json(kit: Kit) -> dict[str, Any]:
 
 
 def _contacts(kit: Kit, table: DockingTable, assembly: Assembly) -> list[list[int | str]]:
-    """Contacts as `[part, part, kind]`."""
+    """Return contacts as `[part, part, kind]`."""
     labels = table.label_edges(assembly.types, assembly.poses, assembly.edges)[:, 0] // 2
     kinds = [kit.grammar.dockings[label].kind for label in labels.tolist()]
     return [[i, j, kind] for (i, j), kind in zip(assembly.edges.tolist(), kinds, strict=True)]
@@ -104,7 +104,7 @@ def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
 
 
 def load_kit(text: Path, arrays: Path) -> Kit:
-    """The kit that `write_kit` wrote to these two files."""
+    """Return the kit that `write_kit` wrote to these two files."""
     described = json.loads(text.read_text())
     heads = iter([(kind["name"], kind.get("meaning", "")) for kind in described["types"]])
     types: list[PartType] = []
@@ -158,7 +158,7 @@ def _exemplar(members: Mapping[str, bytes]) -> Exemplar:
 
 
 def _grammar(described: Mapping[str, Any], labels: Sequence[str]) -> Grammar:
-    """The grammar of a kit with these labels that `kit_json` described."""
+    """Return the grammar of a kit with these labels from the JSON of `kit_json`."""
     index_of = {kind["name"]: index for index, kind in enumerate(described["types"])}
     neighbourhoods = {
         labels.index(name): {

@@ -11,13 +11,13 @@ from stages.shape.kit_files import load_kit
 
 
 def input_kits(task: Task) -> dict[str, Kit]:
-    """The kits among the inputs of a shard, by name."""
+    """Return the kits among the inputs of a shard, by name."""
     names = [name.partition("/")[2] for name in task.shard.inputs if name.startswith("exemplars/")]
     return {name: input_kit(task, name) for name in names}
 
 
 def input_kit(task: Task, name: str) -> Kit:
-    """One kit among the inputs of a shard; read once for each process."""
+    """Return one kit among the inputs of a shard; each process reads it once."""
     return _load(task.input("exemplars", f"{name}.json"), task.input("exemplars", f"{name}.tar"))
 
 

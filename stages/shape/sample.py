@@ -16,15 +16,16 @@ from stages.shape.kit import EMPTY_ASSEMBLY, Assembly
 class Sample:
     """One shape.
 
-    key: unique in its dataset, without a dot; split: `train`, `val` or `test`; producer: the stage that made it;
-    kit: name of the kit that its assembly refers to, or of the program or category that its text belongs to;
-    graph: hex digest of its structure, for a kit that of its canonical type-coloured shape graph (equal exactly for
-    isomorphic graphs of one kit), for a program that of its discrete part;
-    lineage: JSON, how it was made: `method`, without which the record has the producer's name; `parents`, what it was
-    made from (keys of samples, names of exemplars or files), without which it has `kit`; and what its producer
-    declares;
-    assembly: its parts, for a kit;
-    text: the producer's own text that the shape is made from (a program, its parameters); empty for a kit.
+    key: unique in its dataset, without a dot
+    split: `train`, `val` or `test`
+    producer: stage that made it
+    kit: kit of its assembly, or program or category of its text
+    graph: hex digest of its structure; for a kit that of its canonical coloured shape graph (equal exactly for
+        isomorphic graphs of one kit), for a program that of its discrete parameters
+    lineage: JSON on how it was made: `method` (default: the producer's name), `parents` it was made from (keys of
+        samples, names of exemplars or files; default: `kit`), and the fields that its producer declares
+    assembly: its parts, for a kit
+    text: text from which its producer makes the shape (a program, its parameters); empty for a kit
     """
 
     key: str
@@ -38,9 +39,10 @@ class Sample:
 
 
 def write_sample(writer: ShardWriter, sample: Sample) -> None:
-    """Append `sample` to a shard: members `json`, `types.npy`, `poses.npy`, `edges.npy`, and `stretches.npy` where some
-    of its parts are stretched."""
-    described = {
+    """Append `sample` to a shard as `json`, `types.npy`, `poses.npy`, `edges.npy` and, if parts are stretched,
+    `stretches.npy`.
+    """
+    fields = {
         "key": sample.key,
         "split": sample.split,
         "producer": sample.producer,
@@ -50,7 +52,7 @@ def write_sample(writer: ShardWriter, sample: Sample) -> None:
         "text": sample.text,
     }
     members = {
-        "json": json_bytes(described),
+        "json": json_bytes(fields),
         "types.npy": array_bytes(sample.assembly.types),
         "poses.npy": array_bytes(sample.assembly.poses),
         "edges.npy": array_bytes(sample.assembly.edges),
@@ -61,7 +63,7 @@ def write_sample(writer: ShardWriter, sample: Sample) -> None:
 
 
 def read_samples(path: Path) -> Iterator[Sample]:
-    """The samples of a shard that `write_sample` made, in order, one in memory at a time."""
+    """Yield the samples of a shard that `write_sample` made, in order, one in memory at a time."""
     for _, members in read_shard(path):
         assembly = Assembly(
             types=bytes_array(members["types.npy"]),

@@ -33,15 +33,15 @@ def draw_sketch(
     Raises ShardFailed where nothing is seen or nothing would be drawn: a blank drawing is never a sample.
     """
     from stages.shape.views.ink import ink_strokes
-    from stages.shape.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, find_strokes
+    from stages.shape.views.strokes import BOUNDARY_LINE, CONTOUR_LINE, CREASE_LINE, OUTLINE_LINE, find_strokes
 
     seen = visible_triangles(scene, camera, (size * supersample, size * supersample), backend)
     strokes = find_strokes(seen, options.crease_angle, options.step * supersample, options.shortest * supersample)
     widths = {
-        OUTLINE: options.outline,
-        CONTOUR: options.contour,
-        BOUNDARY: options.boundary,
-        CREASE: options.crease,
+        OUTLINE_LINE: options.outline,
+        CONTOUR_LINE: options.contour,
+        BOUNDARY_LINE: options.boundary,
+        CREASE_LINE: options.crease,
     }
     ink = ink_strokes(strokes, widths, size, size, 1.0 / supersample, options.crowding)
     drawing = np.rint(255.0 * (1.0 - options.ink * ink)).astype(np.uint8)

@@ -1,1 +1,1 @@
-"""Each sample of a collection is judged: does it stand? What is found becomes fields of its record and two arrays."""
+"""Check each sample of a collection physically: does it stand? The verdict goes to its record and two arrays."""

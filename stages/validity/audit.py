@@ -1,4 +1,4 @@
-"""Is the physical validity of a sample what its record says?"""
+"""Check that the physical validity of a sample is what its record says."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from stages.shape.physics.judge import judge_of, physical_fields
 from stages.shape.physics.settings import PhysicsConfig
 
 FIELD_ROUNDING = 2e-6
-"""Numbers of a record are rounded to so many."""
+"""Numbers of a record are rounded to this."""
 RELATIVE_TOLERANCE = 1e-3
-"""As a share of the number, so near a number is that is computed from rounded poses."""
+"""Relative error of numbers computed from rounded poses."""
 
 
 def contradictions(sample: PackagedSample) -> Iterator[str]:
-    """A sentence for each two fields that cannot both be true."""
+    """Yield a sentence for each two fields that cannot both be true."""
     yield from _pair_faults(sample)
     physics, parts = sample.record["physics"], len(sample.shape)
     push = _config(sample).push
@@ -33,18 +33,17 @@ def contradictions(sample: PackagedSample) -> Iterator[str]:
     if not (0 <= physics["floating"] <= parts and 1 <= physics["components"] <= parts):
         yield "its json counts more pieces or floating parts than it has parts"
     if not -1 <= physics["weakest"] < parts:
-        yield "its json names a weakest part that is not there"
+        yield "its json names a weakest part that does not exist"
 
 
 def recomputed_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
-    """A sentence for each field that statics finds otherwise, and for contacts that are none."""
+    """Yield a sentence for each field that statics computes otherwise, and for wrong contacts."""
     shape, recorded = sample.shape, sample.record["physics"]
     judge = judge_of(shape.meshes, shape.up, _config(sample))
     validity = judge.validity(shape.assembly)
     if validity.joints.tolist() != sample.arrays[JOINTS].T.tolist():
         yield "its joints are not the pairs that statics counts as connected"
-    found = physical_fields(validity)
-    for name, value in found.items():
+    for name, value in physical_fields(validity).items():
         if isinstance(value, float):
             wrong = abs(value - recorded[name]) > max(FIELD_ROUNDING, RELATIVE_TOLERANCE * abs(value))
         else:
@@ -60,15 +59,15 @@ def recomputed_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
 
 
 def _pair_faults(sample: PackagedSample) -> Iterator[str]:
-    """Contacts and joints are pairs of parts, in order, and the joints make the components."""
+    """Yield faults of contacts and joints: they are ordered pairs of parts, and the joints make the components."""
     parts, physics = len(sample.record["parts"]), sample.record["physics"]
     for member in (CONTACTS, JOINTS):
         pairs = sample.arrays[member]
         if pairs.ndim != 2 or len(pairs) != 2 or pairs.dtype != np.int32:
-            yield f"{member} is no array int32 (2, m)"
+            yield f"{member} is not an array int32 (2, m)"
             return
         if (pairs[0] >= pairs[1]).any() or (pairs < 0).any() or (pairs >= parts).any():
-            yield f"{member} holds what is no pair of its parts"
+            yield f"{member} holds entries that are not pairs of its parts"
             return
         places = pairs[0].astype(np.int64) * parts + pairs[1]
         if (np.diff(places) <= 0).any():

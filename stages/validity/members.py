@@ -1,4 +1,4 @@
-"""What stage `validity` adds to every sample: which parts touch, which hang together, and whether it stands."""
+"""What stage `validity` adds to every sample: which parts touch, which are connected, and whether it stands."""
 
 from __future__ import annotations
 

@@ -22,17 +22,19 @@ BYTES_A_SAMPLE = 4096
 
 
 def run_shard(task: Task) -> Outcome:
-    """The fields of each sample's record that `members.py` declares. A sample without extent or weight is refused. The
-    summary counts the rooted and the stable samples."""
+    """Make the fields of each sample's record that `members.py` declares.
+
+    A sample without extent or weight is rejected. The summary counts the rooted and the stable samples.
+    """
     config = task.config.section(PhysicsConfig)
     counts: Counter[str] = Counter()
 
     def judged(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
         shape = collection.shape(sample)
-        # as the record says it: near ties of statics may fall otherwise by the last digits of a pose
+        # as in the record: the last digits of a pose may decide ties of statics
         assembly = replace(shape.assembly, poses=rounded(shape.assembly.poses))
         judge = judge_of(shape.meshes, shape.up, config)
-        # a shape graph says itself what counts as contact; of parts made from a text nobody has asked yet
+        # a shape graph defines its contacts; those of a shape made from a text are computed here
         graphs = collection.language.graphs
         known = shape.assembly.edges if graphs else judge.contacts(assembly)
         try:
@@ -61,12 +63,12 @@ def run_shard(task: Task) -> Outcome:
 
 
 def _short(length: float) -> float:
-    """A length without the noise of its last digits."""
+    """Return a length without the noise of its last digits."""
     return float(f"{length:.9g}")
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """How many samples are rooted and stable."""
+    """Return how many samples are rooted and stable."""
     found = [plan.summary("validity", name) for name in plan.shards("validity")]
     done = [summary for summary in found if summary is not None]
     judged = sum(summary["samples"] for summary in done)

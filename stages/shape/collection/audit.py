@@ -1,4 +1,4 @@
-"""How `make verify` looks at what a folder of the house has made of a sample."""
+"""How `make verify` checks what a stage made of a sample."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ def _no_recheck(_: PackagedSample, __: DatasetPaths) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Audit:
-    """What is asked of finished samples. `AUDIT = Audit(...)` stands in `stages/<stage>/audit.py`, which no stage
-    imports: an edited audit makes nothing anew.
+    """Checks of finished samples, declared as `AUDIT = Audit(...)` in `stages/<stage>/audit.py`.
 
-    Each answers a sentence for each fault of a sample, none for one that it has nothing to say of. faults: cheap enough
-    to be asked of every sample; anew: by making again what was made, or by other means, with what the mill's folders of
-    the dataset still hold; asked of some samples.
+    No stage imports an audit, so an edited audit rebuilds nothing. A check yields one sentence for each fault of a
+    sample.
+
+    faults: cheap check, run on every sample.
+    recheck: check that rebuilds what was made, or uses other means, with the intermediate files of the dataset. It is
+        run on some samples.
     """
 
     faults: Callable[[PackagedSample], Iterator[str]] = _nothing

@@ -1,4 +1,4 @@
-"""The classes of a dataset: one id for each part label of each of its sources, the same in every member and split."""
+"""The classes of a dataset: one id for each part label of each source, the same in every member and split."""
 
 from __future__ import annotations
 
@@ -10,8 +10,13 @@ from stages.shape.collection.language import Source
 
 @dataclass(frozen=True)
 class PartClass:
-    """One class. id: what labels say; name: the part label; kit: the source it belongs to; color: sRGB, or None
-    where its source has none to say."""
+    """One class.
+
+    id: number that labels hold
+    name: part label
+    kit: source that the class belongs to
+    color: sRGB, or None where the source defines none
+    """
 
     id: int
     name: str
@@ -21,15 +26,18 @@ class PartClass:
 
 @dataclass(frozen=True)
 class Classes:
-    """The classes in the order of their ids; first: the id of the first class of each source. The classes of one
-    source have ids that follow each other, in the order of its labels."""
+    """The classes of a dataset.
+
+    all: classes in the order of their ids
+    first: id of the first class of each source; the ids of one source are consecutive, in the order of its labels
+    """
 
     all: tuple[PartClass, ...]
     first: Mapping[str, int]
 
     @classmethod
     def of(cls, sources: Mapping[str, Source]) -> Classes:
-        """The classes of the sources of a dataset. Raises ValueError for more than an int16 can count."""
+        """Return the classes of the sources of a dataset. Raises ValueError for more than an int16 can count."""
         found: list[PartClass] = []
         first: dict[str, int] = {}
         for kit, source in sources.items():

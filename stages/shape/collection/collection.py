@@ -1,4 +1,4 @@
-"""The samples of a shard of the collection and the shape of each, and the one loop that adds something to them all."""
+"""The samples of a shard of the collection, their shapes, and the loop that adds members to them."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ class Collection:
         self.classes = Classes.of(self.decoder.sources)
 
     def samples(self, shard: str = "") -> Iterator[Sample]:
-        """The samples of the collection's shard `shard`, or of the task's own, in order, one in memory at a time."""
+        """Yield the samples of the collection's shard `shard`, or of the task's own, one in memory at a time."""
         return read_samples(self._task.input(self.producer, f"{shard or self._task.shard.name}.tar"))
 
     def shape(self, sample: Sample) -> Shape:
-        """The shape of a sample. The classes of its parts are those of the dataset."""
+        """Return the shape of a sample. The classes of its parts are those of the dataset."""
         shape = upright(self.decoder.shape(sample))
         return replace(shape, first_class=self.classes.first[sample.kit])
 
 
-def add_members(task: Task, made: Callable[[Collection, Sample], Mapping[str, bytes]]) -> int:
-    """Write the shard's tar: for each sample of the collection what `made` answers, under the sample's key.
+def add_members(task: Task, members_of: Callable[[Collection, Sample], Mapping[str, bytes]]) -> int:
+    """Write the shard's tar: for each sample of the collection what `members_of` returns, under the sample's key.
 
-    A sample for which it raises Rejected is refused and counted. Answers how many samples were written.
+    A sample for which it raises Rejected is rejected and counted. Returns the number of samples written.
     """
     collection, total = Collection(task), int(task.shard.params["samples"])
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for sample in collection.samples():
             try:
-                writer.write(sample.key, made(collection, sample))
+                writer.write(sample.key, members_of(collection, sample))
             except Rejected as error:
                 task.reject(sample.key, error.reason, error.detail)
             task.progress(writer.samples, total)

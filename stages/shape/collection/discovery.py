@@ -1,4 +1,4 @@
-"""Finds what the folders of the house declare: producers, languages, members, audits."""
+"""Discover what stages declare: producers, languages, members, audits."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ Discovered = TypeVar("Discovered")
 
 
 def producers() -> dict[str, Producer]:
-    """The producers by the stage that each is."""
+    """Return the producers by stage."""
     return _discovered("producer", Producer)
 
 
 def languages() -> dict[str, Language]:
-    """The languages by their names."""
+    """Return the languages by name."""
     return {language.name: language for language in _discovered("language", Language).values()}
 
 
 def members() -> dict[str, Members]:
-    """What is added to every sample, by the stage that adds it."""
+    """Return what is added to every sample, by the stage that adds it."""
     return _discovered("members", Members)
 
 
 def member_modules() -> tuple[str, ...]:
-    """The modules in which members are declared: what reads them at run time names them as its code."""
+    """Return the modules that declare members. A stage that reads them at run time names them as its code."""
     return tuple(f"{stages.__name__}.{folder}.members" for folder in members())
 
 
 def audits() -> dict[str, Audit]:
-    """How finished samples are looked at, by the folder that does."""
+    """Return the audits of finished samples, by stage."""
     return _discovered("audit", Audit)
 
 
 def language_of(producer: str) -> Language:
-    """The language of the samples of a producer. Raises ConfigError for one that nobody declares."""
+    """Return the language of the samples of a producer. Raises ConfigError for one that no stage declares."""
     known, name = languages(), producers()[producer].language
     if name not in known:
         raise ConfigError(f"producer {producer} makes samples in the language {name!r}; there are {', '.join(known)}")
@@ -52,7 +52,7 @@ def language_of(producer: str) -> Language:
 
 @cache
 def _discovered(what: str, kind: type[Discovered]) -> dict[str, Discovered]:
-    """The `WHAT` of each `stages/<folder>/<what>.py`, by folder. Raises TypeError for a file without it."""
+    """Return the `WHAT` of each `stages/<folder>/<what>.py`, by folder. Raises TypeError for a file without it."""
     found: dict[str, Discovered] = {}
     for folder in folders_with(stages.__name__, f"{what}.py"):
         declared = getattr(importlib.import_module(f"{stages.__name__}.{folder}.{what}"), what.upper(), None)

@@ -13,16 +13,17 @@ from stages.shape.sample import Sample
 from stages.shape.shape import Shape
 
 RebuildShape = Callable[[Mapping[str, Any], IntArray], Shape]
-"""The shape of a record and its contacts, int32 (m, 2)."""
+"""Function of a record and its contacts, int32 (m, 2), that rebuilds the shape."""
 
 
 @dataclass(frozen=True)
 class Source:
     """Where samples come from: a kit, a program, a category of programs. `Sample.kit` names it.
 
-    labels: the part labels of its shapes, in a fixed order; colors: one for each label, sRGB, or none at all: then
-    a class has that of its first part; sentence: what a card says of it, in a few words.
-    contact_tolerance: of shape graphs the largest distance of parts in contact, in the units of the shapes.
+    labels: part labels of its shapes, in a fixed order
+    colors: sRGB of each label; if empty, a class has the colour of its first part
+    sentence: short description for the card
+    contact_tolerance: for shape graphs, the largest distance of parts in contact, in the units of the shapes
     """
 
     labels: tuple[str, ...]
@@ -32,31 +33,32 @@ class Source:
 
 
 class ShapeDecoder(Protocol):
-    """A language with what it reads of a task: it knows the sources of the dataset."""
+    """A language with what it reads of a task. It knows the sources of the dataset."""
 
     @property
     def sources(self) -> Mapping[str, Source]:
         """All sources of the dataset by name, in the order of the config."""
 
     def shape(self, sample: Sample) -> Shape:
-        """The shape of a sample. Raises ValueError or an error of its own for a text that it does not understand."""
+        """Return the shape of a sample. Raises ValueError or an error of its own for a text it cannot parse."""
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
-        """About `count` shapes with captions that go into the making, for the first row of a contact sheet."""
+        """Return about `count` input shapes with captions for the first row of a contact sheet."""
 
 
 @dataclass(frozen=True)
 class Language:
-    """One language. `LANGUAGE = Language(...)` stands in `stages/<stage>/language.py`.
+    """One language, declared as `LANGUAGE = Language(...)` in `stages/<stage>/language.py`.
 
-    name: what records call it; reads: the records, as `stage/shard`, without which it cannot make shapes;
-    speaker: the language inside a task whose shard has those among its inputs.
-    graphs: whether its samples are shape graphs, with contacts of their own and strings; else they have a text, and
-    contacts are found by whoever asks.
-    text: what the member `txt` of its samples is, unless they are shape graphs; coordinates: their unit, and where
-    their origin is; for the card.
-    anew: the shape that the record of a packaged sample says, made anew and upright, given the mill's folders of its
-    dataset; raises LookupError where what it is made from is not there, ValueError where the record cannot be meant.
+    name: what records call it
+    reads: function that returns the records, as `stage/shard`, without which it cannot make shapes
+    decoder: function that makes the decoder of a task whose shard has those records among its inputs
+    graphs: whether its samples are shape graphs, with contacts of their own and strings; otherwise a sample has a text,
+        and contacts are computed from the shape
+    text: what the member `txt` of its samples is, unless they are shape graphs
+    rebuild: function that takes the paths of a dataset and returns a function that rebuilds the upright shape of a
+        record; raises LookupError if the source is missing and ValueError for an invalid record
+    coordinates: unit and origin of the coordinates, for the card
     """
 
     name: str

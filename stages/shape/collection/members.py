@@ -1,4 +1,4 @@
-"""What a stage adds to every sample: members beside its mesh, and fields of its record."""
+"""What a stage adds to every sample: members and fields of its record."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from stages.shape.arrays import ByteArray
 from stages.shape.views.camera import Camera
 
 TEXT = "txt"
-"""The member that every sample has: its text. Of a shape graph a stage adds it; else the sample brings it."""
+"""The member that every sample has: its text. A shape graph gets it from a stage; other samples bring it."""
 
 
 @dataclass(frozen=True)
 class Member:
     """One file of every sample.
 
-    name: what stands after the key, such as `points.npy`; its ending says the format: npy, png, txt, json or glb.
-    sentence: what it is, for people; dtype, shape: of an array, a name for each length that differs from sample to
-    sample; arrays of one sample that share such a name have the same length there.
+    name: what follows the key, such as `points.npy`; the suffix is the format: npy, png, txt, json or glb
+    sentence: description for people
+    dtype: dtype of an array
+    shape: shape of an array, with a name for each length that differs between samples; arrays of one sample that share
+        a name have the same length there
     """
 
     name: str
@@ -39,7 +41,11 @@ class RecordField:
 
 @dataclass(frozen=True)
 class IndexColumn:
-    """A column of the index: its Arrow type, and where in a record its value stands."""
+    """A column of the index.
+
+    kind: Arrow type
+    place: path of the value in a record
+    """
 
     kind: str
     place: tuple[str, ...]
@@ -47,9 +53,11 @@ class IndexColumn:
 
 @dataclass(frozen=True)
 class PreviewRow:
-    """A row of the preview picture: the same samples as in the first row, drawn from what a stage has made of them.
+    """A row of the preview picture: the samples of the first row, drawn from what a stage made of them.
 
-    title; caption: what is shown, in words; draw: members of one sample, camera and size in pixels -> uint8 picture.
+    title: heading of the row
+    caption: function that says in words what is shown
+    draw: function of the members of a sample, a camera and a size in pixels that returns a uint8 picture
     """
 
     title: str
@@ -67,14 +75,16 @@ def _nothing_to_say(_: Plan) -> Sequence[str]:
 
 @dataclass(frozen=True)
 class Members:
-    """What a stage adds. `MEMBERS = Members(...)` stands in `stages/<stage>/members.py`.
+    """What a stage adds, declared as `MEMBERS = Members(...)` in `stages/<stage>/members.py`.
 
-    Its plan is `collection_shards`; each shard has a tar with the declared members of each sample, and a `json`
-    with the declared fields, which package merges into the record.
+    The plan of the stage is `collection_shards`. Each shard has a tar with the declared members of each sample, and a
+    `json` with the declared fields, which packaging merges into the record.
 
-    of: the members, given the config; fields: of the record, by name; columns: of the index, by name.
-    row: how the preview shows it, or None; card: paragraphs and tables for the card's section on how the dataset was
-    made, from finished records.
+    of: function of the config that returns the members
+    fields: function of the config that returns the fields of the record by name
+    columns: columns of the index by name
+    row: row of the preview, or None
+    card: paragraphs and tables for the card's section on how the dataset was made, from finished records
     """
 
     of: Callable[[Config], tuple[Member, ...]]

@@ -1,4 +1,4 @@
-"""What a dataset was made from, and whose it is: files with their authors, sources and licences."""
+"""What a dataset was made from, and who owns it: files with their authors, sources and licences."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from pipeline.config import StrictModel
 
 
 class Credit(StrictModel):
-    """Whose a file is. What is not said here is asked for by name in the report and in the card."""
+    """Who owns a file. The report and the card name each missing entry."""
 
-    author: str = Field("", description="Who made it, such as Jane Doe.")
-    source: str = Field("", description="Where it comes from, a URL.")
+    author: str = Field("", description="Author, such as Jane Doe.")
+    source: str = Field("", description="URL that the file comes from.")
     license: str = Field("", description="Its licence, as an SPDX id such as CC-BY-4.0.")
     notice: str = Field(
-        "", description="What the licence asks to be said, such as Copyright (c) 2023 Jane Doe, word by word."
+        "", description="Notice that the licence requires, word by word, such as Copyright (c) 2023 Jane Doe."
     )
 
 
@@ -25,8 +25,11 @@ class Credit(StrictModel):
 class Origin:
     """One file that samples were made from.
 
-    kit: the kit or category that it is of; file: its name and its folder's; sha256: of its bytes;
-    author, source, license, notice: as in `Credit`, empty where nobody has said; key: of the config that says it.
+    kit: kit or category that it belongs to
+    file: its name with that of its folder
+    sha256: digest of its bytes
+    author, source, license, notice: as in `Credit`, empty if missing
+    key: config key that provides them
     """
 
     kit: str
@@ -40,7 +43,7 @@ class Origin:
 
 
 def missing_licenses(origins: Sequence[Origin]) -> list[str]:
-    """A sentence for each file whose licence nobody has stated, with the key that does."""
+    """Return a sentence for each file without a licence, with the key that provides it."""
     return [
         f"licence of {origin.file}: not stated; say it with {origin.key}: {{license: ..., author: ..., source: ...}}"
         for origin in origins

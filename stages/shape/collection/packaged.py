@@ -20,9 +20,11 @@ from stages.shape.shape import Shape
 class PackagedSample:
     """One sample of a finished dataset.
 
-    record: its `json`; members: its files by what stands after the key; arrays: the `.npy` ones among them.
-    shape: what its record says that it is, made anew from its source, in the coordinates of the dataset.
-    sections: the config that the dataset was made with, as the manifest has it.
+    record: its `json`
+    members: its files by what follows the key
+    arrays: the `.npy` files among them
+    shape: shape rebuilt from the record's source, in the coordinates of the dataset
+    sections: config sections from the manifest
     """
 
     key: str
@@ -39,11 +41,11 @@ class PackagedSample:
 
     @cached_property
     def size(self) -> float:
-        """The longest side of the box around the shape, in its units."""
+        """The longest side of the bounding box of the shape, in its units."""
         bounds = shape_bounds(self.shape)
         return float((bounds[1] - bounds[0]).max())
 
     @cached_property
     def rays(self) -> RayCaster:
-        """The shape as rays see it."""
+        """The ray caster of the shape."""
         return RayCaster(self.shape)

@@ -1,4 +1,4 @@
-"""Who made a sample: a stage that makes samples, and what there is to say of how it does."""
+"""A stage that makes samples, and what the card says about it."""
 
 from __future__ import annotations
 
@@ -30,22 +30,25 @@ def _no_measures(_: Plan) -> Mapping[str, Any]:
 
 @dataclass(frozen=True)
 class Producer:
-    """A stage that makes samples. `PRODUCER = Producer(...)` stands in `stages/<stage>/producer.py`.
+    """A stage that makes samples, declared as `PRODUCER = Producer(...)` in `stages/<stage>/producer.py`.
 
-    Its plan has shards of `stages.shape.sample.Sample`, named `<dataset>-<split>-<index>`, whose summaries say `split`
+    Its plan has shards of `stages.shape.sample.Sample`, named `<dataset>-<split>-<index>`, whose summaries hold `split`
     and `samples`.
 
-    language: the name of the language that its samples are in; keys: the keys of a config that ask for it, for
-    messages; asked: whether a config does.
-    sentence: how its samples come about; splits: what keeps its splits apart; limits: what not to expect of them, in
-    sentences; all for the card. apart: whether samples of one graph always stand in one split.
-    lineage: what `Sample.lineage` of its samples holds beside `method` and `parents`, by name; the same fields of the
-    same types in all samples of a dataset, and no value empty.
-    origins: the files that its samples are made from, and whose they are.
-    nearness: Markdown for the card on how near the samples of each split are to train.
-    card: paragraphs and tables for the card's section on how the dataset was made, from finished records.
-    variety: Markdown for the card's section on how different the samples are.
-    measures: figures for the manifest.
+    language: name of the language of its samples
+    keys: config keys that ask for them, for messages
+    asked: whether a config asks for them
+    sentence: how its samples are made, for the card
+    splits: what keeps its splits apart, for the card
+    graphs_share_split: whether samples of one graph always share a split
+    limits: sentences on what not to expect of the samples, for the card
+    lineage: fields of `Sample.lineage` in addition to `method` and `parents`, by name; all samples of a dataset have
+        the same fields of the same types, and no value is empty
+    origins: files that its samples are made from, and who owns them
+    nearness: Markdown for the card on how near the samples of val and test are to train
+    card: paragraphs and tables for the card's section on how the dataset was made, from finished records
+    variety: Markdown for the card's section on how different the samples are
+    measures: figures for the manifest
     """
 
     language: str

@@ -8,15 +8,15 @@ from pipeline.stage import Plan, Shard
 from stages.shape.collection.discovery import language_of, producers
 
 PRODUCERS = "*/producer.py"
-"""What a stage that reads samples names among its inputs: every stage that makes them."""
+"""What a stage that reads samples names as an input: every stage that makes samples."""
 MEMBERS = "*/members.py"
-"""What package names among its inputs: every stage that adds to samples."""
+"""What packaging names as an input: every stage that adds to samples."""
 
 
 def collection_shards(plan: Plan, *also: str) -> list[Shard]:
-    """One shard for each shard of the collection, of the same name, `<dataset>-<split>-<index>`.
+    """Return one shard for each shard of the collection, of the same name, `<dataset>-<split>-<index>`.
 
-    Its `params` are `producer`, `split` and `samples`; its inputs are the collection's shard, what the language of its
+    Its `params` are `producer`, `split` and `samples`. Its inputs are the collection's shard, what the language of its
     samples reads, and the shard of the same name of each stage in `also`.
     """
     producer = planned_producer(plan)
@@ -34,20 +34,20 @@ def collection_shards(plan: Plan, *also: str) -> list[Shard]:
 
 
 def sample_count(plan: Plan) -> int:
-    """How many samples the collection has, as far as it is known."""
+    """Return the number of samples of the collection, as far as it is known."""
     return sum(int(shard.params["samples"]) for shard in collection_shards(plan))
 
 
 def planned_producer(plan: Plan) -> str | None:
-    """The stage that makes the samples of a dataset, or None while none of them has a plan."""
+    """Return the stage that makes the samples of a dataset, or None while no producer has a plan."""
     return next((producer for producer in producers() if plan.shards(producer)), None)
 
 
 def check_producers(config: Config) -> None:
-    """Raises ConfigError for a config that makes no shapes, or makes them in more than one way."""
-    ways = producers()
-    used = [producer.keys for producer in ways.values() if producer.asked(config)]
+    """Raise ConfigError for a config that asks for no shapes, or for more than one kind of producer."""
+    known = producers().values()
+    used = [producer.keys for producer in known if producer.asked(config)]
     if len(used) != 1:
-        found = f"has {' and '.join(used)}" if used else "has none"
-        known = ", ".join(producer.keys for producer in ways.values())
-        raise ConfigError(f"{config.path}: a dataset needs one of {known}, and only one; this {found}")
+        named = f"has {' and '.join(used)}" if used else "has none"
+        keys = ", ".join(producer.keys for producer in known)
+        raise ConfigError(f"{config.path}: a dataset needs exactly one of {keys}; this config {named}")

@@ -1,4 +1,4 @@
-"""How large a shape is and where it stands."""
+"""The bounding box of a shape."""
 
 from __future__ import annotations
 
@@ -10,6 +10,6 @@ from stages.shape.shape import Shape
 
 
 def shape_bounds(shape: Shape) -> FloatArray:
-    """Lowest and highest corner of the box around all parts, float64 (2, 3)."""
+    """Return the lowest and highest corner of the box around all parts, float64 (2, 3)."""
     boxes = world_boxes(shape.meshes, shape.assembly.types, shape.assembly.poses)
     return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])

@@ -1,4 +1,4 @@
-"""Connected components of triangles that were written as one mesh, though they are several solids."""
+"""Connected components of triangles that were written as one mesh although they are several solids."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from stages.shape.geometry.components import connected_components
 
 
 def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> np.ndarray:
-    """Pairs of face corners that are one vertex of one surface, int64 (p, 2); corner `3 * face + k`.
+    """Return pairs of face corners that are one vertex of one surface, int64 (p, 2); corner `3 * face + k`.
 
-    Vertices at equal positions count as one, whatever the file's indices. Two faces of one kind (`kinds` int (f,))
-    that are alone at an edge are joined along it. Where more than two meet in an edge, solids stand side by side:
-    two faces that are connected elsewhere and agree belong together, and of the others, going around the edge, two
-    with the inside between them. A face that repeats another goes with it.
+    Vertices at equal positions count as one, whatever the file's indices. Two faces of one kind (`kinds`, int (f,))
+    that are alone at an edge are joined along it. If more than two meet in an edge, several solids touch there: two
+    opposed faces that are connected elsewhere belong together, and of the others, going around the edge, two with the
+    inside between them. A face that repeats another belongs to it.
     """
     positions, place = np.unique(vertices, axis=0, return_inverse=True)
     places = place.reshape(-1)[faces]
@@ -59,18 +59,19 @@ def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> 
 
 
 def connected_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> IntArray:
-    """For each face corner the vertex that it is, int32 (f, 3), in a mesh where no edge has more than two faces."""
+    """Return the vertex of each face corner, int32 (f, 3), in a mesh where no edge has more than two faces."""
     return connected_components(3 * len(faces), joined_corners(vertices, faces, kinds)).reshape(-1, 3)
 
 
 def connected_faces(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> IntArray:
-    """The component of each face, int32 (f,), numbered in the order of their first faces."""
+    """Return the component of each face, int32 (f,), numbered in the order of their first faces."""
     return connected_components(len(faces), joined_corners(vertices, faces, kinds) // 3)
 
 
 def _couples(region: IntArray, forward: np.ndarray) -> tuple[list[tuple[int, int]], np.ndarray]:
-    """Pairs among the faces around an edge that are alone there in their region and run against each other, and the
-    places of the other faces."""
+    """Return pairs of faces around an edge that are alone there in their region and opposed, and the indices of the
+    other faces.
+    """
     couples = []
     for number in np.unique(region):
         members = np.flatnonzero(region == number)
@@ -80,11 +81,13 @@ def _couples(region: IntArray, forward: np.ndarray) -> tuple[list[tuple[int, int
 
 
 def _wedges(ends: FloatArray, triangles: FloatArray, forward: np.ndarray) -> list[tuple[int, int]]:
-    """Pairs of faces around an edge with the inside of a solid between them, as indices into `triangles`.
+    """Return pairs of faces around an edge that bound the inside of a solid, as indices into `triangles`.
 
-    ends: float64 (2, 3); triangles: float64 (k, 3, 3), all on that edge; forward: bool (k,), whether each runs
-    along the edge from its first end to its second. Seen with the edge pointing at the eye, the inside of a solid
-    lies clockwise from its forward face.
+    ends: ends of the edge, float64 (2, 3)
+    triangles: triangles on that edge, float64 (k, 3, 3)
+    forward: whether each runs along the edge from its first end to its second, bool (k,)
+
+    Seen with the edge pointing at the eye, the inside of a solid lies clockwise from its forward face.
     """
     axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     across = triangles.sum(axis=1) - ends.sum(axis=0) - ends[0]  # from the edge to the corner off it

@@ -1,7 +1,7 @@
-"""The one contact test: do two posed parts touch, and in a point, along a line or over a face?
+"""The contact test: do two posed parts touch, and in a point, along a line or over a face?
 
-Two parts are in contact when their triangle meshes intersect or come within the contact tolerance of each other
-(strings §3, with a tolerance for meshes that meet face to face). Exemplars, variations and eval all ask this file.
+Two parts are in contact if their triangle meshes intersect or come within the contact tolerance of each other (strings
+§3, with a tolerance for meshes that meet face to face). Exemplars, variations and eval all use this test.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ Mesh = tuple[FloatArray, FloatArray, np.ndarray]
 class ContactTest:
     """Contact of posed parts of given types.
 
-    `tolerance` is the largest distance in contact, in the units of the parts.
+    types: meshes of the types
+    tolerance: largest distance in contact, in the units of the parts
     """
 
     def __init__(self, types: Sequence[PartMesh], tolerance: float) -> None:
@@ -42,7 +43,7 @@ class ContactTest:
         return np.array([kind.diagonal for kind in self.types])
 
     def mesh(self, index: int) -> Mesh:
-        """The box tree of a type (stages.shape.geometry.mesh_pairs), built at first use."""
+        """Return the box tree of a type (`stages.shape.geometry.mesh_pairs`), built at first use."""
         from stages.shape.geometry.mesh_pairs import build_tree
 
         if index not in self._meshes:
@@ -50,19 +51,20 @@ class ContactTest:
         return self._meshes[index]
 
     def touches(self, a: int, b: int, pose: FloatArray, tolerance: float | None = None) -> bool:
-        """Whether a part of type `b` at `pose` (4, 4), in coordinates of a part of type `a`, touches that part."""
+        """Return whether a part of type `b` at `pose` (4, 4) in coordinates of a part of type `a` touches that part."""
         from stages.shape.geometry.mesh_pairs import first_contact
 
         return first_contact(self.mesh(a), self.mesh(b), pose, self.tolerance if tolerance is None else tolerance)
 
     def area(self, a: int, b: int, pose: FloatArray) -> FloatArray:
-        """Points (q, 3) around which the touching area lies, as `kind` judges it, in coordinates of the part of type
-        `a`; none where there is no contact."""
+        """Return points (q, 3) that span the touching area, in coordinates of the part of type `a`; empty without
+        contact.
+        """
         points: FloatArray = self._patches(a, b, pose)[0]
         return points
 
     def _patches(self, a: int, b: int, pose: FloatArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
-        """Points, areas and crossings of `contact_patches`; areas and crossings are none where there is no contact."""
+        """Return points, areas and crossings of `contact_patches`, all empty without contact."""
         from stages.shape.geometry.mesh_pairs import contact_patches, near_pairs
 
         pairs = near_pairs(self.mesh(a), self.mesh(b), pose, self.tolerance)
@@ -72,11 +74,11 @@ class ContactTest:
         return patches
 
     def kind(self, a: int, b: int, pose: FloatArray) -> ContactKind | None:
-        """What the contact is, judged by the extent of the touching area itself; None where there is no contact.
+        """Return the kind of the contact by the extent of the touching area, or None without contact.
 
-        The touching area is the union, over all pairs of triangles within tolerance, of the share of one triangle
-        that lies near the other. Its extents along its own principal axes decide, so the answer does not depend
-        on how the parts stand in the world.
+        The touching area is the union, over all pairs of triangles within tolerance, of the share of one triangle that
+        lies near the other. Its extents along its principal axes decide, so the pose of the parts in the world does not
+        matter.
         """
         points, areas, crossing = self._patches(a, b, pose)
         if len(crossing) == 0:
@@ -98,7 +100,7 @@ class ContactTest:
         return "face"
 
     def contacts(self, types: np.ndarray, poses: FloatArray) -> IntArray:
-        """The contacts of an assembly: int32 (m, 2), i < j, in lexicographic order."""
+        """Return the contacts of an assembly, int32 (m, 2), i < j, in lexicographic order."""
         boxes = world_boxes(self.types, types, poses)
         pairs = overlapping_boxes(boxes, self.tolerance)
         moved = relative_poses(poses, pairs)
@@ -109,7 +111,7 @@ class ContactTest:
 
 
 def world_boxes(part_types: Sequence[PartMesh], types: np.ndarray, poses: FloatArray) -> FloatArray:
-    """The tight axis-aligned boxes of posed parts, float64 (n, 2, 3)."""
+    """Return the tight axis-aligned boxes of posed parts, float64 (n, 2, 3)."""
     boxes = np.empty((len(types), 2, 3))
     for index, (part_type, pose) in enumerate(zip(types, poses, strict=True)):
         columns = np.ascontiguousarray(transform_points(pose, part_types[part_type].vertices).T)  # 20 times as fast
@@ -118,7 +120,9 @@ def world_boxes(part_types: Sequence[PartMesh], types: np.ndarray, poses: FloatA
 
 
 def overlapping_boxes(boxes: FloatArray, tolerance: float) -> IntArray:
-    """Pairs i < j of boxes (n, 2, 3) at most `tolerance` apart in every axis, int32 (m, 2) in lexicographic order."""
+    """Return pairs i < j of boxes (n, 2, 3) at most `tolerance` apart in every axis, int32 (m, 2), in lexicographic
+    order.
+    """
     order = np.argsort(boxes[:, 0, 0], kind="stable")
     low, high = boxes[order, 0], boxes[order, 1] + tolerance
     ends = np.searchsorted(low[:, 0], high[:, 0], side="right")

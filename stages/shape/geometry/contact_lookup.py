@@ -1,4 +1,4 @@
-"""Hashes of poses, and tables that are asked by them."""
+"""Hashes of poses, and tables indexed by them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from stages.variations.kernels.structs import MISSING
 
 @numba.njit(cache=True)
 def quantize_pose(first_rotation, first_translation, rotation, translation, reach, quantum, out):
-    """The pose of the second part in coordinates of the first in whole quanta, int64 (12,): translation, rotation."""
+    """Write the pose of the second part in coordinates of the first in whole quanta, int64 (12,): translation,
+    rotation.
+    """
     for i in range(3):
         x = 0.0
         for k in range(3):
@@ -37,7 +39,7 @@ def mix(x):
 
 @numba.njit(cache=True)
 def contact_key(a, b, quanta):
-    """A key of a type pair and a quantised pose, uint64, never 0."""
+    """Return a key of a type pair and a quantised pose, uint64, never 0."""
     x = mix(np.uint64(a) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(b) + np.uint64(1))
     for k in range(12):
         x = mix(x * np.uint64(0x9E3779B97F4A7C15) + np.uint64(quanta[k]))
@@ -57,7 +59,7 @@ def look_up(keys, values, key):
 
 @numba.njit(cache=True)
 def look_up_around(keys, values, types, rotations, translations, b, rotation, translation, reach, quantum):
-    """What is known of a part of type b beside each of some others, int64 (n,)."""
+    """Return the known answers for a part of type b next to each of some others, int64 (n,)."""
     known = np.empty(len(types), dtype=np.int64)
     quanta = np.empty(12, dtype=np.int64)
     for i in range(len(types)):
@@ -68,8 +70,7 @@ def look_up_around(keys, values, types, rotations, translations, b, rotation, tr
 
 @intrinsic  # type: ignore[untyped-decorator]
 def call_oracle(typing_context: Any, address: Any, a: Any, b: Any) -> tuple[Any, Any]:
-    """Call the C function of two int64 that returns one and lies at an address: an answer that only Python has, in the
-    middle of a kernel."""
+    """Call the C function of two int64 at an address, which returns one: an answer from Python inside a kernel."""
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         word = ir.IntType(64)

@@ -1,4 +1,4 @@
-"""Contact answers by relative pose: asked of geometry once, looked up ever after."""
+"""Contact answers by relative pose, computed from geometry once and then looked up."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from stages.variations.kernels.structs import FORBIDDEN, LABELS, MISSING, NONE, 
 from stages.variations.kernels.tables import QUANTUM
 
 BORDERLINE_TOLERANCES = 1.06
-"""Two parts closer than this many contact tolerances, yet not in contact, are too close to be called apart."""
+"""Parts closer than this many contact tolerances, yet not in contact, are too close to be called separate."""
 
 
 class ContactOracle:
-    """What happens when a part of one type stands at a relative pose to a part of another.
+    """Answers how a part of one type at a relative pose touches a part of another.
 
-    An answer is NONE (apart), FORBIDDEN (in contact in a way no exemplar shows, nested, or too close to call) or
-    the docking's two directed labels in one number. Poses are rounded to QUANTUM of the contact tolerance, and of
-    all images of a pose under the symmetries of both parts one is chosen by its numbers alone; the answer is that
-    of the chosen pose. So it depends on what is asked and never on what was asked before.
+    An answer is NONE (apart), FORBIDDEN (in contact in a way no exemplar shows, nested, or too close to call), or the
+    two directed labels of the docking in one number. Poses are rounded to QUANTUM of the contact tolerance. Of all
+    images of a pose under the symmetries of both parts one is chosen by its numbers alone, and the answer is that of
+    the chosen pose. So an answer depends on the question and never on earlier questions.
     """
 
     def __init__(self, kit: Kit) -> None:
@@ -45,15 +45,14 @@ class ContactOracle:
         self._every_kind = set(kit.contact_kinds) == set(get_args(ContactKind))
 
     def under(self, kit: Kit) -> ContactOracle:
-        """These answers, with all that is known, for a kit that differs in its exemplars and in which neighbourhoods it
-        admits, and in nothing else."""
+        """Return a copy with all known answers for a kit that differs only in exemplars and admitted neighbourhoods."""
         other = copy.copy(self)
         other.kit = kit
         other.table = ContactTable(self.table.keys.copy(), self.table.values.copy())
         return other
 
     def answer_unknown(self, ws: Workspace, count: int) -> bool:
-        """Answer the first `count` pairs of `ws.unknown`; False as soon as one of them is FORBIDDEN."""
+        """Answer the first `count` pairs of `ws.unknown`. Returns False at the first FORBIDDEN answer."""
         quanta = np.empty(12, dtype=np.int64)
         for i, j in ws.unknown[:count].tolist():
             a, b = int(ws.types[i]), int(ws.types[j])
@@ -68,9 +67,13 @@ class ContactOracle:
         return True
 
     def c_callback(self, types: np.ndarray, rotations: np.ndarray, translations: np.ndarray) -> Any:
-        """A C function that answers, and remembers, how the parts at two places of these arrays (n,), (n, 3, 3),
-        (n, 3) stand to each other, for kernels that call it by its address. What goes wrong in it is raised by
-        `complain`."""
+        """Return a C function that answers, and caches, how two parts in these arrays touch, for kernels to call by
+        address.
+
+        types, rotations, translations: (n,), (n, 3, 3), (n, 3)
+
+        Exceptions inside it are raised by `raise_pending`.
+        """
 
         def answer(i: int, j: int) -> int:
             try:
@@ -88,14 +91,18 @@ class ContactOracle:
         return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(answer)
 
     def raise_pending(self) -> None:
-        """Raise what went wrong in an `asker`, where no exception can pass."""
+        """Raise the exception that occurred in a C callback, through which no exception can pass."""
         if self._broken is not None:
             error, self._broken = self._broken, None
             raise error
 
     def around(self, types: np.ndarray, poses: FloatArray, b: int, pose: FloatArray) -> IntArray:
-        """The answers, int64 (n,), for a part of type `b` at `pose` (4, 4) beside each of the parts of `types` (n,) at
-        `poses` (n, 4, 4). None is asked of geometry where one that is known already is FORBIDDEN."""
+        """Return the answers, int64 (n,), for a part of type `b` at `pose` (4, 4) next to each of some parts.
+
+        types, poses: the other parts, (n,) and (n, 4, 4)
+
+        Geometry is not queried if a known answer is FORBIDDEN.
+        """
         rotations, translations = np.ascontiguousarray(poses[:, :3, :3]), np.ascontiguousarray(poses[:, :3, 3])
         rotation, translation = np.ascontiguousarray(pose[:3, :3]), np.ascontiguousarray(pose[:3, 3])
         reach, quantum = self.kit.types[b].diagonal / 2, self._quantum
@@ -148,13 +155,17 @@ class ContactOracle:
         return FORBIDDEN if self._nested(a, b, pose, not touching) else NONE
 
     def _nested(self, a: int, b: int, pose: FloatArray, apart: bool) -> bool:
-        """Whether a part lies in the other without contact that counts, deeper than any of their types did before.
-        `apart`: whether they do not touch at all."""
+        """Return whether a part lies in the other without a counted contact, deeper than observed for their types.
+
+        apart: whether their surfaces are known not to touch
+        """
         allowed = self.kit.grammar.nested.get((min(a, b), max(a, b)), 0.0) + self.contact.tolerance
         return self._is_deeper(a, b, pose, allowed, apart)
 
     def _is_deeper(self, a: int, b: int, pose: FloatArray, allowed: float, apart: bool = False) -> bool:
-        """Whether one of the parts lies deeper in the other than is allowed; as `PenetrationTest.depth`."""
+        """Return whether one of the parts lies deeper in the other than is allowed, as `PenetrationTest.depth`
+        measures.
+        """
         first, second = self.kit.types[a].bounds, self.kit.types[b].bounds
         centre = pose[:3, :3] @ second.mean(axis=0) + pose[:3, 3]
         half = np.abs(pose[:3, :3]) @ (second[1] - second[0]) / 2

@@ -1,4 +1,4 @@
-"""Looking up docking configurations: which observed relative pose, modulo symmetry, is this one? (strings §6)"""
+"""Look up docking configurations: which observed relative pose, modulo symmetry, is this one? (strings §6)"""
 
 from __future__ import annotations
 
@@ -11,26 +11,28 @@ from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Docking, Kit, PartType
 
 SAME_IMAGE = 0.01
-"""Images of a docking closer than this share of the tolerance are written once."""
+"""Images of a docking closer than this share of the tolerance are stored once."""
 
 
 def symmetric_images(a: PartType, b: PartType, pose: FloatArray) -> FloatArray:
-    """All relative poses (k, 4, 4) of `b` against `a` that look the same as `pose`, by symmetries of either part."""
+    """Return all relative poses (k, 4, 4) of `b` against `a` equal to `pose` up to symmetries of either part."""
     left = a.symmetries @ pose
     images: FloatArray = (left[:, None] @ b.symmetries[None]).reshape(-1, 4, 4)
     return images
 
 
 class DockingTable:
-    """The dockings of a kit, found again by relative pose.
+    """The dockings of a kit, looked up by relative pose.
 
-    A directed label says which docking an edge has as seen from one of its ends: `2 * index` where that end plays
-    the part of `Docking.a`, `2 * index + 1` where it plays `Docking.b`, and always even where the two roles look
-    the same. Unobserved poses have label -1.
+    A directed label says which docking an edge has as seen from one of its ends. It is `2 * index` if that end has the
+    role of `Docking.a`, `2 * index + 1` if it has that of `Docking.b`, and even if both roles look the same. Unobserved
+    poses have label -1.
 
-    `tolerance` is the largest displacement between poses of one docking, in the units of the kit: of the centroid,
-    and of a point half a diagonal away from it. Dockings that were never seen but follow from others have their own,
-    `Docking.slack`; only `fit` knows them.
+    tolerance: largest displacement between poses of one docking, in the units of the kit: of the centroid, and of a
+        point half a diagonal away from it
+
+    Dockings that were never observed but follow from others have their own tolerance, `Docking.slack`; only `fit` uses
+    them.
     """
 
     def __init__(self, types: Sequence[PartType], dockings: Sequence[Docking], tolerance: float) -> None:
@@ -65,11 +67,13 @@ class DockingTable:
 
     @classmethod
     def of(cls, kit: Kit) -> DockingTable:
-        """The dockings of a kit's grammar."""
+        """Return the dockings of a kit's grammar."""
         return cls(kit.types, kit.grammar.dockings, kit.pose_tolerance)
 
     def label(self, a: int, b: int, poses: FloatArray) -> IntArray:
-        """Directed labels int32 (m,), seen from the part of type `a`, of a part of type `b` at `poses` (m, 4, 4)."""
+        """Return the directed labels int32 (m,) of a part of type `b` at `poses` (m, 4, 4), seen from the part of type
+        `a`.
+        """
         if (a, b) not in self.images:
             return np.full(len(poses), -1, dtype=np.int32)
         from stages.shape.geometry.images import nearest_image
@@ -86,9 +90,11 @@ class DockingTable:
         self._fit_poses.setdefault((docking.a, docking.b), []).append(docking.pose)
 
     def fit(self, a: int, b: int, pose: FloatArray) -> tuple[int, int] | None:
-        """Directed labels of a docking that was never seen but holds for a part of type `b` at `pose` (4, 4) to one of
-        type `a`, seen from that part and from the other; the nearest for its slack, or None. The same from both
-        sides."""
+        """Return the directed labels of an unobserved docking that holds for a part of type `b` at `pose` (4, 4).
+
+        The labels are as seen from the part of type `a` and from the other. The docking nearest by its slack is taken;
+        None if there is none. Both sides give the same answer.
+        """
         forward = [(gap, index, 0) for gap, index in self._nearest_fit(a, b, pose)]
         backward = [(gap, index, 1) for gap, index in self._nearest_fit(b, a, invert(pose))]
         if not forward and not backward:
@@ -99,7 +105,7 @@ class DockingTable:
         return 2 * index + turned, 2 * index + 1 - turned
 
     def poses(self, a: int, b: int) -> FloatArray:
-        """All poses (k, 4, 4) in which a part of type `b` docks to one of type `a`, seen ones first."""
+        """Return all poses (k, 4, 4) in which a part of type `b` docks to one of type `a`, observed ones first."""
         if (a, b) not in self._poses:
             first, second = self.types[a], self.types[b]
             fits = [*self._fit_poses.get((a, b), ()), *map(invert, self._fit_poses.get((b, a), ()))]
@@ -109,7 +115,7 @@ class DockingTable:
         return self._poses[a, b][0]
 
     def nearest(self, a: int, b: int, pose: FloatArray) -> list[tuple[float, FloatArray]]:
-        """Of `poses` the one nearest to `pose` (4, 4), with the gap between them, if that is at most `reach`."""
+        """Return the pose of `poses` nearest to `pose` (4, 4) and the gap between them, if it is at most `reach`."""
         poses = self.poses(a, b)
         gaps = np.linalg.norm(self._poses[a, b][1] - pose_vectors(pose[None], self.types[b].diagonal / 2), axis=1)
         if not len(gaps) or gaps.min() > self.reach:
@@ -117,7 +123,7 @@ class DockingTable:
         return [(float(gaps.min()), poses[int(gaps.argmin())])]
 
     def _nearest_fit(self, a: int, b: int, pose: FloatArray) -> list[tuple[float, int]]:
-        """The fit of a pair of types, in this order, nearest to a pose, as its gap by its slack and its number."""
+        """Return the fit of an ordered pair of types nearest to a pose: its gap in units of slack, and its index."""
         vector = pose_vectors(pose[None], self.types[b].diagonal / 2)
         gaps = [
             (float(np.linalg.norm(images - vector, axis=1).min()) / slack, index)
@@ -126,7 +132,9 @@ class DockingTable:
         return [min(gaps)] if gaps and min(gaps)[0] <= 1.0 else []
 
     def label_edges(self, types: np.ndarray, poses: FloatArray, edges: IntArray) -> IntArray:
-        """Directed labels of all edges of an assembly, int32 (m, 2): seen from `edges[:, 0]` and from `edges[:, 1]`."""
+        """Return the directed labels of all edges of an assembly, int32 (m, 2): from `edges[:, 0]` and from `edges[:,
+        1]`.
+        """
         labels = np.empty((len(edges), 2), dtype=np.int32)
         for column in (0, 1):
             near, far = edges[:, column], edges[:, 1 - column]

@@ -18,11 +18,13 @@ def _gap(one, other):
 
 @numba.njit(cache=True)
 def distinct_images(vectors, labels, tolerance, same):
-    """The places int64 (k,) of the images `vectors`, float64 (n, 12), that are kept, in the order of their `labels`,
-    int32 (n,), which are changed.
+    """Return the indices of the images that are kept, int64 (k,), in the order of their labels.
 
-    An image within `same` of one that is kept is not. Where the nearest kept one within `tolerance` is of the same
-    docking, `label // 2`, an image gets its label, the lower one.
+    vectors: images as `pose_vectors`, float64 (n, 12)
+    labels: directed labels, int32 (n,), changed in place
+
+    An image within `same` of a kept one is dropped. If the nearest kept one within `tolerance` is of the same docking,
+    `label // 2`, an image gets its label, the lower one.
     """
     reach = 1.01 * max(tolerance, same)
     size = 1
@@ -58,8 +60,9 @@ def distinct_images(vectors, labels, tolerance, same):
 
 @numba.njit(cache=True)
 def nearest_image(known, vectors):
-    """For each of the `vectors` (m, 12) the place int64 (m,) of the nearest of the images `known` (n, 12), of which
-    there are some, and the gap float64 (m,) between them."""
+    """Return the index of the nearest of the images `known` (n, 12), n > 0, for each of the `vectors` (m, 12), and its
+    gap.
+    """
     places, gaps = np.empty(len(vectors), dtype=np.int64), np.empty(len(vectors))
     for number in range(len(vectors)):
         best, least = 0, np.inf

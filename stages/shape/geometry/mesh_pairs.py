@@ -1,8 +1,9 @@
 """Compiled kernels on pairs of triangle meshes: box trees, triangle distance, pairs within a tolerance.
 
-A mesh is a tuple `(corners, boxes, links)`: triangle corners float64 (f, 3, 3) in tree order, node boxes float64
-(k, 6) as centre and half extents, and node links int64 (k, 2): `(-first - 1, count)` for a leaf, else the indices
-of the two children. The root is node 0.
+A mesh is a tuple `(corners, boxes, links)`:
+corners: triangle corners in tree order, float64 (f, 3, 3)
+boxes: node boxes as centre and half extents, float64 (k, 6)
+links: int64 (k, 2), `(-first - 1, count)` for a leaf, else the indices of the two children; the root is node 0
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ Tree = tuple[FloatArray, FloatArray, np.ndarray]
 
 
 def build_tree(vertices: FloatArray, faces: IntArray) -> Tree:
-    """The box tree of a mesh: median split along the longest axis of the triangle centres."""
+    """Return the box tree of a mesh, by median split along the longest axis of the triangle centres."""
     corners = np.ascontiguousarray(vertices[faces])
     order, boxes, links = _split(corners.min(axis=1), corners.max(axis=1))
     return np.ascontiguousarray(corners[order]), boxes, links
@@ -27,7 +28,9 @@ def build_tree(vertices: FloatArray, faces: IntArray) -> Tree:
 
 @numba.njit(cache=True)
 def _split(low, high):
-    """Order of the triangles, boxes and links of the tree over triangles with these lowest and highest corners."""
+    """Return the order of the triangles, boxes and links of the tree over triangles with these lowest and highest
+    corners.
+    """
     count = len(low)
     order, centres = np.arange(count), (low + high) / 2
     boxes, links = np.empty((2 * count + 1, 6)), np.zeros((2 * count + 1, 2), dtype=np.int64)
@@ -71,7 +74,7 @@ def _dot(a, b):
 
 @numba.njit(cache=True)
 def _segment_distance2(p0, p1, q0, q1):
-    """Squared distance of two segments."""
+    """Return the squared distance of two segments."""
     d1x, d1y, d1z = p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]
     d2x, d2y, d2z = q1[0] - q0[0], q1[1] - q0[1], q1[2] - q0[2]
     rx, ry, rz = p0[0] - q0[0], p0[1] - q0[1], p0[2] - q0[2]
@@ -106,7 +109,7 @@ def _segment_distance2(p0, p1, q0, q1):
 
 @numba.njit(cache=True)
 def _inside_prism(p, tri, n):
-    """Whether `p` projects into the triangle `tri` with (unnormalised) normal `n`."""
+    """Return whether `p` projects into the triangle `tri` with (unnormalised) normal `n`."""
     for k in range(3):
         o, w = tri[k], tri[(k + 1) % 3]
         ex, ey, ez = w[0] - o[0], w[1] - o[1], w[2] - o[2]
@@ -129,7 +132,7 @@ def _normal(tri, out):
 
 @numba.njit(cache=True)
 def _plane_sides(n, length, origin, tri, out):
-    """Signed distances of the corners of `tri` to a plane, into `out`."""
+    """Write the signed distances of the corners of `tri` to a plane into `out`."""
     for k in range(3):
         out[k] = (
             n[0] * (tri[k, 0] - origin[0]) + n[1] * (tri[k, 1] - origin[1]) + n[2] * (tri[k, 2] - origin[2])
@@ -138,7 +141,9 @@ def _plane_sides(n, length, origin, tri, out):
 
 @numba.njit(cache=True)
 def _pierces(tri, sides, other, n):
-    """Whether an edge of `tri` passes through the interior of `other` (normal n); `sides` are its plane distances."""
+    """Return whether an edge of `tri` passes through the interior of `other` (normal n); `sides` are its plane
+    distances.
+    """
     hit = np.empty(3)
     for k in range(3):
         after = (k + 1) % 3
@@ -156,7 +161,7 @@ def _pierces(tri, sides, other, n):
 
 @numba.njit(cache=True)
 def _triangles_within(p, q, tolerance, np_, nq, sp, sq):
-    """Whether two triangles are at most `tolerance` apart or intersect; np_, nq, sp, sq are scratch (3,)."""
+    """Return whether two triangles are at most `tolerance` apart or intersect; np_, nq, sp, sq are scratch (3,)."""
     lp = _normal(p, np_)
     lq = _normal(q, nq)
     if lq > 0.0:
@@ -189,7 +194,7 @@ def _triangles_within(p, q, tolerance, np_, nq, sp, sq):
 
 @numba.njit(cache=True)
 def _boxes_apart(a, b, r, ar, t, tolerance):
-    """Whether box `a` and box `b` (moved by rotation `r`, translation `t`; `ar` = |r|) are surely apart."""
+    """Return whether box `a` and box `b`, moved by rotation `r` (`ar` = |r|) and translation `t`, are surely apart."""
     dx = r[0, 0] * b[0] + r[0, 1] * b[1] + r[0, 2] * b[2] + t[0] - a[0]
     dy = r[1, 0] * b[0] + r[1, 1] * b[1] + r[1, 2] * b[2] + t[1] - a[1]
     dz = r[2, 0] * b[0] + r[2, 1] * b[1] + r[2, 2] * b[2] + t[2] - a[2]
@@ -211,7 +216,7 @@ def _boxes_apart(a, b, r, ar, t, tolerance):
 
 @numba.njit(cache=True)
 def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, stop_at_first, pairs):
-    """Number of triangle pairs within tolerance; their indices go to `pairs` as far as it has rows."""
+    """Return the number of triangle pairs within tolerance. Their indices go to `pairs` as far as it has rows."""
     r = np.ascontiguousarray(pose[:3, :3])
     ar = np.abs(r) + 1e-12
     t = pose[:3, 3].copy()
@@ -258,12 +263,12 @@ _NO_PAIRS = np.empty((0, 2), dtype=np.int64)
 
 
 def first_contact(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> bool:
-    """Whether mesh `b`, moved by `pose` (4, 4) into the coordinates of mesh `a`, comes within `tolerance` of it."""
+    """Return whether mesh `b`, moved by `pose` (4, 4) into coordinates of mesh `a`, comes within `tolerance` of it."""
     return bool(_walk(*a, *b, pose, tolerance, True, _NO_PAIRS))
 
 
 def near_pairs(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> np.ndarray:
-    """All pairs of triangles within `tolerance`, int64 (p, 2) in tree order of `a` and `b`."""
+    """Return all pairs of triangles within `tolerance`, int64 (p, 2), in tree order of `a` and `b`."""
     pairs = np.empty((4096, 2), dtype=np.int64)
     found = _walk(*a, *b, pose, tolerance, False, pairs)
     if found > len(pairs):
@@ -274,11 +279,12 @@ def near_pairs(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> np.ndarr
 
 @numba.njit(cache=True)
 def contact_patches(ca, cb, pairs, pose, tolerance):
-    """Where mesh `b` touches mesh `a`: for each pair of near triangles the share of the first near the second.
+    """Find where mesh `b` touches mesh `a`: for each pair of near triangles the share of the first near the second.
 
-    Returns points float64 (q, 3), corners of the shares; area float64 (p,), the area of each share where the two
-    triangles are parallel within 8 degrees, else 0; crossing bool (p,), whether each triangle reaches to more than
-    twice the tolerance on both sides of the other's plane; all in coordinates of `a`.
+    Returns, in coordinates of `a`:
+    points: corners of the shares, float64 (q, 3)
+    area: area of each share if the two triangles are parallel within 8 degrees, else 0, float64 (p,)
+    crossing: whether each triangle reaches more than twice the tolerance to both sides of the other's plane, bool (p,)
     """
     r, t = pose[:3, :3], pose[:3, 3]
     points = np.empty((12 * len(pairs) + 1, 3))
@@ -341,7 +347,7 @@ def contact_patches(ca, cb, pairs, pose, tolerance):
 
 @numba.njit(cache=True)
 def _point_triangle_distance2(p, tri, n):
-    """Squared distance of a point and a triangle; n is scratch (3,)."""
+    """Return the squared distance of a point and a triangle; n is scratch (3,)."""
     length = _normal(tri, n)
     if length > 0.0 and _inside_prism(p, tri, n):
         h = (n[0] * (p[0] - tri[0, 0]) + n[1] * (p[1] - tri[0, 1]) + n[2] * (p[2] - tri[0, 2])) / length
@@ -354,7 +360,7 @@ def _point_triangle_distance2(p, tri, n):
 
 @numba.njit(cache=True)
 def points_on_surface(corners, boxes, links, points, tolerance):
-    """Whether every one of `points` (q, 3) lies within `tolerance` of the mesh."""
+    """Return whether all of `points` (q, 3) lie within `tolerance` of the mesh."""
     stack = np.empty(512, dtype=np.int64)
     n = np.empty(3)
     for index in range(len(points)):

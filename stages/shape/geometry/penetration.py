@@ -1,4 +1,4 @@
-"""How deep one posed part reaches into another, by ray casting (Open3D); slow and exact enough for verification."""
+"""Penetration depth of one posed part in another by ray casting (Open3D): slow, and exact enough for verification."""
 
 from __future__ import annotations
 
@@ -24,15 +24,18 @@ RAYS = np.array(
         [0.2182, -0.8729, -0.4364],
     ]
 )
-"""Directions in which a probe looks for surfaces, askew to what people model along."""
+"""Directions in which a probe looks for surfaces, oblique to common modelling axes."""
 MAJORITY_RAYS = len(RAYS) // 2 + 1
 BOX_ROUNDING_SHARE = 1e-9
-"""Points so near to a box, as a share of its size, are looked at once more."""
+"""Points this near to a box, as a share of its size, are tested again with exact coordinates."""
 
 
 def depth_bound(first: FloatArray, second: FloatArray) -> float:
-    """No point of a part in one box (2, 3) lies deeper in a part in the other than this: the least overlap of the
-    boxes among the axes along which neither holds the other, infinite where there is none."""
+    """Return an upper bound of the penetration depth of parts in two boxes (2, 3).
+
+    The bound is the least overlap of the boxes among the axes along which neither contains the other, infinite if there
+    is no such axis.
+    """
     overlap = np.minimum(first[1], second[1]) - np.maximum(first[0], second[0])
     nested = (first[0] - second[0]) * (first[1] - second[1]) <= 0
     return float(np.where(nested & (overlap > 0), np.inf, overlap).min())
@@ -48,19 +51,21 @@ class PenetrationTest:
         self._centres: dict[int, FloatArray] = {}
 
     def depth(self, a: int, b: int, pose: FloatArray, apart: bool = False) -> float:
-        """How far a part of type `b`, at `pose` (4, 4) in coordinates of a part of type `a`, and that part reach into
-        each other: the greatest distance to the other's surface of a point that lies inside the other.
+        """Return how far a part of type `b` at `pose` (4, 4) in coordinates of one of type `a` and that part penetrate.
 
-        The points are a regular sample of both surfaces; inside is decided by the majority of several rays, so a
-        mesh with holes has an inside where most rays see one. `apart`: their surfaces are known not to meet; then each
-        triangle is inside or outside as a whole, and where none is inside by one point of it, there is no depth.
+        The depth is the greatest distance to the other's surface of a point inside the other. Points sample both
+        surfaces regularly. The majority of several rays decides what is inside, so a mesh with holes has an inside
+        where most rays see one.
+
+        apart: whether their surfaces are known not to meet. Then each triangle is inside or outside as a whole, so one
+            point of each decides whether there is any depth.
         """
         if apart and not self._holds_any(a, b, pose) and not self._holds_any(b, a, invert(pose)):
             return 0.0
         return max(self._depth_of(a, b, pose), self._depth_of(b, a, invert(pose)))
 
     def _depth_of(self, index: int, other: int, pose: FloatArray) -> float:
-        """How deep points of a part of type `other`, at `pose`, lie in one of type `index`."""
+        """Return how deep points of a part of type `other` at `pose` lie in one of type `index`."""
         import open3d as o3d
 
         near = _inside_box(self._points(other), pose, self.types[index].bounds).astype(np.float32)
@@ -71,12 +76,12 @@ class PenetrationTest:
         return float(distances.max())
 
     def _holds_any(self, index: int, other: int, pose: FloatArray) -> bool:
-        """Whether the middle of any triangle of a part of type `other`, at `pose`, lies in one of type `index`."""
+        """Return whether the middle of any triangle of a part of type `other` at `pose` lies in one of type `index`."""
         near = _inside_box(self._middles(other), pose, self.types[index].bounds).astype(np.float32)
         return bool(self._inside(index, near).any())
 
     def _inside(self, index: int, points: np.ndarray) -> np.ndarray:
-        """Which of the points, float32 (p, 3), lie in a part of type `index`, bool (p,)."""
+        """Return which of the points, float32 (p, 3), lie in a part of type `index`, bool (p,)."""
         if len(points) == 0:
             return np.zeros(0, dtype=bool)
         scene = self._scene(index)
@@ -88,7 +93,7 @@ class PenetrationTest:
         return found
 
     def _odd(self, scene: Any, points: np.ndarray, directions: FloatArray) -> np.ndarray:
-        """Along how many of the `directions` (d, 3) each of the points (p, 3) sees an odd number of surfaces, (p,)."""
+        """Return along how many `directions` (d, 3) each of the points (p, 3) sees an odd number of surfaces, (p,)."""
         import open3d as o3d
 
         turned = np.tile(directions, (len(points), 1))
@@ -110,14 +115,14 @@ class PenetrationTest:
         return self._scenes[index]
 
     def _middles(self, index: int) -> FloatArray:
-        """The middles of the triangles of a type, a column each, float64 (3, f)."""
+        """Return the middles of the triangles of a type in columns, float64 (3, f)."""
         if index not in self._centres:
             part = self.types[index]
             self._centres[index] = np.ascontiguousarray(part.vertices[part.faces].mean(axis=1).T)
         return self._centres[index]
 
     def _points(self, index: int) -> FloatArray:
-        """The probes of a type, a column each, float64 (3, p)."""
+        """Return the probes of a type in columns, float64 (3, p)."""
         if index not in self._probes:
             part = self.types[index]
             corners = part.vertices[part.faces]
@@ -133,9 +138,9 @@ class PenetrationTest:
 
 
 def _inside_box(columns: FloatArray, pose: FloatArray, box: FloatArray) -> FloatArray:
-    """Those of the points `columns` (3, p), float64 (k, 3), that lie in a `box` (2, 3) once they are moved by `pose`.
+    """Return the points `columns` (3, p) that lie in a `box` (2, 3) once moved by `pose`, float64 (k, 3).
 
-    An axis at a time: a large part has hundreds of thousands, of which few are near.
+    Axes are tested one at a time: a large part has hundreds of thousands of points, and few are near.
     """
     slack = BOX_ROUNDING_SHARE * float(np.abs(box).max())
     for axis, (low, high) in enumerate(box.T):

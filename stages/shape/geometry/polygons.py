@@ -8,11 +8,14 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 
 THIN_CORNER_SHARE = 1e-7
+"""Corners that stand out by less than this share of the hull's length are left out."""
 
 
 @numba.njit(cache=True)
 def cut(polygon, count, n, sign, offset, out):
-    """The part of a polygon, its first `count` rows, where sign n . x <= offset, into `out`; its corner count."""
+    """Write the part of a polygon, its first `count` rows, where sign n . x <= offset, into `out`. Returns its corner
+    count.
+    """
     kept = 0
     for k in range(count):
         after = (k + 1) % count
@@ -31,7 +34,7 @@ def cut(polygon, count, n, sign, offset, out):
 
 @numba.njit(cache=True)
 def polygon_area(polygon, count):
-    """Area of a flat polygon in space, its first `count` rows."""
+    """Return the area of a flat polygon in space, its first `count` rows."""
     x, y, z = 0.0, 0.0, 0.0
     for k in range(1, count - 1):
         a, b = polygon[k] - polygon[0], polygon[k + 1] - polygon[0]
@@ -43,8 +46,10 @@ def polygon_area(polygon, count):
 
 @numba.njit(cache=True)
 def _chain(flat, order):
-    """One side of a convex hull from the first to the last of the points, which are in order, counter-clockwise;
-    without corners that stand out by less than THIN of its length."""
+    """Return one side of a convex hull from the first to the last of the ordered points, counter-clockwise.
+
+    Corners that stand out by less than THIN_CORNER_SHARE of its length are left out.
+    """
     hull = np.empty(len(order), dtype=np.int64)
     count = 0
     for index in order:
@@ -68,7 +73,9 @@ def _chain(flat, order):
 
 
 def convex_hull(flat: FloatArray) -> np.ndarray:
-    """Indices of the corners of the convex hull of points (q, 2), counter-clockwise; two for points in a line."""
+    """Return the indices of the corners of the convex hull of points (q, 2), counter-clockwise; two for collinear
+    points.
+    """
     order = np.lexsort((flat[:, 1], flat[:, 0]))
     if np.ptp(flat, axis=0).max() == 0:
         return order[:1]
@@ -76,8 +83,10 @@ def convex_hull(flat: FloatArray) -> np.ndarray:
 
 
 def inside_margin(flat: FloatArray, point: FloatArray) -> float:
-    """How far `point` (2,) lies inside the convex hull of points (q, 2), the distance to its nearest side; outside it
-    is the negative distance to the hull. Never above zero where the points lie in a line."""
+    """Return how far `point` (2,) lies inside the convex hull of points (q, 2): the distance to its nearest side.
+
+    Outside it is the negative distance to the hull. It is never positive for collinear points.
+    """
     hull = flat[convex_hull(flat)]
     ways = np.roll(hull, -1, axis=0) - hull
     lengths = np.maximum((ways**2).sum(axis=1), np.finfo(float).tiny)

@@ -7,11 +7,10 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 
 POSE_DECIMALS = 12
-"""So many of the numbers of a record are kept."""
 
 
 def invert(poses: FloatArray) -> FloatArray:
-    """Inverse of rigid transforms (..., 4, 4)."""
+    """Return the inverse of rigid transforms (..., 4, 4)."""
     rotation = np.swapaxes(poses[..., :3, :3], -1, -2)
     inverse = np.zeros_like(poses)
     inverse[..., :3, :3] = rotation
@@ -21,29 +20,29 @@ def invert(poses: FloatArray) -> FloatArray:
 
 
 def relative_poses(poses: FloatArray, edges: np.ndarray) -> FloatArray:
-    """Pose of part `edges[:, 1]` in the coordinates of part `edges[:, 0]`, (m, 4, 4)."""
+    """Return the pose of part `edges[:, 1]` in the coordinates of part `edges[:, 0]`, (m, 4, 4)."""
     relative: FloatArray = invert(poses[edges[:, 0]]) @ poses[edges[:, 1]]
     return relative
 
 
 def transform_points(pose: FloatArray, points: FloatArray) -> FloatArray:
-    """`points` (n, 3) moved by one rigid transform (4, 4)."""
+    """Return `points` (n, 3) moved by one rigid transform (4, 4)."""
     moved: FloatArray = points @ pose[:3, :3].T + pose[:3, 3]
     return moved
 
 
 def rotation_angle(pose: FloatArray) -> FloatArray:
-    """Angle of the rotation part of (..., 4, 4) in radians, in [0, pi]."""
+    """Return the angle of the rotation part of (..., 4, 4) in radians, in [0, pi]."""
     trace = np.trace(pose[..., :3, :3], axis1=-2, axis2=-1)
     angle: FloatArray = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
     return angle
 
 
 def pose_vectors(poses: FloatArray, length: float) -> FloatArray:
-    """Poses (n, 4, 4) as points (n, 12) of a Euclidean space in which distance means displacement.
+    """Return poses (n, 4, 4) as points (n, 12) of a Euclidean space in which distance means displacement.
 
-    The three translation entries are kept and the nine rotation entries are multiplied by `length`, so that two
-    poses that differ by a turn of `a` radians about the origin are about `length * a * sqrt(2)` apart.
+    The three translation entries are kept, and the nine rotation entries are multiplied by `length`. So two poses that
+    differ by a turn of `a` radians about the origin are about `length * a * sqrt(2)` apart.
     """
     vectors = np.empty((len(poses), 12))
     vectors[:, :3] = poses[:, :3, 3]
@@ -52,12 +51,12 @@ def pose_vectors(poses: FloatArray, length: float) -> FloatArray:
 
 
 def rounded(numbers: FloatArray) -> FloatArray:
-    """`numbers` as a record has them, without the noise of their last digits and without minus zeros."""
+    """Return `numbers` as records store them, without the noise of their last digits and without minus zeros."""
     return np.round(numbers, POSE_DECIMALS) + 0.0
 
 
 def rigid_fit(source: FloatArray, target: FloatArray) -> FloatArray:
-    """The rigid transform (4, 4) that moves `source` (n, 3) onto `target` (n, 3) with least squared error.
+    """Return the rigid transform (4, 4) that moves `source` (n, 3) onto `target` (n, 3) with least squared error.
 
     By SVD of the 3x3 covariance, without reflection (strings §4, docking transformation estimation).
     """

@@ -1,4 +1,4 @@
-"""Points and rotations: moving them, and whether two look the same."""
+"""Points and rotations in kernels: move them, and test whether two look the same."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 @numba.njit(cache=True)
 def same_rotation(symmetries, first, last, rotation, other, slack):
-    """Whether two rotations of a part look the same, entries within `slack` together; the symmetry or -1."""
+    """Return the symmetry by which two rotations of a part look the same, entries within `slack` together, or -1."""
     limit = slack * slack
     between = np.empty((3, 3))
     for i in range(3):
@@ -30,14 +30,14 @@ def same_rotation(symmetries, first, last, rotation, other, slack):
 
 @numba.njit(cache=True)
 def looks_same(kit, part_type, rotation, other):
-    """Whether two rotations of a part of a type look the same within the pose tolerance; the symmetry or -1."""
+    """Return the symmetry by which two rotations of a part of a type look the same within the pose tolerance, or -1."""
     first, last = kit.symmetry_starts[part_type], kit.symmetry_starts[part_type + 1]
     return same_rotation(kit.symmetries, first, last, rotation, other, kit.limits[0] / kit.reach[part_type])
 
 
 @numba.njit(cache=True)
 def part_at(translations, by_type, first, last, point, tolerance):
-    """Which of the parts `by_type[first:last]` stands at a point, or -1."""
+    """Return which of the parts `by_type[first:last]` is at a point, or -1."""
     limit = tolerance * tolerance
     for k in range(first, last):
         part = by_type[k]
@@ -48,21 +48,21 @@ def part_at(translations, by_type, first, last, point, tolerance):
 
 @numba.njit(cache=True)
 def squared_distance(p, q):
-    """The squared distance of two points."""
+    """Return the squared distance of two points."""
     x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]
     return x * x + y * y + z * z
 
 
 @numba.njit(cache=True)
 def transform(motion, point, out):
-    """Put a point, moved by a motion, into `out`."""
+    """Write a point moved by a rigid transform into `out`."""
     for i in range(3):
         out[i] = motion[i, 0] * point[0] + motion[i, 1] * point[1] + motion[i, 2] * point[2] + motion[3, i]
 
 
 @numba.njit(cache=True)
 def rotate(motion, rotation, out):
-    """Put the product of two rotations, of which that of a motion is the second, into `out`."""
+    """Write the product of a rotation and that of a rigid transform into `out`."""
     for i in range(3):
         for j in range(3):
             out[i, j] = motion[i, 0] * rotation[0, j] + motion[i, 1] * rotation[1, j] + motion[i, 2] * rotation[2, j]

@@ -1,4 +1,4 @@
-"""Rays and nearest points at all triangles of a shape, by Embree in Open3D: no display, no driver, one thread."""
+"""Rays and nearest points on the triangles of a shape, by Embree in Open3D: no display, no driver, one thread."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from stages.shape.shape import Shape
 
 
 class RayCaster:
-    """A shape as rays see it. Open3D counts in 32-bit numbers, so it is cast about the shape's middle."""
+    """Ray queries on a shape. Open3D uses 32-bit numbers, so coordinates are relative to the middle of the shape."""
 
     def __init__(self, shape: Shape) -> None:
         self._shape = shape
 
     @cached_property
     def triangles(self) -> tuple[FloatArray, IntArray]:
-        """Corners of all triangles, float64 (t, 3, 3), and the part that each belongs to, int32 (t,)."""
+        """Corners of all triangles, float64 (t, 3, 3), and the part of each, int32 (t,)."""
         assembly, meshes = self._shape.assembly, self._shape.meshes
         corners, parts = [], []
         for part, (kind, pose) in enumerate(zip(assembly.types.tolist(), assembly.poses, strict=True)):
@@ -34,19 +34,25 @@ class RayCaster:
         """The longest side of the box around all triangles."""
         return float(np.ptp(self.triangles[0].reshape(-1, 3), axis=0).max())
 
-    def hit(self, origins: FloatArray, directions: FloatArray, least: float = 0.0, most: float = np.inf) -> BoolArray:
-        """Which rays, float64 (n, 3), meet the shape between `least` and `most` lengths of their directions."""
+    def hit(
+        self, origins: FloatArray, directions: FloatArray, nearest: float = 0.0, farthest: float = np.inf
+    ) -> BoolArray:
+        """Return which rays hit the shape, bool (n,).
+
+        origins, directions: float64 (n, 3)
+        nearest, farthest: limits of the hit, in lengths of the directions
+        """
         scene, middle = self._scene
         rays = np.concatenate([origins - middle, directions], axis=1).astype(np.float32)
-        found: BoolArray = scene.test_occlusions(_tensor(rays), tnear=least, tfar=most, nthreads=1).numpy()
-        return found
+        hits: BoolArray = scene.test_occlusions(_tensor(rays), tnear=nearest, tfar=farthest, nthreads=1).numpy()
+        return hits
 
     def nearest(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The nearest of `triangles` of each point, int32 (n,), and how far it is, float64 (n,)."""
+        """Return the nearest triangle of each point, int32 (n,), and its distance, float64 (n,)."""
         scene, middle = self._scene
-        found = scene.compute_closest_points(_tensor((points - middle).astype(np.float32)), nthreads=1)
-        gaps = np.linalg.norm(found["points"].numpy().astype(np.float64) - (points - middle), axis=1)
-        return found["primitive_ids"].numpy().astype(np.int32), gaps
+        closest = scene.compute_closest_points(_tensor((points - middle).astype(np.float32)), nthreads=1)
+        gaps = np.linalg.norm(closest["points"].numpy().astype(np.float64) - (points - middle), axis=1)
+        return closest["primitive_ids"].numpy().astype(np.int32), gaps
 
     @cached_property
     def _scene(self) -> tuple[Any, FloatArray]:

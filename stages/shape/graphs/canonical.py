@@ -1,7 +1,7 @@
 """Canonical graphs: one order of the nodes, and one digest, for all drawings of the same coloured graph.
 
-Colour refinement tells most nodes of a shape graph apart. BLISS orders those that it leaves alike, on the subgraph
-where they differ by more than names; so both answers are exact, and nearly always the second step has little to do.
+Colour refinement tells most nodes of a shape graph apart. BLISS orders the remaining ones, on the subgraph where they
+differ by more than names. So both answers are exact, and the second step usually has little to do.
 """
 
 from __future__ import annotations
@@ -17,28 +17,32 @@ Indices = npt.NDArray[np.int64]
 
 
 def graph_digest(types: TypeArray, edges: IntArray) -> str:
-    """Hex sha256 of a graph with coloured nodes: equal exactly for isomorphic graphs.
+    """Return the hex sha256 of a graph with coloured nodes: equal exactly for isomorphic graphs.
 
-    types: int16 (n,); edges: int32 (m, 2), each edge once, in either direction. Raises ValueError as
-    `canonical_order` does.
+    types: int16 (n,)
+    edges: each edge once, in either direction, int32 (m, 2)
+
+    Raises ValueError as `canonical_order` does.
     """
     return _digest(types, edges, None)
 
 
 def docking_digest(types: TypeArray, edges: IntArray, labels: IntArray) -> str:
-    """Hex sha256 of a graph whose edges carry a label for each of their ends: equal exactly for isomorphic ones.
+    """Return the hex sha256 of a graph with a label at each end of its edges: equal exactly for isomorphic ones.
 
-    labels: int32 (m, 2), the label seen from `edges[:, 0]` and that seen from `edges[:, 1]` (docking configurations).
+    labels: label seen from `edges[:, 0]` and that from `edges[:, 1]` (docking configurations), int32 (m, 2)
     """
     return _digest(types, edges, labels)
 
 
 def canonical_order(types: TypeArray, edges: IntArray, edge_labels: IntArray | None = None) -> Indices:
-    """The nodes in canonical order, int64 (n,): isomorphic graphs, put in this order, are equal.
+    """Return the nodes in canonical order, int64 (n,): isomorphic graphs in this order are equal.
 
-    types: int16 (n,), colours of the nodes; edges: int32 (m, 2), each edge once; edge_labels: int32 (m, 2), labels of
-    each edge as seen from its two ends. Nodes of lower type come first. Raises ValueError for an edge to a node that
-    is not there, from a node to itself, or that stands twice.
+    types: colours of the nodes, int16 (n,); nodes of lower type come first
+    edges: each edge once, int32 (m, 2)
+    edge_labels: labels of each edge as seen from its two ends, int32 (m, 2)
+
+    Raises ValueError for an edge to a node that does not exist, from a node to itself, or given twice.
     """
     from stages.shape.graphs.refinement import refine
 
@@ -83,7 +87,7 @@ def _check_simple(n: int, pairs: Indices) -> None:
 
 
 def _arc_classes(m: int, labels: IntArray | None) -> tuple[Indices, Indices, int]:
-    """Class of the arc along each edge, class of the arc against it, and how many classes there are."""
+    """Return the class of the arc along each edge, the class of the arc against it, and the number of classes."""
     if labels is None:
         none = np.zeros(m, dtype=np.int64)
         return none, none, 1
@@ -99,10 +103,10 @@ def _arc_classes(m: int, labels: IntArray | None) -> tuple[Indices, Indices, int
 
 
 def _settle(order: Indices, start: Indices, pairs: Indices, forward: Indices, backward: Indices) -> Indices:
-    """`order` with the nodes inside each cell in canonical order too.
+    """Return `order` with the nodes inside each cell in canonical order too.
 
-    Where a cell touches all of another cell alike, or none of it, that relation says nothing about which node is
-    which; so BLISS sees only the relations that are neither, and only the nodes in them.
+    If a cell is connected to all of another cell alike, or to none of it, that relation does not tell nodes apart. So
+    BLISS sees only the other relations, and only their nodes.
     """
     n = len(order)
     cell = np.empty(n, dtype=np.int64)
@@ -125,20 +129,20 @@ def _settle(order: Indices, start: Indices, pairs: Indices, forward: Indices, ba
     sample[relation] = low_to_high
     differs = (low_to_high != sample[relation]) | ((a == b) & (high_to_low != low_to_high))
     same_kind[relation[differs]] = False
-    telling = ~(same_kind[relation] & (edges_of[relation] == possible))
-    if not telling.any():
+    informative = ~(same_kind[relation] & (edges_of[relation] == possible))
+    if not informative.any():
         return order
-    plain = same_kind[relation[telling]]
-    return _bliss(order, start, ends[telling], plain, low_to_high[telling], high_to_low[telling])
+    plain = same_kind[relation[informative]]
+    return _bliss(order, start, ends[informative], plain, low_to_high[informative], high_to_low[informative])
 
 
 def _bliss(
     order: Indices, start: Indices, edges: Indices, plain: npt.NDArray[np.bool_], along: Indices, against: Indices
 ) -> Indices:
-    """`order` with the nodes of `edges` in the canonical order of igraph's BLISS inside their cells.
+    """Return `order` with the nodes of `edges` in the canonical order of igraph's BLISS inside their cells.
 
-    Edges that are not `plain` carry classes, `along` and `against`: they get nodes of their own, coloured by them, one
-    where both classes are equal and two in a row where they are not.
+    Edges that are not `plain` carry classes, `along` and `against`. They get coloured nodes of their own: one if both
+    classes are equal, else two in a row.
     """
     import igraph
 

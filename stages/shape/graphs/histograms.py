@@ -1,4 +1,4 @@
-"""How unlike two shapes are by how many parts of each type they have (strings §5.3)."""
+"""Difference of two shapes by their numbers of parts of each type (strings §5.3)."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from typing import Any
 
 
 def histogram_metric(first: Any, second: Any) -> Any:
-    """E of histograms of types, (..., types) each, arrays of numpy or of torch that broadcast: (...), from 0 to 1.
+    """Return E of histograms of types, from 0 to 1, of shape (...).
 
-    The parts that one has and the other has not, as a share of the parts of both.
+    first, second: numpy or torch arrays (..., types) that broadcast
+
+    E is the number of parts that only one of the two has, as a share of the parts of both.
     """
     return abs(first - second).sum(-1) / (first.sum(-1) + second.sum(-1))

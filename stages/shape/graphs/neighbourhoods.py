@@ -2,18 +2,18 @@
 
 Each level admits all that the one before it admits:
 
-- `multiset`: the very multisets of neighbour types that were observed around the part's type;
-- `count_and_set`: as many neighbours, of the same set of types, as one observed multiset has; how many there are of
-  each type is free as long as there is one;
-- `count_and_pairs`: as many neighbours as some observed multiset has, of types such that each was observed around the
-  part's type and each two of them were observed around one part of it;
-- `count_and_types`: as many neighbours as some observed multiset has, of types such that each was observed around the
-  part's type. This is the published rule.
+- `multiset`: the multisets of neighbour types observed around the part's type;
+- `count_and_set`: as many neighbours, of the same set of types, as in one observed multiset; the number of each type is
+  free but not zero;
+- `count_and_pairs`: as many neighbours as some observed multiset, of types such that each was observed around the
+  part's type and each two of them around one part of it;
+- `count_and_types`: as many neighbours as some observed multiset, of types that were each observed around the part's
+  type. This is the published rule.
 
-Beside them stand the levels of slots, which ask for poses (`stages.shape.graphs.slots`); of a shape's graph alone only
-this much of them can be told, that each neighbour's type was observed around the part's type.
+The levels of slots need poses (`stages.shape.graphs.slots`). A shape's graph alone shows only that each neighbour's
+type was observed around the part's type.
 
-Hub types stand outside: a hub may have any neighbours, and hubs do not count among the neighbours of other parts.
+Hub types are exempt: a hub may have any neighbours, and hubs do not count among the neighbours of other parts.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from itertools import combinations
 from stages.shape.kit import Grammar, Multiset, Strictness
 
 STRICTNESS: tuple[Strictness, ...] = ("multiset", "count_and_set", "count_and_pairs", "count_and_types")
-"""The levels, the strictest first."""
+"""The levels without slots, the strictest first."""
 SLOT_LEVELS: tuple[Strictness, ...] = ("slot_pairs", "slot_fillings", "slots")
 """The levels of slots, the strictest first."""
 
 
 def admits(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
-    """Whether a part of type `part_type` may have these `neighbours`, hubs among them left out of account."""
+    """Return whether a part of type `part_type` may have these `neighbours`, hubs among them ignored."""
     if part_type in grammar.hubs:
         return True
     counted = tuple((other, count) for other, count in neighbours if other not in grammar.hubs)
@@ -52,8 +52,10 @@ def admits(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
 
 
 def admits_superset(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
-    """Whether a part of type `part_type` may have these `neighbours` and, it may be, others: what a graph that leaves
-    out contacts can show of it."""
+    """Return whether a part of type `part_type` may have these `neighbours`, possibly with others.
+
+    This is what a graph that leaves out contacts can show.
+    """
     if part_type in grammar.hubs:
         return True
     counts = {other: count for other, count in neighbours if other not in grammar.hubs}

@@ -1,4 +1,4 @@
-"""The local patterns of a kit: what was seen around its parts, pose by pose, modulo their symmetries (strings §3)."""
+"""The local patterns of a kit: poses observed around its parts, modulo their symmetries (strings §3)."""
 
 from __future__ import annotations
 
@@ -13,14 +13,19 @@ from stages.shape.geometry.pose import invert
 from stages.shape.kit import Kit, PartType
 
 MAX_UP_DIFFERENCE = 0.02
-"""Ways up that differ by less, as unit vectors, are one."""
+"""Up directions that differ by less, as unit vectors, are one."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """What stands around a part of type `part_type`: parts of `types` int64 (n,) at `poses` float64 (n, 4, 4) in its
-    coordinates, ordered by type and docking; `up` float64 (3,) is what was up there; `seen` says how often, `owner` in
-    which exemplar first."""
+    """What surrounds a part of type `part_type`, in its coordinates.
+
+    types: types of the neighbours, ordered by type and docking, int64 (n,)
+    poses: their poses, float64 (n, 4, 4)
+    up: direction that was up, float64 (3,)
+    seen: how often the pattern was observed
+    owner: first exemplar that shows it
+    """
 
     part_type: int
     types: np.ndarray
@@ -31,9 +36,10 @@ class Pattern:
 
 
 def observed_patterns(kit: Kit, dockings: DockingTable, upright: bool) -> list[Pattern]:
-    """The patterns of all parts of the exemplars, each once, in the order of their types.
+    """Return the patterns of all parts of the exemplars, each once, in the order of their types.
 
-    dockings: those of the kit. With `upright` patterns that differ only in which way is up are two.
+    dockings: those of the kit
+    upright: whether patterns that differ only in which way is up are two
     """
     axis = {"y": 1, "z": 2}[kit.up]
     found: dict[tuple[int, ...], list[Pattern]] = {}
@@ -70,7 +76,7 @@ def observed_patterns(kit: Kit, dockings: DockingTable, upright: bool) -> list[P
 
 
 def _same(kit: Kit, first: Pattern, second: Pattern, upright: bool) -> bool:
-    """Whether one pattern is the other, turned by a symmetry of the part in the middle."""
+    """Return whether one pattern is the other, turned by a symmetry of the part in the middle."""
     turns = kit.types[first.part_type].symmetries[:, :3, :3]
     if upright:
         turns = turns[np.linalg.norm(turns @ first.up - second.up, axis=1) < MAX_UP_DIFFERENCE]
@@ -96,6 +102,6 @@ def _looks_same(part_type: PartType, rotation: FloatArray, other: FloatArray, li
 
 
 def unique_pattern_share(patterns: Sequence[Pattern]) -> float:
-    """The share of the exemplars' parts whose pattern no other part shows: it foretells how much growth copies."""
+    """Return the share of exemplar parts whose pattern no other part shows: it predicts how much growth copies."""
     total = sum(pattern.seen for pattern in patterns)
     return sum(pattern.seen == 1 for pattern in patterns) / total

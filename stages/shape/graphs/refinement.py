@@ -12,8 +12,13 @@ import numpy as np
 
 
 class _Partition(NamedTuple):
-    """Nodes in cells, all int64 (n,): the `order` of the nodes, cell by cell; the `position` of each node in it; by
-    position where its cell begins, its `start`; where a cell begins its `size`."""
+    """Nodes in cells, all int64 (n,).
+
+    order: nodes, cell by cell
+    position: position of each node in `order`
+    start: by position, where its cell begins
+    size: size of the cell, where a cell begins
+    """
 
     order: np.ndarray
     position: np.ndarray
@@ -23,14 +28,16 @@ class _Partition(NamedTuple):
 
 @numba.njit(cache=True)
 def refine(colors, edges, forward, backward, classes):
-    """The equitable refinement of a colouring: `(order, start)`, both int64 (n,).
+    """Return the equitable refinement of a colouring: `(order, start)`, both int64 (n,).
 
-    Nodes of one cell have, for each cell and each class of arc, equally many neighbours in that cell over arcs of
-    that class. `order` lists the nodes cell by cell; `start[k]` is the position at which the cell of `order[k]`
-    begins. Isomorphic graphs get the same cells in the same order; the order inside a cell means nothing.
+    colors: int64 (n,)
+    edges: a simple graph, int64 (m, 2)
+    forward, backward: class (0 to `classes` - 1) of the arc from `edges[:, 0]` to `edges[:, 1]`, and of the arc back,
+        int64 (m,)
 
-    colors: int64 (n,); edges: int64 (m, 2), a simple graph; forward, backward: int64 (m,), the class (0 to
-    `classes` - 1) of the arc from `edges[:, 0]` to `edges[:, 1]`, and of the arc back.
+    Nodes of one cell have, for each cell and each class of arc, equally many neighbours in that cell over arcs of that
+    class. `order` lists the nodes cell by cell. `start[k]` is the position at which the cell of `order[k]` begins.
+    Isomorphic graphs get the same cells in the same order. The order inside a cell means nothing.
     """
     n, m = len(colors), len(edges)
     first, source, kind = _arcs(n, edges, forward, backward)
@@ -82,8 +89,9 @@ def refine(colors, edges, forward, backward, classes):
 
 @numba.njit(cache=True)
 def _arcs(n, edges, forward, backward):
-    """The arcs into each node: those into `v` come from `source[first[v]:first[v + 1]]` and are of the classes `kind`
-    there."""
+    """Return the arcs into each node: those into `v` come from `source[first[v]:first[v + 1]]` with the classes `kind`
+    there.
+    """
     m = len(edges)
     first = np.zeros(n + 1, dtype=np.int64)
     for k in range(m):
@@ -105,7 +113,7 @@ def _arcs(n, edges, forward, backward):
 
 @numba.njit(cache=True)
 def _partition(colors):
-    """The cells of a colouring, by colour."""
+    """Return the cells of a colouring, by colour."""
     n = len(colors)
     order = np.argsort(colors, kind="mergesort")
     position = np.empty(n, dtype=np.int64)
@@ -120,7 +128,7 @@ def _partition(colors):
 
 @numba.njit(cache=True)
 def _wait(queue, waiting, head, queued, cell):
-    """Put a cell at the end of the ring `queue`; returns how many wait."""
+    """Put a cell at the end of the ring `queue`. Returns the number of waiting cells."""
     waiting[cell] = True
     queue[(head + queued) % len(queue)] = cell
     return queued + 1
@@ -128,9 +136,10 @@ def _wait(queue, waiting, head, queued, cell):
 
 @numba.njit(cache=True)
 def _arcs_by_class(nodes, first, source, kind, members, newest, used):
-    """List the arcs into `nodes` by their classes: their sources go to `members[0]`, the last one of a class at
-    `newest` and the one before each at `members[1]`, or -1. Returns how many classes there are; they are `used`,
-    ascending."""
+    """List the arcs into `nodes` by their classes. Returns the number of classes; they are `used`, ascending.
+
+    Sources go to `members[0]`, the last one of a class at `newest`, and the one before each at `members[1]`, or -1.
+    """
     member, older = members
     arcs, kinds = 0, 0
     for v in nodes:
@@ -149,8 +158,11 @@ def _arcs_by_class(nodes, first, source, kind, members, newest, used):
 
 @numba.njit(cache=True)
 def _touch(partition, members, arc, count, touched, moved, parted):
-    """Count, in `count`, the arcs of the list that begins at `arc` by the nodes they come from, and bring these to the
-    end of their cells, `moved` of each. Returns how many nodes are `touched` and how many cells `parted`, ascending."""
+    """Count the arcs of the list that begins at `arc` by their source nodes, and move these to the end of their cells.
+
+    `count` holds the counts by node, `moved` the number of moved nodes by cell. Returns the number of `touched` nodes
+    and of `parted` cells, ascending.
+    """
     order, position, start, size = partition
     member, older = members
     reached, broken = 0, 0
@@ -177,8 +189,10 @@ def _touch(partition, members, arc, count, touched, moved, parted):
 
 @numba.njit(cache=True)
 def _split(partition, count, cell, low):
-    """Cut a cell wherever the count of its nodes changes, the first of which is counted at `low`. Returns the number
-    of pieces and where the largest starts, the first of those alike."""
+    """Cut a cell wherever the count of its nodes changes; the first counted node is at `low`.
+
+    Returns the number of pieces and where the largest starts, the first of equals.
+    """
     order, _, start, size = partition
     end = cell + size[cell]
     begin, largest, pieces = cell, cell, 1

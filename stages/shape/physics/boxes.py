@@ -1,4 +1,4 @@
-"""Compiled kernels on oriented boxes: distance, depth, overlap volume and contact polygon, all in closed form.
+"""Compiled kernels on oriented boxes: distance, depth, overlap volume and contact polygon in closed form.
 
 Boxes are centres float64 (n, 3), axes float64 (n, 3, 3) with one unit axis a row, and half extents float64 (n, 3).
 """
@@ -14,25 +14,25 @@ from stages.shape.geometry.polygons import cut, polygon_area
 SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 EDGES = np.array([[a, b] for a in range(8) for b in range(a + 1, 8) if np.abs(SIGNS[a] - SIGNS[b]).sum() == 2])
 RIGHT_ANGLE_TOLERANCE = 1e-5
-"""Corners of a box are as near as this, as a share of its diagonal, to where the corners of a true box would be."""
+"""Largest distance of the corners of a box from those of a true box, as a share of its diagonal."""
 EDGE_AXIS_MARGIN = 1e-3
-"""Boxes a little askew touch with their faces all the same: edges must part them by this share of their size more."""
+"""Slightly tilted boxes still touch with their faces: an edge axis must separate them by this share of their size more.
+"""
 SHRINK_SHARE = 1e-9
-"""One of two boxes is smaller by this share of the other's size where they are cut with each other, so that no face
-of one lies in a face of the other."""
+"""One of two boxes is shrunk by this share of the other's size before cutting, so that none of their faces coincide."""
 
 
 def box_corners(centres: FloatArray, axes: FloatArray, halves: FloatArray) -> FloatArray:
-    """The corners of boxes, float64 (n, 8, 3)."""
+    """Return the corners of boxes, float64 (n, 8, 3)."""
     corners: FloatArray = centres[:, None] + np.einsum("ks,ns,nsc->nkc", SIGNS, halves, axes)
     return corners
 
 
 def recognise_boxes(corners: FloatArray) -> tuple[BoolArray, FloatArray, FloatArray, FloatArray]:
-    """Which sets of eight points (n, 8, 3), in any order, are the corners of a box, bool (n,), and the boxes.
+    """Return which sets of eight points (n, 8, 3), in any order, are the corners of a box, bool (n,), and the boxes.
 
-    The shortest way from a corner to another is an edge; of those square to it the shortest is an edge, and of those
-    square to both the third. What is not a box has a meaningless one.
+    The shortest way from a corner to another is an edge. The shortest of those perpendicular to it is the second edge,
+    and of those perpendicular to both the third. A set that is not a box gets a meaningless one.
     """
     count = len(corners)
     every = np.arange(count)

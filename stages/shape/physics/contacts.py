@@ -1,4 +1,4 @@
-"""Which parts are connected, how deep they reach into each other, and the patches on which they press."""
+"""Which parts are connected, how deep they penetrate, and the patches on which they press."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from stages.shape.kit import PartMesh
 from stages.shape.physics.solids import MeshSolids, PlacedParts
 
 POSE_STEP_SHARE = 1e-6
-"""Poses are asked about on a grid of this share of the smaller part's diagonal, so that answers can be kept."""
+"""Grid of poses in cached queries, as a share of the smaller part's diagonal."""
 MAX_CACHED_ANSWERS = 100_000
 
 
@@ -23,8 +23,10 @@ MAX_CACHED_ANSWERS = 100_000
 class ContactPatches:
     """Points at which bodies press on each other.
 
-    first, second: int (q,), the bodies of each point, `second` is -1 for the ground; patch: int (q,), which points
-    belong to one joint; points: float64 (q, 3); normals: float64 (q, 3), unit, from the second body to the first.
+    first, second: bodies of each point, int (q,); `second` is -1 for the ground
+    patch: joint of each point, int (q,)
+    points: float64 (q, 3)
+    normals: unit, from the second body to the first, float64 (q, 3)
     """
 
     first: np.ndarray
@@ -35,7 +37,7 @@ class ContactPatches:
 
 
 class PairContacts:
-    """Answers about pairs of posed parts with given meshes; what recurs is looked up."""
+    """Queries about pairs of posed parts with given meshes. Recurring answers are cached."""
 
     def __init__(self, meshes: Sequence[PartMesh], solids: MeshSolids) -> None:
         self.meshes = tuple(meshes)
@@ -44,27 +46,30 @@ class PairContacts:
         self._answers: dict[tuple[Any, ...], Any] = {}
 
     def connected(self, placed: PlacedParts, distance: float, known: IntArray) -> IntArray:
-        """Pairs of parts that overlap or are at most `distance` apart, int32 (m, 2), i < j in lexicographic order.
+        """Return pairs of parts that overlap or are at most `distance` apart, int32 (m, 2), i < j in lexicographic
+        order.
 
-        `known`: pairs of which that is known. A part that lies wholly inside another is connected to it.
+        known: pairs known to be connected
+
+        A part that lies wholly inside another is connected to it.
         """
         from stages.shape.physics.boxes import boxes_within
 
         pairs = overlapping_boxes(placed.spans, distance)
         if not len(pairs):
             return pairs
-        found = _listed(pairs, known, len(placed))
+        is_connected = _listed(pairs, known, len(placed))
         plain = _both_boxes(placed, pairs)
-        asked = plain & ~found
-        found[asked] = boxes_within(placed.centres, placed.axes, placed.halves, pairs[asked], distance)
-        asked = ~plain & ~found
-        found[asked] = [self._near(placed, i, j, distance) for i, j in pairs[asked].tolist()]
-        return pairs[found]
+        unknown = plain & ~is_connected
+        is_connected[unknown] = boxes_within(placed.centres, placed.axes, placed.halves, pairs[unknown], distance)
+        unknown = ~plain & ~is_connected
+        is_connected[unknown] = [self._near(placed, i, j, distance) for i, j in pairs[unknown].tolist()]
+        return pairs[is_connected]
 
     def overlaps(self, placed: PlacedParts, pairs: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Volume that the parts of each pair share and how deep they reach into each other, float64 (m,) each.
+        """Return the shared volume and the penetration depth of each pair, float64 (m,) each.
 
-        Exact for two boxes; on lines through the parts otherwise; 0 where a mesh is open.
+        Exact for two boxes, else measured on lines through the parts; 0 if a mesh is open.
         """
         from stages.shape.physics.boxes import overlap_volumes, separations
 
@@ -77,8 +82,10 @@ class PairContacts:
         return volumes, depths
 
     def patches(self, placed: PlacedParts, pairs: IntArray, tolerance: float) -> tuple[ContactPatches, BoolArray]:
-        """The patches between the parts of `pairs`, and which pairs are interlocked, bool (m,): near each other with
-        no face or edge of one on a face of the other."""
+        """Return the patches between the parts of `pairs`, and which pairs are interlocked, bool (m,).
+
+        Interlocked parts are near each other, but no face or edge of one lies on a face of the other.
+        """
         from stages.shape.physics.boxes import box_contacts
 
         plain = np.flatnonzero(_both_boxes(placed, pairs))
@@ -113,7 +120,7 @@ class PairContacts:
         return self._trees[mesh]
 
     def _question(self, placed: PlacedParts, i: int, j: int) -> tuple[int, int, FloatArray, bytes]:
-        """Meshes, the pose of part j in coordinates of part i on a grid, and what to remember it by."""
+        """Return the meshes, the pose of part j in coordinates of part i on a grid, and the cache key of the pose."""
         a, b = int(placed.types[i]), int(placed.types[j])
         pose = relative_poses(placed.poses, np.array([[i, j]]))[0]
         step = POSE_STEP_SHARE * min(self.meshes[a].diagonal, self.meshes[b].diagonal)
@@ -160,8 +167,11 @@ class PairContacts:
         return remembered
 
     def _patch(self, placed: PlacedParts, i: int, j: int, tolerance: float) -> tuple[bool, FloatArray, FloatArray]:
-        """Whether the parts are within `tolerance`, corners of the patches between them, and normals out of part i;
-        in its coordinates."""
+        """Return whether the parts are within `tolerance`, the corners of the patches between them, and normals out of
+        part i.
+
+        All are in coordinates of part i.
+        """
         from stages.shape.geometry.mesh_pairs import near_pairs
         from stages.shape.geometry.pose import invert
         from stages.shape.physics.patches import facing_polygons, flat_hulls, touching_edges
@@ -176,7 +186,7 @@ class PairContacts:
         closed = bool(self.solids.closed[a] and self.solids.closed[b])
         points, normals = facing_polygons(corners_a, corners_b, pairs, pose, tolerance, closed)
         if not closed:
-            # A surface without an inside has no outside: the normal leads from one part to the other.
+            # An open surface has no outside: the normal leads from one part to the other.
             way = pose[:3, :3] @ self.solids.centroids[b] + pose[:3, 3] - self.solids.centroids[a]
             normals = normals * np.where(normals @ way < 0, -1.0, 1.0)[:, None]
         if not len(points) and len(pairs):
@@ -195,7 +205,7 @@ def _both_boxes(placed: PlacedParts, pairs: IntArray) -> BoolArray:
 
 
 def _listed(pairs: IntArray, known: IntArray, count: int) -> BoolArray:
-    """Which of `pairs` are among the pairs `known`, bool (m,)."""
+    """Return which of `pairs` are among the pairs `known`, bool (m,)."""
     listed: BoolArray = np.isin(
         pairs[:, 0] * np.int64(count) + pairs[:, 1], known[:, 0] * np.int64(count) + known[:, 1]
     )

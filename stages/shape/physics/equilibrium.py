@@ -1,11 +1,11 @@
 """Equilibrium of rigid bodies that press and rub on each other, as linear programmes.
 
-Each contact point bears any force in its friction cone, cut down to a pyramid inside it, so what is found to stand
-does so with the round cone too: between the directions friction counts up to 8 % too weak in joints, where it is exact
-along the slope and across it, and up to 1 % on the ground. A glued joint bears pull up to a limit: then the cone
-begins that far behind. Bodies are rigid and joints do not crush, so this is limit analysis: what falls by it falls by
-a mechanism of rigid bodies, which the dual solution tells. Because joints do not open as they slide (no dilatancy),
-limit analysis may call a shape stable that could slide; a simulation also moves, so it sees shapes settle elsewhere.
+Each contact point bears any force in its friction cone, replaced by an inscribed pyramid. So a shape found stable is
+stable with the round cone too. Between the directions of the pyramid friction is up to 8 % too weak in joints, where it
+is exact along the slope and across it, and up to 1 % on the ground. A glued joint bears pull up to a limit: then the
+cone begins that far behind. Bodies are rigid and joints do not crush. This is limit analysis: a shape fails by a
+mechanism of rigid bodies, given by the dual solution. Joints do not open as they slide (no dilatancy), so limit
+analysis may call a shape stable that could slide. A simulation moves bodies and so sees shapes settle elsewhere.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from stages.shape.physics.contacts import ContactPatches
 JOINT_DIRECTIONS = 8
 """Sides of the friction pyramid of a joint."""
 GROUND_DIRECTIONS = 24
-"""Sides of the friction pyramid on the ground, where slopes tell nothing of the way in which things slide."""
+"""Sides of the friction pyramid on the ground, where slopes do not give the direction of sliding."""
 MAX_HIGHS_COLUMNS = 4_000
-"""Programmes of together so many columns are given to HiGHS."""
+"""Programmes with up to this many columns in total are solved by HiGHS."""
 MAX_HIGHS_ITERATIONS = 20_000
-"""Iterations after which HiGHS gives up."""
 MIN_WEIGHT_SHARE = 1e-8
-"""Bodies lighter than this share of the heaviest count as that heavy where equations are scaled."""
+"""Lighter bodies count as this share of the heaviest in the scaling of equations."""
 STEADY_LOAD_WEIGHT = 100.0
-"""Worth of the steady load beside that of a growing one."""
+"""Cost of the steady load relative to that of a growing one."""
 BORNE_TOLERANCE = 1e-5
-"""A load is borne if this share of it is not left over."""
+"""A load is borne if at most this share of it is left over."""
 
 
 @dataclass(frozen=True)
 class LoadLimits:
     """How far loads can grow.
 
-    factors: float64 (loads,), the greatest factor up to the cap at which there is equilibrium, all -1 where there is
-    none even at 0, or none that a solver finds; motions: float64 (loads, n, 6), how each body begins to move,
-    displacement of its centre and turn, when the load grows beyond that; 0 where the cap was reached.
+    factors: greatest factor up to the cap with equilibrium, float64 (loads,); all -1 if there is none even at 0, or no
+        solver finds one
+    motions: how each body begins to move when the load grows beyond that, displacement of its centre and turn, float64
+        (loads, n, 6); 0 if the cap was reached
     """
 
     factors: FloatArray
@@ -56,11 +56,13 @@ def load_limits(
     azimuth: float,
     cap: float = 1.0,
 ) -> LoadLimits:
-    """The greatest factor, at most `cap`, by which each of the loads `growing` can be borne beside the `steady` load.
+    """Return the greatest factor, at most `cap`, by which each load of `growing` can be borne in addition to `steady`.
 
-    centres: float64 (n, 3), where the torques on each body are about; steady: float64 (n, 6), force and torque on each
-    body; growing: float64 (loads, n, 6); pull: float64 (q,), the pull that each contact point bears; azimuth: radians,
-    where the friction directions on level ground are counted from.
+    centres: point of each body about which torques are counted, float64 (n, 3)
+    steady: force and torque on each body, float64 (n, 6)
+    growing: float64 (loads, n, 6)
+    pull: pull that each contact point bears, float64 (q,)
+    azimuth: origin of the friction directions on level ground, radians
     """
     ground = patches.second < 0
     parts = [
@@ -85,8 +87,10 @@ def load_limits(
 
 
 def _solved(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float) -> LoadLimits:
-    """One body by the simplex method on its six equations, small programmes by HiGHS, large ones by the interior point
-    method for bodies; each by another if it fails."""
+    """Solve one body by the simplex method, small programmes by HiGHS, and large ones by the interior point method.
+
+    If a method fails, another takes over.
+    """
     if len(load) == 1:
         found = _by_tableau(wrenches, bodies, load, growing, cap)
         if found is not None:
@@ -97,8 +101,8 @@ def _solved(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing:
             return found
     factors, motions = np.full(len(growing), -1.0), np.zeros_like(growing)
     for index in range(len(growing)):
-        one = growing[index : index + 1]
-        found = _by_interior_point(wrenches, bodies, load, one, cap) or _by_highs(wrenches, bodies, load, one, cap)
+        single = wrenches, bodies, load, growing[index : index + 1], cap
+        found = _by_interior_point(*single) or _by_highs(*single)
         if found is None or found.factors[0] < 0:
             return LoadLimits(np.full(len(growing), -1.0), motions)
         factors[index], motions[index] = found.factors[0], found.motions[0]
@@ -108,7 +112,7 @@ def _solved(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing:
 def _by_tableau(
     wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float
 ) -> LoadLimits | None:
-    """All loads on one body, which nothing but the ground bears. None where the method fails."""
+    """Solve all loads on one body, which only the ground bears. Returns None if the method fails."""
     from stages.shape.physics.tableau import grow_loads
 
     edges = np.where((bodies >= 0)[:, :, None], wrenches, 0.0).sum(axis=1).T
@@ -122,8 +126,10 @@ def _by_tableau(
 def _by_highs(
     wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float
 ) -> LoadLimits | None:
-    """All loads as one programme of independent blocks: a call costs more than a small programme. None where HiGHS
-    finds no answer."""
+    """Solve all loads as one programme of independent blocks. Returns None if HiGHS finds no answer.
+
+    A call costs more than a small programme.
+    """
     from scipy import sparse
     from scipy.optimize import linprog
 
@@ -157,8 +163,11 @@ def _by_highs(
 def _by_interior_point(
     wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float
 ) -> LoadLimits | None:
-    """One load. The steady load has a factor of its own, at most 1, that counts far more than the growing one: so
-    there always is a solution, and the steady load is borne where that factor is 1. None where the method fails."""
+    """Solve one load. Returns None if the method fails.
+
+    The steady load has a factor of its own, at most 1, with a far greater cost than the growing one. So there is always
+    a solution, and the steady load is borne if that factor is 1.
+    """
     from stages.shape.physics.interior import solve_interior
 
     loads = np.stack([-load.ravel(), growing.ravel()])
@@ -173,10 +182,10 @@ def _by_interior_point(
 
 
 def _cone(normals: FloatArray, friction: float, azimuth: float, directions: int) -> FloatArray:
-    """The edges of the friction pyramid of each contact, float64 (q, directions, 3).
+    """Return the edges of the friction pyramid of each contact, float64 (q, directions, 3).
 
-    The first direction is level and one at a right angle the steepest, so that friction is exact on a slope; where
-    the contact itself is level they are counted from `azimuth`. Both turn with the shape about the vertical.
+    The first direction is level and one perpendicular to it the steepest, so friction is exact on a slope. If the
+    contact itself is level, directions are counted from `azimuth`. Both turn with the shape about the vertical.
     """
     level = np.stack([-normals[:, 1], normals[:, 0], np.zeros(len(normals))], axis=1)
     lengths = np.linalg.norm(level, axis=1)
@@ -194,7 +203,7 @@ def _cone(normals: FloatArray, friction: float, azimuth: float, directions: int)
 def _wrenches(
     first: np.ndarray, second: np.ndarray, points: FloatArray, centres: FloatArray, forces: FloatArray
 ) -> tuple[FloatArray, np.ndarray]:
-    """What each edge of each cone does to its two bodies, float64 (c, 2, 6), and the bodies, int64 (c, 2)."""
+    """Return the wrench of each cone edge on its two bodies, float64 (c, 2, 6), and the bodies, int64 (c, 2)."""
     bodies = np.stack([first, second], axis=1).astype(np.int64)
     arms = points[:, None] - centres[bodies]
     both = np.array([1.0, -1.0])[:, None] * forces[:, :, None]
@@ -203,7 +212,7 @@ def _wrenches(
 
 
 def _glue(patches: ContactPatches, centres: FloatArray, pull: FloatArray) -> FloatArray:
-    """The load on each body, float64 (n, 6), of the pull of all glue at its limit."""
+    """Return the load on each body, float64 (n, 6), of all glue at its limit."""
     load = np.zeros((len(centres), 6))
     for bodies, sign in ((patches.first, -1.0), (patches.second, 1.0)):
         own = bodies >= 0

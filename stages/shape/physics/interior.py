@@ -1,9 +1,9 @@
 """A solver for the linear programmes of large assemblies: a primal-dual interior point method on a banded matrix.
 
-HiGHS takes minutes for the ten programmes of a vault of 200 blocks. What they are made of is simple: every column
-acts on two bodies at most, so the matrix of the normal equations has a block of 6 x 6 for each pair that touches, and
-once bodies are ordered along the structure it is a band, which LAPACK factors in milliseconds (with one thread; several
-that wait for each other on a busy machine take a hundred times as long, see pipeline.workers).
+HiGHS takes minutes for the ten programmes of a vault of 200 blocks. Every column acts on at most two bodies, so the
+matrix of the normal equations has a block of 6 x 6 for each pair that touches. With bodies ordered along the structure
+it is a band, which LAPACK factors in milliseconds on one thread. Several threads on a busy machine take a hundred times
+as long (see pipeline.workers).
 """
 
 from __future__ import annotations
@@ -17,30 +17,32 @@ from stages.shape.arrays import FloatArray
 
 MAX_ITERATIONS = 100
 MAX_RESIDUAL = 1e-5
-"""Largest residual of any equation at the end; forces and loads are to be of the order of 1."""
+"""Largest residual of any equation at the end; forces and loads should be of the order of 1."""
 MAX_COST_GAP = 1e-4
 """Largest gap of the costs at the end."""
 DIVERGED_GAP = 1e12
-"""A gap from which there is no way back."""
+"""A gap beyond which the method has diverged."""
 STEP_TO_BOUND = 0.995
 """Share of the way to the nearest bound that a step goes."""
 DIAGONAL_SHIFT = 1e-11
-"""Added to the diagonal, as a share of its mean: bodies that touch at a point can turn about it."""
+"""Added to the diagonal, as a share of its mean, since bodies that touch at a point can turn about it."""
 MAX_GRADIENT_STEPS = 100
-"""Conjugate gradients for a solution of the normal equations, at most."""
+"""Maximum number of conjugate gradient steps for one solution of the normal equations."""
 
 
 def solve_interior(
     wrenches: FloatArray, bodies: np.ndarray, count: int, loads: FloatArray, bounds: FloatArray, costs: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Minimise costs . f with forces x >= 0 and 0 <= f <= bounds, so that all that acts on each body sums to nothing.
+    """Minimise costs . f with forces x >= 0 and 0 <= f <= bounds such that all wrenches on each body sum to zero.
 
-    wrenches: float64 (c, 2, 6), what a unit of each force does to its two bodies; bodies: int64 (c, 2), the second -1
-    for none; loads: float64 (k, 6 n), what a unit of each factor f does to all `count` = n bodies; bounds, costs:
-    float64 (k,).
+    wrenches: wrench of a unit of each force on its two bodies, float64 (c, 2, 6)
+    bodies: int64 (c, 2), the second -1 for none
+    count: number of bodies n
+    loads: wrench of a unit of each factor f on all bodies, float64 (k, 6 n)
+    bounds, costs: float64 (k,)
 
-    Returns the factors float64 (k,) and the dual solution float64 (6 n,). Raises ArithmeticError where the method
-    does not converge. Mehrotra's predictor and corrector; the few loads are dense columns.
+    Returns the factors float64 (k,) and the dual solution float64 (6 n,). Raises ArithmeticError if the method does not
+    converge. Mehrotra's predictor and corrector; the few loads are dense columns.
     """
     order, width = _along(bodies, count)
     rows = (6 * order[:, None] + np.arange(6)).ravel()
@@ -57,20 +59,25 @@ def solve_interior(
             break
         system.factor(now)
         straight = system.move(now, left, 0.0, None)
-        one, two = now.reach(straight)
-        after = now.after(straight, min(one, 1.0), min(two, 1.0)).gap()
-        # No nearer to the bounds than the answer needs: there the normal equations lose their digits.
+        primal, dual = now.reach(straight)
+        after = now.after(straight, min(primal, 1.0), min(dual, 1.0)).gap()
+        # No nearer to the bounds than needed: there the normal equations lose precision.
         aim = max((after / gap) ** 3 * gap, MAX_COST_GAP / 10) / (len(now.x) + 2 * len(now.f))
         bent = system.move(now, left, aim, straight)
-        one, two = now.reach(bent)
-        now = now.after(bent, min(STEP_TO_BOUND * one, 1.0), min(STEP_TO_BOUND * two, 1.0))
+        primal, dual = now.reach(bent)
+        now = now.after(bent, min(STEP_TO_BOUND * primal, 1.0), min(STEP_TO_BOUND * dual, 1.0))
     raise ArithmeticError(f"the programme of equilibrium did not converge: the gap is {gap:.1e}")
 
 
 @dataclass(frozen=True)
 class _Point:
-    """Forces x and their slack z; factors f, what is left s of their bounds, and the slack of both, zf and zs; dual y.
-    A move is the same."""
+    """An iterate; a move has the same fields.
+
+    x, z: forces and their slack
+    f, s: factors and what is left of their bounds
+    zf, zs: slack of f and of s
+    y: dual values
+    """
 
     x: FloatArray
     z: FloatArray
@@ -82,8 +89,11 @@ class _Point:
 
     @classmethod
     def first(cls, forces: int, bounds: FloatArray, rows: int) -> _Point:
-        """Where the search begins: the forces share the weight of the bodies, for ten thousands of forces of the order
-        of 1 are so far from equilibrium that there is no way back."""
+        """Return the first iterate.
+
+        The forces share the weight of the bodies: ten thousands of forces of the order of 1 are too far from
+        equilibrium to converge.
+        """
         ones = np.ones(len(bounds))
         x = np.full(forces, min(rows / (6 * forces), 1.0))
         return cls(x, np.ones(forces), bounds / 2, bounds / 2, ones, ones, np.zeros(rows))
@@ -92,7 +102,7 @@ class _Point:
         return float(self.x @ self.z + self.f @ self.zf + self.s @ self.zs)
 
     def reach(self, move: _Point) -> tuple[float, float]:
-        """The longest steps of the primal and of the dual values that leave them all above zero."""
+        """Return the longest steps of the primal and of the dual values that keep them all positive."""
         primal = (self.x, move.x), (self.f, move.f), (self.s, move.s)
         dual = (self.z, move.z), (self.zf, move.zf), (self.zs, move.zs)
         return _longest(*primal), _longest(*dual)
@@ -116,7 +126,7 @@ class _System:
         self._wrenches, self._place, self._count, self._width, self._dense = wrenches, place, count, width, dense
 
     def residuals(self, now: _Point, costs: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """What is left over of equilibrium, and of the dual equations of forces and of factors."""
+        """Return the residuals of equilibrium, and of the dual equations of forces and of factors."""
         return -self._act(now.x, now.f), -self._lift(now.y) - now.z, costs - self._dense.T @ now.y - now.zf + now.zs
 
     def factor(self, now: _Point) -> None:
@@ -133,7 +143,7 @@ class _System:
     def move(
         self, now: _Point, left: tuple[FloatArray, FloatArray, FloatArray], aim: float, bend: _Point | None
     ) -> _Point:
-        """The Newton step to where each value times its slack is `aim`, minus what `bend` adds to that."""
+        """Return the Newton step to where each value times its slack is `aim`, minus what `bend` adds to that."""
         primal, dual_x, dual_f = left
         want_x, want_f, want_s = aim - now.x * now.z, aim - now.f * now.zf, aim - now.s * now.zs
         if bend is not None:
@@ -162,8 +172,11 @@ class _System:
         return lifted
 
     def _solve(self, right: FloatArray) -> FloatArray:
-        """The normal equations by conjugate gradients on what the factors leave over. Where bodies can turn about a
-        point the factors, made firm, answer so much too stiffly that correcting again and again would not arrive."""
+        """Solve the normal equations by conjugate gradients, preconditioned by the factors.
+
+        If bodies can turn about a point, the shifted factors are so much too stiff that iterative refinement would not
+        converge.
+        """
         answer, left = np.zeros_like(right), right
         along, before = np.zeros_like(right), 1.0
         for _ in range(MAX_GRADIENT_STEPS):
@@ -171,7 +184,7 @@ class _System:
                 break
             near = self._nearly(left)
             worth = float(left @ near)
-            if not worth > 0:  # nothing is left but rounding
+            if not worth > 0:  # only rounding is left
                 break
             along = near + worth / before * along
             acting = self._act(self._weight_x * self._lift(along), self._weight_f * (self._dense.T @ along))
@@ -180,7 +193,7 @@ class _System:
         return answer
 
     def _nearly(self, right: FloatArray) -> FloatArray:
-        """What the factors alone answer."""
+        """Return the answer of the factors alone."""
         from scipy.linalg import cho_solve_banded
 
         plain = cho_solve_banded(self._band, right, check_finite=False)
@@ -189,7 +202,7 @@ class _System:
 
 
 def _longest(*moves: tuple[FloatArray, FloatArray]) -> float:
-    """The longest step that leaves all values above zero, at most a long one."""
+    """Return the longest step, at most a long one, that keeps all values positive."""
     longest = 1e3
     for value, move in moves:
         falling = move < 0
@@ -199,8 +212,10 @@ def _longest(*moves: tuple[FloatArray, FloatArray]) -> float:
 
 
 def _along(bodies: np.ndarray, count: int) -> tuple[np.ndarray, int]:
-    """The place of each body in an order in which touching bodies stand near each other (reverse Cuthill-McKee), and
-    the number of diagonals that the matrix of 6 x 6 blocks has below its own."""
+    """Return the index of each body in an order in which touching bodies are near, and the number of lower diagonals.
+
+    The order is reverse Cuthill-McKee. The diagonals are those of the matrix of 6 x 6 blocks.
+    """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -213,7 +228,7 @@ def _along(bodies: np.ndarray, count: int) -> tuple[np.ndarray, int]:
 
 @numba.njit(cache=True)
 def _normal(wrenches, place, weights, count, width):
-    """The lower band, (width + 1, 6 count), of the sum over columns of weight times the column's outer product."""
+    """Return the lower band, (width + 1, 6 count), of the weighted sum of the columns' outer products."""
     band = np.zeros((width + 1, 6 * count))
     for c in range(len(wrenches)):
         for one in range(2):

@@ -1,4 +1,4 @@
-"""The physical validity of a shape: everything that is judged, as one answer, as fields of a record, as a filter."""
+"""The physical validity of a shape: all checks as one answer, as fields of a record, and as a filter."""
 
 from __future__ import annotations
 
@@ -21,20 +21,24 @@ from stages.shape.physics.structure import ground_share, mirror_score
 from stages.shape.shape import Shape
 
 TIPPING_TOLERANCE_DEGREES = 1e-4
-"""Degrees by which a shape that just stands may seem to be beyond tipping."""
+"""A shape that just stands may seem to be this far beyond tipping."""
 
 
 @dataclass(frozen=True)
 class Validity:
-    """What is known of a shape's physics. Nothing changes when the shape is turned about the vertical or scaled.
+    """The physical validity of a shape, invariant under turns about the vertical and scaling.
 
-    rooted: whether every part is connected to the ground (shapeassembly App. E); stable, margin: see
-    `stages.shape.physics.stability.Stability`; weakest: index of the part that gives way first, -1 if none;
-    tipping_degrees: how far the shape, were it rigid, can be tilted; components: pieces that hang together;
-    floating: parts that no chain of connected parts leads to the ground; penetration: volume that parts share, by
-    pairs, as a share of the volume of all parts; ground: area that it stands on, as a share of its outline from above;
-    symmetry: share of the weight that an upright mirror maps to its like; weighed: by volume, or by area where a part
-    is open; joints: the connected pairs, int32 (m, 2), i < j in lexicographic order.
+    rooted: whether every part is connected to the ground (shapeassembly App. E)
+    stable, margin: see `stages.shape.physics.stability.Stability`
+    weakest: index of the part that gives way first, -1 if none
+    tipping_degrees: how far the shape, if rigid, can be tilted
+    components: number of connected pieces
+    floating: number of parts that no chain of connected parts leads to the ground
+    penetration: volume that parts share, by pairs, as a share of the volume of all parts
+    ground: area that it stands on, as a share of its outline from above
+    symmetry: share of the weight that an upright mirror maps to equal parts
+    weighed: by volume, or by area if a part is open
+    joints: connected pairs, int32 (m, 2), i < j in lexicographic order
     """
 
     rooted: bool
@@ -61,13 +65,15 @@ class Judge:
         self._touch = PairContacts(self._meshes, self._solids)
 
     def rooted(self, assembly: Assembly) -> bool:
-        """Whether every part is connected to the ground (shapeassembly App. E), and nothing more."""
+        """Return whether every part is connected to the ground (shapeassembly App. E)."""
         placed = self._placed(assembly)
         return not _floating(placed, self._connected(placed, assembly), self.config).any()
 
     def unmet_requirement(self, assembly: Assembly, requirements: Requirements) -> str | None:
-        """The first of the requirements that is not met, None if all are. What tips over as a whole is seen before
-        anything is asked about its parts. Raises ValueError as `validity` does."""
+        """Return the first requirement that is not met, or None.
+
+        Whether the whole shape tips over is tested before its parts. Raises ValueError as `validity` does.
+        """
         placed = self._placed(assembly)
         standing = self._standing(placed) if requirements.stable else None
         if standing is not None and tipping_angle(placed, standing) < -TIPPING_TOLERANCE_DEGREES:
@@ -82,10 +88,12 @@ class Judge:
         return None if self._stability(placed, connected, depths, standing).stable else "not stable"
 
     def tilt_to_fall(self, assembly: Assembly) -> float:
-        """The least tilt, in degrees, by which a component that is let go comes to rest at another height
-        (`stages.shape.physics.settling`): 0 where one falls by itself, or where a part is not rooted, for what is
-        stable is rooted (shapeassembly App. E). Connected parts are one rigid body, whatever `config.joints` says.
-        Raises ValueError as `validity` does."""
+        """Return the least tilt, in degrees, by which a dropped component comes to rest at another height.
+
+        It is 0 if one falls by itself or a part is not rooted, since stable shapes are rooted (shapeassembly App. E).
+        Connected parts are one rigid body whatever `config.joints` is. See `stages.shape.physics.settling`. Raises
+        ValueError as `validity` does.
+        """
         placed = self._placed(assembly)
         connected = self._connected(placed, assembly)
         if _floating(placed, connected, self.config).any():
@@ -94,13 +102,15 @@ class Judge:
         return min(tilt_to_fall(_body(placed, pieces == piece), placed.diagonal) for piece in range(pieces.max() + 1))
 
     def contacts(self, assembly: Assembly) -> IntArray:
-        """The pairs of parts that touch or overlap, int32 (m, 2), i < j in lexicographic order: those that the
-        assembly has, and those at most `config.touching` apart."""
+        """Return the pairs of parts that touch or overlap, int32 (m, 2), i < j in lexicographic order.
+
+        These are the assembly's edges and the pairs at most `config.touching` apart.
+        """
         placed = self._placed(assembly)
         return self._touch.connected(placed, self.config.touching * placed.diagonal, assembly.edges)
 
     def validity(self, assembly: Assembly) -> Validity:
-        """Everything. Raises ValueError for a shape without parts, extent or weight."""
+        """Return the whole verdict. Raises ValueError for a shape without parts, extent or weight."""
         config = self.config
         placed = self._placed(assembly)
         connected = self._connected(placed, assembly)
@@ -125,8 +135,7 @@ class Judge:
         )
 
     def tolerances(self, assembly: Assembly) -> tuple[float, float]:
-        """The largest distance of parts in contact and that of connected parts, `config.touching` and
-        `config.connected`, in the units of the shape."""
+        """Return `config.touching` and `config.connected` in the units of the shape."""
         diagonal = self._placed(assembly).diagonal
         return self.config.touching * diagonal, self.config.connected * diagonal
 
@@ -139,7 +148,10 @@ class Judge:
     def _stability(
         self, placed: PlacedParts, connected: IntArray, depths: FloatArray, standing: ContactPatches
     ) -> Stability:
-        """`depths`: how deep the connected pairs reach into each other; of no matter where joints are rigid."""
+        """Return the stability of placed parts.
+
+        depths: penetration depth of the connected pairs; irrelevant if joints are rigid
+        """
         deep = connected[depths > self.config.touching * placed.diagonal]
         return stability(placed, self._touch, connected, deep, standing, self.config)
 
@@ -149,25 +161,25 @@ class Judge:
 
 @lru_cache(maxsize=16)
 def judge_of(meshes: tuple[PartMesh, ...], up: Literal["y", "z"], config: PhysicsConfig) -> Judge:
-    """The judge of all shapes with these meshes, kept from shape to shape."""
+    """Return the cached judge of all shapes with these meshes."""
     return Judge(meshes, up, config)
 
 
 def judge_shape(shape: Shape, config: PhysicsConfig) -> Validity:
-    """The physical validity of one shape. Raises ValueError for a shape without parts, extent or weight."""
+    """Return the physical validity of one shape. Raises ValueError for a shape without parts, extent or weight."""
     return Judge(shape.meshes, shape.up, config).validity(shape.assembly)
 
 
 def physical_fields(validity: Validity) -> dict[str, Any]:
-    """What a sample's record says under `physics`: rounded, so that the noise of last digits changes no bytes."""
+    """Return the `physics` field of a sample's record, rounded so that noise of last digits changes no bytes."""
     values = {field.name: getattr(validity, field.name) for field in fields(validity) if field.name != "joints"}
     return {name: round(value, 6) + 0.0 if isinstance(value, float) else value for name, value in values.items()}
 
 
 def unmet_requirement(requirements: Requirements, shape: Shape) -> str | None:
-    """The reason, as it is counted among the rejects, why a shape is not kept; None if it is kept.
+    """Return why a shape is rejected, as counted among the rejects, or None if it is kept.
 
-    Where nothing is required nothing is computed. A shape without a body to judge meets no requirement.
+    Without requirements nothing is computed. A shape without a body to judge meets no requirement.
     """
     if not requirements.rooted and not requirements.stable:
         return None
@@ -178,14 +190,14 @@ def unmet_requirement(requirements: Requirements, shape: Shape) -> str | None:
 
 
 def _body(placed: PlacedParts, own: BoolArray) -> Body:
-    """The parts `own`, bool (n,), as one body."""
+    """Return the parts `own`, bool (n,), as one body."""
     weights = placed.weights[own]
     points = np.concatenate([placed.points[part] for part in np.flatnonzero(own).tolist()])
     return Body(points, weights @ placed.centroids[own] / max(weights.sum(), np.finfo(float).tiny))
 
 
 def _floating(placed: PlacedParts, connected: np.ndarray, config: PhysicsConfig) -> np.ndarray:
-    """Which parts no chain of connected parts leads to the ground, bool (n,)."""
+    """Return which parts no chain of connected parts leads to the ground, bool (n,)."""
     pieces = connected_components(len(placed), connected)
     low = placed.spans[:, 0, 2] <= config.connected * placed.diagonal
     found: np.ndarray = ~np.isin(pieces, pieces[low])

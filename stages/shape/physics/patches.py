@@ -9,7 +9,7 @@ from stages.shape.arrays import FloatArray
 from stages.shape.geometry.polygons import convex_hull, cut
 
 MIN_OPPOSED_COSINE = 0.98
-"""Faces press on each other if their normals are opposed within about 11 degrees (cosine)."""
+"""Faces press on each other if their normals are opposed within about 11 degrees."""
 LINES_PER_SIDE = 24
 """Lines along each axis, on either side of a square, on which the overlap of two meshes is measured."""
 
@@ -19,7 +19,7 @@ LINE_OFFSETS = np.array([0.0073, 0.0131, 0.0039])
 
 @numba.njit(cache=True)
 def _unit_normal(tri, out):
-    """Unit normal of a triangle into `out`; its double area."""
+    """Write the unit normal of a triangle into `out`. Returns its double area."""
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         out[k] = (tri[1, i] - tri[0, i]) * (tri[2, j] - tri[0, j]) - (tri[1, j] - tri[0, j]) * (tri[2, i] - tri[0, i])
@@ -32,7 +32,9 @@ def _unit_normal(tri, out):
 
 @numba.njit(cache=True)
 def _sides(tri, n, k, out):
-    """The plane through side k of a triangle (normal n), square to it, out of the triangle; its offset."""
+    """Write the normal of the plane through side k of a triangle (normal n), perpendicular to it, into `out`. Returns
+    its offset.
+    """
     after = (k + 1) % 3
     length = 0.0
     for i in range(3):
@@ -49,12 +51,15 @@ def _sides(tri, n, k, out):
 
 @numba.njit(cache=True)
 def facing_polygons(ca, cb, pairs, pose, tolerance, oriented):
-    """Where triangles that look at each other, of two meshes, are near: polygons between them.
+    """Return the polygons between triangles of two meshes that face each other and are near.
 
-    ca, cb: triangle corners (f, 3, 3); pairs: int64 (p, 2) near triangles; pose: of mesh b in coordinates of a.
-    Where `oriented` is false triangles may also look the same way: surfaces without an inside.
-    Returns points float64 (q, 3), the corners of the polygons, and normals float64 (q, 3), out of mesh a, turned
-    round where that was a matter of choice; in coordinates of a.
+    ca, cb: triangle corners (f, 3, 3)
+    pairs: near triangles, int64 (p, 2)
+    pose: pose of mesh b in coordinates of a
+    oriented: if false, triangles may also face the same way: surfaces without an inside
+
+    Returns points float64 (q, 3), the corners of the polygons, and normals float64 (q, 3) out of mesh a, in coordinates
+    of a.
     """
     r, t = pose[:3, :3], pose[:3, 3]
     points, normals = np.empty((10 * len(pairs) + 1, 3)), np.empty((10 * len(pairs) + 1, 3))
@@ -101,7 +106,7 @@ def facing_polygons(ca, cb, pairs, pose, tolerance, oriented):
 
 @numba.njit(cache=True)
 def _behind(corners, used, r, t, n, base, slack):
-    """Whether any corner of the `used` triangles, moved by r and t, lies deeper than `slack` behind a plane."""
+    """Return whether any corner of the `used` triangles, moved by r and t, lies deeper than `slack` behind a plane."""
     for u in range(len(corners)):
         if used[u]:
             for k in range(3):
@@ -118,9 +123,9 @@ def _behind(corners, used, r, t, n, base, slack):
 
 @numba.njit(cache=True)
 def touching_edges(ca, cb, pairs, pose, tolerance):
-    """Where edges of mesh b lie on faces of mesh a: ends of the pieces of edge, with the normals of the faces.
+    """Return the ends of the pieces of edges of mesh b on faces of mesh a, with the normals of the faces.
 
-    A face counts if all near triangles of b stand before it. Arguments and answer as `facing_polygons`.
+    A face counts if all near triangles of b lie in front of it. Arguments and results are as in `facing_polygons`.
     """
     r, t = pose[:3, :3], pose[:3, 3]
     points, normals = np.empty((6 * len(pairs) + 1, 3)), np.empty((6 * len(pairs) + 1, 3))
@@ -167,10 +172,10 @@ def touching_edges(ca, cb, pairs, pose, tolerance):
 
 
 def flat_hulls(points: FloatArray, normals: FloatArray, tolerance: float) -> tuple[FloatArray, FloatArray]:
-    """Corners and normals of the fewest flat patches that bear what pressure on all of `points` (q, 3) bears.
+    """Return corners and normals of the fewest flat patches equivalent to pressure on all of `points` (q, 3).
 
-    Points with normals alike and in one plane within `tolerance` make one patch, the convex hull: pressure inside
-    it is the same as pressure at its corners.
+    Points with similar normals in one plane within `tolerance` make one patch, the convex hull: pressure inside it
+    equals pressure at its corners.
     """
     kept_points, kept_normals = [], []
     left = np.arange(len(points))
@@ -189,7 +194,7 @@ def flat_hulls(points: FloatArray, normals: FloatArray, tolerance: float) -> tup
 
 
 def hull_corners(points: FloatArray, normal: FloatArray) -> np.ndarray:
-    """Indices of the corners of the convex hull of points (q, 3) seen along `normal`, in order (monotone chain)."""
+    """Return the indices of the corners of the convex hull of points (q, 3) seen along `normal`, in order."""
     first = np.eye(3)[np.argmin(np.abs(normal))]
     u = np.cross(normal, first)
     flat = np.column_stack([points @ u, points @ np.cross(normal, u)])
@@ -198,8 +203,10 @@ def hull_corners(points: FloatArray, normal: FloatArray) -> np.ndarray:
 
 @numba.njit(cache=True)
 def _crossings(corners, axis, low, step, columns, out, counts):
-    """Where lines along `axis` cross the triangles of a mesh: heights into `out` (columns, columns, room) with
-    `counts`. Lines stand at low + (index + 1/2) step in the two other axes."""
+    """Write where lines along `axis` cross the triangles of a mesh into `out` (columns, columns, room), with `counts`.
+
+    Lines are at low + (index + 1/2) step in the two other axes.
+    """
     u, v = (axis + 1) % 3, (axis + 2) % 3
     counts[:] = 0
     for f in range(len(corners)):
@@ -226,11 +233,11 @@ def _crossings(corners, axis, low, step, columns, out, counts):
 
 @numba.njit(cache=True)
 def overlap(ca, cb, pose, low, high):
-    """Volume that two closed meshes share inside the box from `low` to `high`, in coordinates of the first, and how
-    deep they reach into each other at least.
+    """Return the volume that two closed meshes share in the box from `low` to `high`, and a lower bound of their depth.
 
-    Measured on COLUMNS x COLUMNS lines along each axis: exact along the lines, sampled across them. A layer of
-    overlap, however it lies, has along some axis no stretch longer than the root of three times its thickness.
+    Coordinates are those of the first mesh. The volume is measured on LINES_PER_SIDE x LINES_PER_SIDE lines along each
+    axis: exact along the lines, sampled across them. A layer of overlap has, along some axis, no stretch longer than
+    sqrt(3) times its thickness.
     """
     r, t = pose[:3, :3], pose[:3, 3]
     moved = np.empty_like(cb)

@@ -1,4 +1,4 @@
-"""What physical validity is judged by, and what of it a config may require of every sample."""
+"""The settings of the physical checks, and what a config may require of every sample."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pipeline.config import StrictModel
 
 
 class PhysicsConfig(StrictModel):
-    """The model of statics: how near is touching, what joints bear, how hard the shape is pushed."""
+    """The model of statics: contact distances, strength of joints, size of pushes."""
 
     connected: float = Field(
         0.02,
@@ -48,7 +48,7 @@ class PhysicsConfig(StrictModel):
 
 
 class Requirements(StrictModel):
-    """What a sample must be so that it is kept; what is not named is not required."""
+    """What a sample must satisfy to be kept; by default nothing is required."""
 
     rooted: bool = Field(False, description="Whether every part must be connected to the ground.")
     stable: bool = Field(False, description="Whether the shape must stand and bear small pushes.")

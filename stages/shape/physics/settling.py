@@ -1,10 +1,10 @@
-"""Does a dropped shape stay as high as it was let go? (shapeassembly App. E, without time steps)
+"""Does a dropped shape keep its height? (shapeassembly App. E, without time steps)
 
-The paper lets every connected component of a shape go on the ground as one rigid body, pushes it a little, and calls
-the shape unstable when a component's resting height has changed. Between pushes a slow body does nothing but tip over
-edges of its convex hull: it rests where the vertical through its centre of mass meets the face it lies on, and from
-there a push takes it over an edge if it tilts it far enough. So the answer is a walk over rests: the least tilt after
-which the centre of mass lies at another height. Nothing slides, and nothing bounces.
+The paper drops every connected component of a shape on the ground as one rigid body, pushes it a little, and calls the
+shape unstable if a component's resting height has changed. Between pushes a slow body only tips over edges of its
+convex hull. It rests where the vertical through its centre of mass meets the face it lies on. From there a push takes
+it over an edge if it tilts it far enough. So the answer is a walk over rests: the least tilt after which the centre of
+mass has another height. Nothing slides, and nothing bounces.
 """
 
 from __future__ import annotations
@@ -18,17 +18,22 @@ from stages.shape.arrays import FloatArray
 from stages.shape.geometry.polygons import convex_hull, inside_margin
 
 FALL_SHARE = 0.025
-"""Change of the height of the centre of mass, as a share of it, by which a component has fallen: that of the programs'
-authors, whose figures are published; their text says 0.1."""
+"""Relative change of the height of the centre of mass of a fallen component, as in the authors' programs; their text
+has 0.1.
+"""
 SAME_PLACE_SHARE = 1e-4
 """Points this near, as a share of the diagonal of the shape, lie on the ground together."""
 MAX_RESTS = 40
-"""A body that has been on so many faces without falling rolls."""
+"""A body that has rested on this many faces without falling rolls."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body above the ground at height 0: its points, float64 (q, 3), and its centre of mass, float64 (3,)."""
+    """A rigid body above the ground at height 0.
+
+    points: float64 (q, 3)
+    centre: centre of mass, float64 (3,)
+    """
 
     points: FloatArray
     centre: FloatArray
@@ -38,19 +43,21 @@ class Body:
         return float(self.centre[2])
 
     def lowered(self) -> Body:
-        """The body brought down until it touches the ground."""
+        """Return the body lowered until it touches the ground."""
         drop = np.array([0.0, 0.0, self.points[:, 2].min()])
         return Body(self.points - drop, self.centre - drop)
 
     def support(self, near: float) -> FloatArray:
-        """The corners, float64 (k, 2), of the outline of what is at most `near` above the ground."""
+        """Return the corners, float64 (k, 2), of the outline of the points at most `near` above the ground."""
         low = self.points[self.points[:, 2] <= near, :2]
         outline: FloatArray = low[convex_hull(low)]
         return outline
 
     def tipped(self, pivot: FloatArray, way: FloatArray, near: float) -> Body:
-        """The body turned in direction `way` (2,) about the level axis across it through `pivot` (2,) on the ground,
-        until the next of its points touches the ground."""
+        """Return the body turned in direction `way` (2,) about the level axis through `pivot` (2,) on the ground.
+
+        It turns until the next of its points touches the ground.
+        """
         arms = self.points - [*pivot, 0.0]
         along, up = arms[:, :2] @ way, arms[:, 2]
         angle = np.arctan2(up, along)[up > near].min(initial=np.pi)
@@ -63,8 +70,10 @@ class Body:
 
 
 def come_to_rest(body: Body, diagonal: float) -> Body:
-    """The body as it lies when it has been let go: tipped over points and edges, its centre sinking, until the
-    vertical through the centre meets the face below it."""
+    """Return the body at rest after it was dropped.
+
+    It tips over points and edges, its centre sinking, until the vertical through the centre meets the face below it.
+    """
     near = SAME_PLACE_SHARE * diagonal
     body = body.lowered()
     for _ in range(len(body.points)):
@@ -77,8 +86,10 @@ def come_to_rest(body: Body, diagonal: float) -> Body:
 
 
 def tilt_to_fall(body: Body, diagonal: float) -> float:
-    """The least tilt, in degrees, by which pushes make the body come to rest with its centre FALL higher or lower than
-    it was let go; 0 where it falls by itself, infinite where it never does: a ball, a cube."""
+    """Return the least tilt, in degrees, after which the body rests with its centre FALL_SHARE higher or lower.
+
+    It is 0 if the body falls by itself, and infinite if it never does: a ball, a cube.
+    """
     start = body.lowered().height
     near = SAME_PLACE_SHARE * diagonal
     ahead: list[tuple[float, int, Body]] = [(0.0, 0, come_to_rest(body, diagonal))]
@@ -104,8 +115,11 @@ def tilt_to_fall(body: Body, diagonal: float) -> float:
 
 
 def _downhill(support: FloatArray, centre: FloatArray, near: float) -> tuple[FloatArray, FloatArray]:
-    """The point of the outline of the support that is nearest to the centre, and the way, a unit vector (2,), from it
-    to the centre: across the edge where the centre is above it."""
+    """Return the point of the support's outline nearest to the centre, and the unit direction (2,) from it to the
+    centre.
+
+    If the centre is above an edge, the direction is perpendicular to the edge.
+    """
     edges = np.roll(support, -1, axis=0) - support
     lengths = np.maximum((edges**2).sum(axis=1), np.finfo(float).tiny)
     along = np.clip(((centre - support) * edges).sum(axis=1) / lengths, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Parts as bodies: volume, area, centroid and, where a part is one, its box."""
+"""Parts as bodies: volume, area, centroid and, for a cuboid, its box."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from stages.shape.physics.boxes import box_corners, recognise_boxes
 
 
 class MeshSolids:
-    """What is known of each mesh by itself, in its own coordinates.
+    """Properties of each mesh in its own coordinates.
 
-    closed: bool (k,), whether the mesh has an inside: every edge is passed as often in one sense as in the other, and
-    the volume is not negative; volumes, areas: float64 (k,), the volume of an open mesh is 0; centroids: float64
-    (k, 3), of the volume where the mesh is closed, else of the surface; boxes: bool (k,), whether it is a box, and
-    centres, axes, halves of the boxes (stages.shape.physics.boxes).
+    closed: whether the mesh has an inside, bool (k,): every edge is used equally often in both directions, and the
+        volume is not negative
+    volumes, areas: float64 (k,); the volume of an open mesh is 0
+    centroids: of the volume of a closed mesh, else of the surface, float64 (k, 3)
+    boxes: whether the mesh is a box, bool (k,)
+    centres, axes, halves: the boxes (`stages.shape.physics.boxes`)
     """
 
     def __init__(self, meshes: Sequence[PartMesh]) -> None:
@@ -43,7 +45,7 @@ class MeshSolids:
         faces = np.stack([meshes[index].faces for index in eights])
         corners = np.stack([meshes[index].vertices for index in eights])[np.arange(len(eights))[:, None, None], faces]
         sides = 8 * (halves * np.roll(halves, 1, axis=1)).sum(axis=1)
-        # Twelve triangles with the area of the six sides are the sides: none is missing, none is there twice.
+        # Twelve triangles with the area of the six sides are the sides: none is missing or repeated.
         found &= np.abs(triangle_areas(corners).sum(axis=1) - sides) <= 1e-4 * sides
         for index, row in zip(eights, range(len(eights)), strict=True):
             if found[row]:
@@ -67,7 +69,7 @@ class MeshSolids:
 
 
 def _breadth(points: Sequence[FloatArray]) -> float:
-    """The greatest distance of two of the points, seen from above."""
+    """Return the greatest distance of two of the points seen from above."""
     flat = np.concatenate(points)[:, :2]
     hull = flat[convex_hull(flat)]
     return float(np.linalg.norm(hull[:, None] - hull[None], axis=2).max())
@@ -82,14 +84,18 @@ def _has_inside(faces: IntArray) -> bool:
 
 @dataclass(frozen=True)
 class PlacedParts:
-    """The parts of one assembly as bodies in a world whose third axis points up, the ground at height 0.
+    """The parts of one assembly as bodies in a world whose third axis points up, with the ground at height 0.
 
-    types: the mesh of each part; poses: float64 (n, 4, 4); spans: float64 (n, 2, 3), their upright boxes;
-    points: for each part its vertices, float64 (v, 3); diagonal: of the height and the greatest
-    breadth, which is that of the box around a shape whose outline from above is a rectangle, and which no turn about
-    the vertical changes;
-    weights: float64 (n,), they sum to 1; weighed: whether by volume or, where a part is open, all by area;
-    centroids: float64 (n, 3); boxes: bool (n,); centres, axes, halves: of the parts that are boxes.
+    types: mesh of each part
+    poses: float64 (n, 4, 4)
+    spans: axis-aligned boxes, float64 (n, 2, 3)
+    points: vertices of each part, float64 (v, 3)
+    diagonal: of the height and the greatest breadth, which no turn about the vertical changes
+    weights: sum to 1, float64 (n,)
+    weighed: by volume, or by area if a part is open
+    centroids: float64 (n, 3)
+    boxes: whether each part is a box, bool (n,)
+    centres, axes, halves: the boxes
     """
 
     types: np.ndarray
@@ -109,7 +115,7 @@ class PlacedParts:
     def of(
         cls, meshes: Sequence[PartMesh], solids: MeshSolids, assembly: Assembly, up: Literal["y", "z"]
     ) -> PlacedParts:
-        """The bodies of `assembly`. Raises ValueError for a shape without parts or without extent."""
+        """Return the bodies of `assembly`. Raises ValueError for a shape without parts or without extent."""
         types = assembly.types.astype(np.int64)
         if not len(types):
             raise ValueError("a shape without parts has no statics")

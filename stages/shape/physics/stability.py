@@ -1,10 +1,10 @@
-"""Does a shape stand, what does it bear, and what gives way first? (shapeassembly App. E, without a simulator)
+"""Does a shape stand, what load does it bear, and what gives way first? (shapeassembly App. E, without a simulator)
 
 The paper drops every connected component, as a rigid body, into a physics engine, pushes it a little, and calls the
-shape unstable when a component's height changes. Here statics answers: a shape is stable if its bodies are in
-equilibrium under gravity alone, and under gravity with each of a fixed set of pushes. Nothing moves, so nothing
-settles: a chair that rocks on legs of unequal length within the ground tolerance stands here, and a shape that falls
-over onto another side and rests there at the same height does not. What the paper measures is in `settling`.
+shape unstable if a component's height changes. Here statics answers. A shape is stable if its bodies are in equilibrium
+under gravity alone, and under gravity with each of a fixed set of pushes. Nothing moves, so nothing settles. A chair
+that rocks on legs of unequal length within the ground tolerance is stable here. A shape that falls onto another side
+and rests there at the same height is not. `settling` computes what the paper measures.
 """
 
 from __future__ import annotations
@@ -31,10 +31,12 @@ MAX_PUSH = 1.0
 
 @dataclass(frozen=True)
 class Stability:
-    """stable: whether the shape stands and bears every push of the config's size.
+    """The stability of a shape.
 
-    margin: the greatest share of its weight, at most 1, by which it can be pushed in every one of the ways; -1 where
-    it does not even stand. weakest: the part that gives way first, -1 where nothing does up to a push of full weight.
+    stable: whether the shape stands and bears every push of the config's size
+    margin: greatest share of its weight, at most 1, by which it can be pushed in every direction; -1 if it does not
+        stand
+    weakest: part that gives way first, -1 if none does up to a push of full weight
     """
 
     stable: bool
@@ -43,7 +45,7 @@ class Stability:
 
 
 def standing_points(placed: PlacedParts, body_of: np.ndarray, tolerance: float) -> ContactPatches:
-    """Where bodies stand on the ground: for each body the hull of its points at most `tolerance` above the ground."""
+    """Return where bodies stand: for each body the hull of its points at most `tolerance` above the ground."""
     low = placed.spans[:, 0, 2] <= tolerance
     first, points = [], []
     for body in np.unique(body_of[low]).tolist():
@@ -65,8 +67,10 @@ def standing_points(placed: PlacedParts, body_of: np.ndarray, tolerance: float) 
 
 
 def tipping_angle(placed: PlacedParts, standing: ContactPatches) -> float:
-    """By how many degrees the whole shape, were it rigid, can be tilted before it tips over its support polygon, in
-    the direction in which it tips soonest; below zero, by how many it is beyond that already."""
+    """Return by how many degrees the whole shape, if rigid, can be tilted before it tips over its support polygon.
+
+    The direction is the one in which it tips soonest. A negative angle says how far it is beyond tipping.
+    """
     centre = placed.weights @ placed.centroids
     inside = inside_margin(standing.points[:, :2], centre[:2])
     return float(np.degrees(np.arctan2(inside, max(centre[2], 1e-12 * placed.diagonal))))
@@ -80,10 +84,11 @@ def stability(
     standing: ContactPatches,
     config: PhysicsConfig,
 ) -> Stability:
-    """Whether the shape stands, its margin, and its weakest part.
+    """Return whether the shape stands, its margin, and its weakest part.
 
-    connected: pairs of parts within the config's `connected`; deep: those of them that reach deeper into each other
-    than `touching`; standing: where parts stand on the ground, the bodies being the parts.
+    connected: pairs of parts within the config's `connected`
+    deep: those of them that penetrate deeper than `touching`
+    standing: where parts stand on the ground, the bodies being the parts
     """
     count = len(placed)
     tolerance = config.touching * placed.diagonal
@@ -127,7 +132,7 @@ def stability(
 def _dry_joints(
     placed: PlacedParts, touch: PairContacts, connected: IntArray, deep: IntArray, tolerance: float
 ) -> tuple[np.ndarray, ContactPatches]:
-    """The bodies that parts which reach into each other make, and the patches between bodies."""
+    """Return the body of each part, where penetrating parts are one body, and the patches between bodies."""
     shallow = connected[~_among(connected, deep)]
     patches, locked = touch.patches(placed, shallow, tolerance)
     pieces = connected_components(len(placed), np.concatenate([deep, shallow[locked]]))
@@ -144,7 +149,7 @@ def _among(pairs: IntArray, some: IntArray) -> np.ndarray:
 
 
 def _reach(pieces: np.ndarray, between: ContactPatches, standing: ContactPatches) -> np.ndarray:
-    """For each part whether its body rests on the ground, by way of other bodies or not, bool (n,)."""
+    """Return whether the body of each part rests on the ground, directly or by other bodies, bool (n,)."""
     links = np.stack([between.first, between.second], axis=1).astype(np.int32)
     groups = connected_components(int(pieces.max()) + 1, links)
     found: np.ndarray = np.isin(groups[pieces], groups[pieces[standing.first]])
@@ -152,7 +157,7 @@ def _reach(pieces: np.ndarray, between: ContactPatches, standing: ContactPatches
 
 
 def _hulls_of(standing: ContactPatches, pieces: np.ndarray) -> ContactPatches:
-    """The points on the ground of parts, as hulls of the points of bodies."""
+    """Return the ground points of parts as hulls of the points of bodies."""
     bodies = pieces[standing.first]
     kept = []
     for body in np.unique(bodies).tolist():
@@ -165,8 +170,11 @@ def _hulls_of(standing: ContactPatches, pieces: np.ndarray) -> ContactPatches:
 
 
 def _azimuth(placed: PlacedParts) -> float:
-    """A direction that turns with the shape about the vertical: to its point furthest from the vertical through the
-    centre of mass, and among equals the first. The pushes look alike in a mirror along it."""
+    """Return a direction that turns with the shape about the vertical.
+
+    It leads from the vertical through the centre of mass to the farthest point, the first of equals. The pushes are
+    symmetric about it.
+    """
     centre = (placed.weights @ placed.centroids)[:2]
     ways = np.concatenate(placed.points)[:, :2] - centre
     reach = (ways**2).sum(axis=1)
@@ -175,9 +183,11 @@ def _azimuth(placed: PlacedParts) -> float:
 
 
 def _pushes(weights: FloatArray, azimuth: float, glued: bool) -> FloatArray:
-    """The loads that a stable shape bears a little of, float64 (loads, n, 6), lengths in diagonals: each part pushed by
-    its weight in eight level directions and twisted by it both ways about the vertical. Where joints bear pull only so
-    far also up and down: without glue that is less or more gravity, which changes nothing."""
+    """Return the loads of which a stable shape bears a share, float64 (loads, n, 6), lengths in diagonals.
+
+    Each part is pushed by its weight in eight level directions and twisted both ways about the vertical. If joints bear
+    limited pull, each is also pushed up and down; without glue that only changes gravity.
+    """
     angles = azimuth + 2 * np.pi * np.arange(PUSH_DIRECTIONS) / PUSH_DIRECTIONS
     level = np.stack([np.cos(angles), np.sin(angles), np.zeros(PUSH_DIRECTIONS)], axis=1)
     upright = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
@@ -188,7 +198,7 @@ def _pushes(weights: FloatArray, azimuth: float, glued: bool) -> FloatArray:
 
 
 def _fastest(placed: PlacedParts, pieces: np.ndarray, centres: FloatArray, motion: FloatArray) -> int:
-    """The part whose centroid moves most in a motion (n, 6), lengths in diagonals, of the bodies."""
+    """Return the part whose centroid moves most in a motion (n, 6) of the bodies, lengths in diagonals."""
     arms = (placed.centroids - centres[pieces]) / placed.diagonal
     moves = motion[pieces, :3] + np.cross(motion[pieces, 3:], arms)
     lengths = np.linalg.norm(moves, axis=1)

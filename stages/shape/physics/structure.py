@@ -1,4 +1,4 @@
-"""What a shape is like as a structure: overlap of its parts, its stand, its symmetry."""
+"""Structure of a shape: its stand and its symmetry."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from stages.shape.physics.contacts import ContactPatches
 from stages.shape.physics.solids import PlacedParts
 
 MIRROR_TOLERANCE_SHARE = 0.02
-"""Parts are mirror images where centroids and extents differ by at most this share of the shape's diagonal."""
+"""Mirror images differ in centroids and extents by at most this share of the shape's diagonal."""
 
 
 def ground_share(placed: PlacedParts, standing: ContactPatches) -> float:
-    """Area on which the shape stands, as a share of the area of its outline seen from above: the flat undersides of
-    its parts, each part's hull of what stands on the ground. 0 where it stands on points or lines."""
+    """Return the area on which the shape stands, as a share of the area of its outline seen from above.
+
+    The area is that of each part's hull of ground points. It is 0 if the shape stands on points or lines.
+    """
     outline = np.concatenate(placed.points)[:, :2]
     whole = _area(outline[convex_hull(outline)])
     if whole <= 1e-12 * placed.diagonal**2:
@@ -30,11 +32,11 @@ def _area(polygon: FloatArray) -> float:
 
 
 def mirror_score(placed: PlacedParts) -> float:
-    """The greatest share of the weight, over upright mirror planes through the centre of mass, of parts that the mirror
-    maps to a part alike: same place of the centroid, same extents, within ALIKE.
+    """Return the greatest share of the weight that an upright mirror through the centre of mass maps to equal parts.
 
-    Any mirror that maps the shape to itself maps the part that is furthest out, weighed, to one of its kind, so it is
-    among the planes tried: between that part and each other, and through that part.
+    Equal parts have the same position of the centroid and the same extents, within MIRROR_TOLERANCE_SHARE. Any mirror
+    of the shape maps the outmost part, by weight, to one of its kind. So the planes tried are those between that part
+    and each other, and through that part.
     """
     centre = placed.weights @ placed.centroids
     places = placed.centroids - centre
@@ -52,20 +54,20 @@ def mirror_score(placed: PlacedParts) -> float:
 
 
 def _long_axis(placed: PlacedParts) -> FloatArray:
-    """The level axis along which the points of the shape spread most."""
+    """Return the level axis along which the points of the shape spread most."""
     flat = np.concatenate(placed.points)[:, :2] - (placed.weights @ placed.centroids)[:2]
     axis: FloatArray = np.linalg.eigh(flat.T @ flat)[1][:, 1]
     return axis
 
 
 def _spreads(placed: PlacedParts) -> FloatArray:
-    """How the corners of each part spread about their middle, float64 (n, 3, 3), as a root of second moments."""
-    found = np.empty((len(placed), 3, 3))
+    """Return how the corners of each part spread about their middle, float64 (n, 3, 3), as a root of second moments."""
+    spreads = np.empty((len(placed), 3, 3))
     for part, points in enumerate(placed.points):
         centred = points - points.mean(axis=0)
         values, vectors = np.linalg.eigh(centred.T @ centred / len(points))
-        found[part] = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
-    return found
+        spreads[part] = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    return spreads
 
 
 def _matched(placed: PlacedParts, places: FloatArray, spreads: FloatArray, normal: FloatArray) -> float:

@@ -1,5 +1,7 @@
-"""Linear programmes of one rigid body: six equations, so the simplex method on a dense tableau answers ten of
-them in a millisecond, which takes a general solver tens of milliseconds."""
+"""Linear programmes of one rigid body: six equations, solved by the simplex method on a dense tableau.
+
+Ten of them take a millisecond; a general solver takes tens of milliseconds.
+"""
 
 from __future__ import annotations
 
@@ -9,26 +11,29 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 
 FEASIBILITY_TOLERANCE = 1e-7
-"""What may be left over of an equation that holds."""
+"""Largest residual of an equation that holds."""
 TIE_TOLERANCE = 1e-6
-"""Of loads that grow equally far the first tells what gives way."""
+"""Of loads that grow equally far the first decides what gives way."""
 ZERO_RATE = 1e-9
-"""Smaller rates are rounding: none is divided by."""
+"""Smaller rates are rounding and are never divided by."""
 GREEDY_PIVOTS = 100
-"""Pivots by the greatest gain; then by the first, which never goes in circles (Bland's rule)."""
+"""Pivots by the greatest gain; later ones take the first, which never cycles (Bland's rule)."""
 MAX_PIVOTS = 2_000
 NO_END = -2.0
 
 
 def grow_loads(edges: FloatArray, load: FloatArray, growing: FloatArray, cap: float) -> tuple[FloatArray, FloatArray]:
-    """The greatest factor, at most `cap`, of each load with which edges @ x + factor * growing = load, for an x >= 0.
+    """Return the greatest factor, at most `cap`, of each load with edges @ x + factor * growing = load for some x >= 0.
 
-    edges: float64 (rows, c), what a unit of each force does; load: float64 (rows,); growing: float64 (loads, rows).
-    Gives the factors, float64 (loads,), all -1 where there is no x even for factor 0, and the multipliers of the
-    equations, float64 (loads, rows), 0 where the cap was reached. Of many multipliers those of the first of the loads
-    that grow least are the least of all: they are the same however the equations are turned.
+    edges: wrench of a unit of each force, float64 (rows, c)
+    load: float64 (rows,)
+    growing: float64 (loads, rows)
 
-    Raises ArithmeticError where the method finds no end, or its answer does not solve the equations.
+    Returns the factors, float64 (loads,), all -1 if there is no x even for factor 0, and the multipliers of the
+    equations, float64 (loads, rows), 0 if the cap was reached. For the first of the loads that grow least the shortest
+    multipliers are taken, which do not depend on the orientation of the equations.
+
+    Raises ArithmeticError if the method finds no end, or its answer does not solve the equations.
     """
     rows, count = edges.shape
     sign = np.where(load < 0, -1.0, 1.0)
@@ -69,8 +74,10 @@ def grow_loads(edges: FloatArray, load: FloatArray, growing: FloatArray, cap: fl
 
 
 def _least(edges: FloatArray, load: FloatArray, growing: FloatArray, factor: float, found: FloatArray) -> FloatArray:
-    """The multipliers y of least length with edges.T @ y >= 0, growing @ y >= 1, load @ y <= factor (least distance
-    programming, Lawson and Hanson 1974, chapter 23); those that were found where that fails."""
+    """Return the shortest multipliers y with edges.T @ y >= 0, growing @ y >= 1, load @ y <= factor.
+
+    Least distance programming (Lawson and Hanson 1974, chapter 23). Returns `found` if it fails.
+    """
     from scipy.optimize import nnls
 
     inner = np.vstack([edges.T, growing, -load])
@@ -86,7 +93,7 @@ def _least(edges: FloatArray, load: FloatArray, growing: FloatArray, factor: flo
 
 @numba.njit(cache=True)
 def _pivot(table, basis, row, column):
-    """The variable `column` enters the basis at `row`."""
+    """Let the variable `column` enter the basis at `row`."""
     table[row] /= table[row, column]
     for other in range(len(table)):
         if other != row and table[other, column] != 0.0:
@@ -96,8 +103,10 @@ def _pivot(table, basis, row, column):
 
 @numba.njit(cache=True)
 def _leaving(table, basis, count, column, fixed):
-    """The row whose variable first comes to nothing as that of `column` grows, -1 for none; of equals that of the first
-    variable. `fixed`: whether slacks are nothing and must stay so."""
+    """Return the row whose variable first becomes zero as that of `column` grows, -1 for none.
+
+    Ties go to the first variable. `fixed`: whether slacks are zero and must stay so.
+    """
     found, least = -1, np.inf
     for row in range(len(table)):
         rate = table[row, column]
@@ -111,7 +120,7 @@ def _leaving(table, basis, count, column, fixed):
 
 @numba.njit(cache=True)
 def _entering(rates, greedy):
-    """The column of the greatest rate, or of the first above rounding, -1 for none."""
+    """Return the column of the greatest rate, or of the first above rounding, -1 for none."""
     found, most = -1, ZERO_RATE
     for column in range(len(rates)):
         if rates[column] > most:
@@ -123,7 +132,7 @@ def _entering(rates, greedy):
 
 @numba.njit(cache=True)
 def _empty_slacks(table, basis, count):
-    """Pivots until the slacks are as little as they can be; what is left of them."""
+    """Pivot until the slacks are minimal. Returns what is left of them."""
     for step in range(MAX_PIVOTS):
         rates = np.zeros(count)
         left = 0.0
@@ -143,7 +152,7 @@ def _empty_slacks(table, basis, count):
 
 @numba.njit(cache=True)
 def _grow(table, basis, count, cap):
-    """Pivots from a basis that bears the steady load until the factor is as great as it can be, or the cap."""
+    """Pivot from a basis that bears the steady load until the factor is greatest. Returns the factor, or the cap."""
     factor = count + len(table)
     row = _leaving(table, basis, count, factor, True)
     if row < 0:

@@ -1,7 +1,7 @@
-"""Cameras: where one stands to look at a shape, and the view and projection matrices that follow.
+"""Cameras: viewpoints, and the view and projection matrices that follow.
 
-Matrices are OpenGL's: the eye looks along -z of eye space, x points right and y up; clip depth runs from -1 (near)
-to 1 (far).
+Matrices are OpenGL's: the eye looks along -z of eye space, x points right and y up; clip depth runs from -1 (near) to 1
+(far).
 """
 
 from __future__ import annotations
@@ -14,15 +14,17 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 
 MIN_DISTANCE_RADII = 1.05
-"""Nearest allowed eye, in radii of the bounding sphere: the whole shape stays in front of the eye."""
+"""Nearest allowed eye in radii of the bounding sphere: the whole shape stays in front of the eye."""
 
 
 @dataclass(frozen=True)
 class View:
-    """A camera that has been pointed at one shape.
+    """A camera pointed at one shape.
 
-    eye: float64 (4, 4), world to eye space; projection: float64 (4, 4), eye to clip space.
-    depth: distance from the eye to the middle of the shape; radius: of the shape's bounding sphere; world units.
+    eye: world to eye space, float64 (4, 4)
+    projection: eye to clip space, float64 (4, 4)
+    depth: distance from the eye to the middle of the shape, world units
+    radius: radius of the shape's bounding sphere, world units
     """
 
     eye: FloatArray
@@ -32,18 +34,21 @@ class View:
 
     @property
     def perspective(self) -> bool:
-        """Whether far things look smaller."""
+        """Whether the projection is perspective."""
         return bool(self.projection[3, 3] == 0.0)
 
 
 @dataclass(frozen=True)
 class Camera:
-    """Where to look from.
+    """A viewpoint.
 
-    azimuth, elevation: degrees; azimuth 0 looks at the front (from +z where y is up, from -y where z is up) and
-    grows towards +x; elevation 90 looks straight down. fov: full angle of the shorter image side, degrees.
-    distance: from the eye to the middle of the shape in radii of its bounding sphere, at least 1.05; None moves the
-    eye (and centres the shape) so that it just fills the frame but for `margin`, a share of the frame on each side.
+    azimuth: degrees; 0 looks at the front (from +z if y is up, from -y if z is up), growing towards +x
+    elevation: degrees; 90 looks straight down
+    projection: kind of projection
+    fov: full angle of the shorter image side, degrees
+    distance: from the eye to the middle of the shape in radii of its bounding sphere, at least 1.05; None moves the eye
+        and centres the shape so that it fills the frame
+    margin: share of the frame left free on each side if `distance` is None
     """
 
     azimuth: float
@@ -54,9 +59,12 @@ class Camera:
     margin: float = 0.06
 
     def look(self, points: FloatArray, up: Literal["y", "z"], aspect: float = 1.0) -> View:
-        """Point the camera at a shape, given by points (n, 3) whose hull contains it; `aspect` is width / height.
+        """Point the camera at a shape.
 
-        Raises ValueError for no points, and for a distance that would put the eye inside the shape.
+        points: points whose hull contains the shape, (n, 3)
+        aspect: width / height
+
+        Raises ValueError for no points, and for a distance that puts the eye inside the shape.
         """
         if len(points) == 0:
             raise ValueError("a camera needs at least one point to look at")
@@ -84,7 +92,10 @@ class Camera:
         return View(eye, _projection(self.projection, frame, near, far), depth, radius)
 
     def _perspective_frame(self, turned: FloatArray, half: FloatArray, radius: float) -> tuple[FloatArray, float]:
-        """Sideways shift (2,) and distance of the eye; `half` are the tangents of half the angles of both sides."""
+        """Return the sideways shift (2,) and the distance of the eye.
+
+        half: tangents of half the angles of both sides
+        """
         if self.distance is not None:
             return np.zeros(2), self.distance * radius
         inner = half * (1.0 - 2.0 * self.margin)
@@ -97,7 +108,7 @@ class Camera:
     def _orthographic_frame(
         self, turned: FloatArray, sides: FloatArray, radius: float, slope: float
     ) -> tuple[FloatArray, FloatArray]:
-        """Sideways shift (2,) and half extents (2,) of the frame."""
+        """Return the sideways shift (2,) and half extents (2,) of the frame."""
         if self.distance is not None:
             return np.zeros(2), sides * self.distance * radius * slope
         high, low = turned[:, :2].max(axis=0), turned[:, :2].min(axis=0)
@@ -106,7 +117,7 @@ class Camera:
 
 
 def eye_rotation(azimuth: float, elevation: float, up: Literal["y", "z"]) -> FloatArray:
-    """Rotation (3, 3) from world to eye axes: rows are right, up and backwards; angles in degrees."""
+    """Return the rotation (3, 3) from world to eye axes. Rows are right, up and backwards; angles are in degrees."""
     a, e = np.radians(azimuth), np.radians(elevation)
     right = [np.cos(a), 0.0, -np.sin(a)]
     above = [-np.sin(e) * np.sin(a), np.cos(e), -np.sin(e) * np.cos(a)]
@@ -119,7 +130,10 @@ def eye_rotation(azimuth: float, elevation: float, up: Literal["y", "z"]) -> Flo
 
 
 def _projection(kind: Literal["perspective", "orthographic"], frame: FloatArray, near: float, far: float) -> FloatArray:
-    """Clip matrix (4, 4); `frame` (2,) scales eye x and y (per unit of depth, if in perspective) to -1..1."""
+    """Return the clip matrix (4, 4).
+
+    frame: scales eye x and y (per unit of depth in perspective) to -1..1, (2,)
+    """
     projection = np.zeros((4, 4))
     projection[0, 0], projection[1, 1] = frame
     if kind == "perspective":

@@ -1,4 +1,4 @@
-"""Ink: strokes as an image, each an even line with round ends, its edge anti-aliased by its exact distance."""
+"""Ink: strokes as an image, each an even line with round ends, anti-aliased by exact distance."""
 
 from __future__ import annotations
 
@@ -8,26 +8,25 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, Strokes
+from stages.shape.views.strokes import BOUNDARY_LINE, CONTOUR_LINE, CREASE_LINE, OUTLINE_LINE, Strokes
 
 CROWD_CELL = 4.0
-"""Side of the cells, in pixels of the image, in which the length of lines is summed to see how crowded they are."""
+"""Side, in pixels of the image, of the cells in which the length of lines is summed to find where they are crowded."""
 
 FADING = np.zeros(256)
-"""How strongly each kind of stroke gives way where lines are crowded: the proportion is taken to this power."""
-FADING[[CREASE, BOUNDARY, CONTOUR, OUTLINE]] = 1.0, 1.0, 0.5, 0.5
+"""Exponent of the thinning of each kind of stroke where lines are crowded."""
+FADING[[CREASE_LINE, BOUNDARY_LINE, CONTOUR_LINE, OUTLINE_LINE]] = 1.0, 1.0, 0.5, 0.5
 
 
 def ink_strokes(
     strokes: Strokes, widths: Mapping[int, float], width: int, height: int, scale: float, crowding: float
 ) -> FloatArray:
-    """Coverage 0..1 of each pixel by ink, float64 (height, width).
+    """Return the coverage 0..1 of each pixel by ink, float64 (height, width).
 
-    widths: line width of each kind of stroke, in pixels of the image; a kind without a width is not drawn.
-    scale: pixels of the image for each pixel of the view the strokes were found in.
-    crowding: where lines stand closer than this, in pixels of the image, they are drawn thinner in proportion
-    (contours and outlines less so), so that fine detail turns into a light hatch and not into a black patch; 0 keeps
-    all widths.
+    widths: line width of each kind of stroke, in pixels of the image; a kind without a width is not drawn
+    scale: pixels of the image for each pixel of the view in which the strokes were found
+    crowding: lines closer than this, in pixels of the image, are drawn thinner in proportion (contours and outlines
+        less so), so that fine detail becomes a light hatch; 0 keeps all widths
     """
     ends = strokes.ends * scale
     table = np.zeros(256)
@@ -40,7 +39,9 @@ def ink_strokes(
 
 @numba.njit(cache=True, error_model="numpy")
 def _fade(ends, kinds, table, fading, width, height, crowding):
-    """Width of each segment (n,): thinner where the mean spacing of lines (area over length) around it is small."""
+    """Return the width of each segment (n,), thinner where the mean spacing of lines (area over length) around it is
+    small.
+    """
     lines = table[kinds]
     if crowding == 0.0:
         return lines

@@ -1,4 +1,4 @@
-"""Which of two faces in one plane is seen: every backend sets the parts of higher layers back by the same hair."""
+"""Which of two faces in one plane is seen: every renderer sets the parts of higher layers back equally."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ LAYER_STEP = 5e-5
 
 
 def layered_moves(scene: Scene, view: View) -> FloatArray:
-    """Mesh coordinates to eye space for each part, float64 (n, 4, 4), parts set back along the rays by their layer.
+    """Return transforms from mesh coordinates to eye space, float64 (n, 4, 4), parts set back along the rays by layer.
 
     In perspective a part is scaled about the eye, so nothing moves on the screen.
     """

@@ -1,4 +1,4 @@
-"""Light for portraits: where a shape shadows itself and the ground, and how open the sky is at each pixel."""
+"""Light for portraits: shadows of a shape on itself and the ground, and how open the sky is at each pixel."""
 
 from __future__ import annotations
 
@@ -19,14 +19,18 @@ GOLDEN_ANGLE = 2.399963229728653
 
 @dataclass(frozen=True)
 class KeyLight:
-    """A far light: `direction` float64 (3,), towards it, in the world; `view` and `depth` (s, s): its shadow map."""
+    """A distant light.
+
+    direction: towards the light, in the world, float64 (3,)
+    view, depth: its shadow map, depth (s, s)
+    """
 
     direction: FloatArray
     view: View
     depth: Float32Array
 
     def reaches(self, points: FloatArray, softness: float) -> FloatArray:
-        """Share 0..1 of the light that reaches world points (n, 3), blurred over `softness` (world units)."""
+        """Return the share 0..1 of the light that reaches world points (n, 3), blurred over `softness`, world units."""
         local = points @ self.view.eye[:3, :3].T + self.view.eye[:3, 3]
         size = len(self.depth)
         x = (local[:, 0] * self.view.projection[0, 0] + 1) / 2 * size
@@ -37,16 +41,16 @@ class KeyLight:
         return share
 
 
-def key_light(scene: Scene, azimuth: float, elevation: float, backend: RendererName) -> KeyLight:
-    """A light that shines on the scene from a direction given as a camera's is."""
+def key_light(scene: Scene, azimuth: float, elevation: float, renderer: RendererName) -> KeyLight:
+    """Return a light that shines on the scene from a direction given as a camera's is."""
     camera = Camera(azimuth, elevation, "orthographic", margin=0.02)
     view = camera.look(scene.points, scene.up)
-    buffers = render_buffers(scene, camera, (SHADOW_MAP, SHADOW_MAP), 1, backend)
+    buffers = render_buffers(scene, camera, (SHADOW_MAP, SHADOW_MAP), 1, renderer)
     return KeyLight(view.eye[2, :3].copy(), view, buffers.depth)
 
 
 def eye_positions(depth: Float32Array, view: View) -> FloatArray:
-    """Positions of the pixels in eye space, float64 (h, w, 3); infinite depths give infinite positions."""
+    """Return the positions of the pixels in eye space, float64 (h, w, 3); infinite depths give infinite positions."""
     height, width = depth.shape
     x = ((np.arange(width) + 0.5) * 2 / width - 1) / view.projection[0, 0]
     y = (1 - (np.arange(height) + 0.5) * 2 / height) / view.projection[1, 1]
@@ -56,7 +60,7 @@ def eye_positions(depth: Float32Array, view: View) -> FloatArray:
 
 
 def to_world(points: FloatArray, view: View) -> FloatArray:
-    """Points of eye space (n, 3) in the world."""
+    """Return points of eye space (n, 3) in the world."""
     moved: FloatArray = (points - view.eye[:3, 3]) @ view.eye[:3, :3]
     return moved
 
@@ -64,8 +68,12 @@ def to_world(points: FloatArray, view: View) -> FloatArray:
 def ground_seen(
     wanted: BoolArray, view: View, axis: int, height: float, middle: FloatArray, reach: float
 ) -> tuple[IntArray, FloatArray]:
-    """Where the rays through the `wanted` pixels, bool (h, w), meet the ground, at `height` along `axis`, from above
-    and within `reach` of `middle` (3,): numbers of the pixels, int64 (n,), and points of the world, float64 (n, 3)."""
+    """Return where rays through pixels meet the ground: pixel numbers, int64 (n,), and world points, float64 (n, 3).
+
+    wanted: pixels, bool (h, w)
+    axis, height: the ground is at `height` along `axis`, seen from above
+    middle, reach: only points within `reach` of `middle` (3,) count
+    """
     across, upwards = view.projection[0, 0], view.projection[1, 1]
     rotation, shift = view.eye[:3, :3], view.eye[:3, 3]
     seen: tuple[IntArray, FloatArray]
@@ -74,9 +82,9 @@ def ground_seen(
 
 
 def openness(depth: Float32Array, normal: Float32Array, view: View, reach: float) -> FloatArray:
-    """How much of the half-sphere over each pixel is free of nearby surfaces, float64 (h, w), 1 for background.
+    """Return how much of the half-sphere over each pixel is free of nearby surfaces, float64 (h, w), 1 for background.
 
-    Nearby means within `reach` (world units), and only what the picture itself shows is known.
+    Nearby means within `reach` (world units). Only surfaces in the picture count.
     """
     positions = eye_positions(depth, view)
     across = 2.0 / (view.projection[0, 0] * depth.shape[1])
@@ -98,11 +106,11 @@ def _ground_seen(wanted, across, upwards, perspective, rotation, shift, axis, he
             x = ((column + 0.5) * 2 / columns - 1) / across
             y = (1 - (row + 0.5) * 2 / rows) / upwards
             for k in range(3):
-                # Through a lens rays leave the eye; else they leave the picture, all the same way.
-                away, beside = -rotation[2, k], rotation[0, k] * x + rotation[1, k] * y
+                # In perspective rays start at the eye, else in the picture, all parallel.
+                away, sideways = -rotation[2, k], rotation[0, k] * x + rotation[1, k] * y
                 origin = -(rotation[0, k] * shift[0] + rotation[1, k] * shift[1] + rotation[2, k] * shift[2])
-                start[k] = origin if perspective else origin + beside
-                ray[k] = away + beside if perspective else away
+                start[k] = origin if perspective else origin + sideways
+                ray[k] = away + sideways if perspective else away
             if ray[axis] >= -1e-9:
                 continue
             long = (height - start[axis]) / ray[axis]
@@ -119,7 +127,7 @@ def _ground_seen(wanted, across, upwards, perspective, rotation, shift, axis, he
 
 @numba.njit(cache=True, error_model="numpy")
 def _filtered(depth, x, y, distance, radius, bias):
-    """Share of unshadowed taps of a disc of `radius` pixels around each (x, y)."""
+    """Return the share of unshadowed taps of a disc of `radius` pixels around each (x, y)."""
     lit = np.empty(len(x))
     size = len(depth)
     taps = 32
@@ -133,8 +141,8 @@ def _filtered(depth, x, y, distance, radius, bias):
                 top, bottom = min(top, row), max(bottom, row)
                 first, last = min(first, column), max(last, column)
     for k in range(len(x)):
-        beside = x[k] < first - radius or x[k] >= last + 1 + radius
-        if beside or y[k] < top - radius or y[k] >= bottom + 1 + radius:
+        outside = x[k] < first - radius or x[k] >= last + 1 + radius
+        if outside or y[k] < top - radius or y[k] >= bottom + 1 + radius:
             lit[k] = 1.0
             continue
         free = 0
@@ -181,7 +189,7 @@ def _openness(depth, normal, positions, reach, across, perspective):
 
 @numba.njit(cache=True, error_model="numpy")
 def _smoothed(values, depth, reach):
-    """Mean over four by four pixels of about the same depth: exactly one turn of the pattern of `_openness`."""
+    """Return the mean over four by four pixels of similar depth: exactly one turn of the pattern of `_openness`."""
     height, width = values.shape
     result = values.copy()
     for row in range(height):

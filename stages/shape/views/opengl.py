@@ -1,8 +1,8 @@
 """Which triangle each pixel shows, by OpenGL: pyrender's offscreen context, and one shader that writes numbers.
 
-pyrender draws colours, with anti-aliasing that mixes neighbouring ids and one upload of every mesh for each scene.
-Here its EGL context is kept, meshes are uploaded once for each mesh set, all instances of a mesh are one draw call, and
-the only thing drawn is the number of the triangle.
+pyrender draws colours, with anti-aliasing that mixes neighbouring ids and one upload of every mesh for each scene. Here
+its EGL context is kept, meshes are uploaded once for each mesh set, all instances of a mesh are one draw call, and only
+the number of the triangle is drawn.
 
 Graphics cards round differently, so Mesa's software rasteriser draws, on machines with a card too.
 """
@@ -25,7 +25,7 @@ from stages.shape.views.layers import layered_moves
 from stages.shape.views.scene import MeshSet, Scene
 
 KEPT_MESH_SETS = 8
-"""Mesh sets that stay uploaded; the one used longest ago goes first."""
+"""Mesh sets that stay uploaded; the least recently used goes first."""
 
 VERTEX_SHADER = """#version 330 core
 layout(location = 0) in vec3 position;
@@ -57,7 +57,7 @@ SOFTWARE = {
     "GALLIUM_DRIVER": "llvmpipe",
     "LP_NUM_THREADS": "0",
 }
-"""Mesa draws in software, and in the calling thread: the mill runs one worker for each core."""
+"""Environment that makes Mesa draw in software in the calling thread: there is one worker for each core."""
 
 RASTERISER = "llvmpipe"
 VENDORS = ("/etc/glvnd/egl_vendor.d", "/usr/share/glvnd/egl_vendor.d")
@@ -65,7 +65,7 @@ VENDORS = ("/etc/glvnd/egl_vendor.d", "/usr/share/glvnd/egl_vendor.d")
 
 
 def load_pyrender() -> Any:
-    """The module `pyrender`, set to draw by Mesa's software rasteriser. Raises RuntimeError where there is none.
+    """Return the module `pyrender`, set to draw by Mesa's software rasteriser. Raises RuntimeError if it is missing.
 
     pyrender still uses a NumPy name that NumPy 2 dropped.
     """
@@ -86,7 +86,12 @@ def load_pyrender() -> Any:
 
 @dataclass(frozen=True)
 class _Mesh:
-    """One uploaded mesh: vertex array, its buffers (the last one for instances), number of indices."""
+    """One uploaded mesh.
+
+    array: vertex array
+    buffers: its buffers, the last one for instances
+    indices: number of indices
+    """
 
     array: int
     buffers: tuple[int, int, int]
@@ -94,7 +99,7 @@ class _Mesh:
 
 
 class OpenGLRenderer:
-    """One OpenGL context. Raises RuntimeError where none can be had, or where anything but llvmpipe would draw."""
+    """One OpenGL context. Raises RuntimeError if none can be created, or if anything but llvmpipe would draw."""
 
     def __init__(self) -> None:
         try:
@@ -111,9 +116,9 @@ class OpenGLRenderer:
         self._frame = 0
 
     def triangles(self, scene: Scene, view: View, width: int, height: int) -> IntArray:
-        """The triangle that each pixel shows, int32 (height, width), -1 for none.
+        """Return the triangle that each pixel shows, int32 (height, width), -1 for none.
 
-        Raises RuntimeError where the driver refuses: the context may be lost.
+        Raises RuntimeError if the driver refuses: the context may be lost.
         """
         from OpenGL.error import Error
 
@@ -145,7 +150,7 @@ class OpenGLRenderer:
         return np.ascontiguousarray(pixels[::-1])
 
     def close(self) -> None:
-        """Give the context back."""
+        """Release the context."""
         self._context.delete()
 
     def _build(self) -> None:
@@ -215,14 +220,14 @@ class OpenGLRenderer:
 
 
 def _renderer_name() -> str:
-    """Renderer and version as OpenGL names them."""
+    """Return renderer and version as OpenGL names them."""
     from OpenGL import GL
 
     return ", ".join(GL.glGetString(name).decode() for name in (GL.GL_RENDERER, GL.GL_VERSION))
 
 
 def _upload(vertices: np.ndarray, faces: IntArray) -> _Mesh:
-    """One mesh as a vertex array whose per-instance attributes come from its third buffer."""
+    """Upload one mesh as a vertex array whose per-instance attributes come from its third buffer."""
     from OpenGL import GL
 
     array = GL.glGenVertexArrays(1)

@@ -1,4 +1,4 @@
-"""Colours for things that have none of their own: part types, labels, samples."""
+"""Colours for part types, labels and samples that have none."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ CHROMA = (0.088, 0.072, 0.100)
 
 
 def label_colors(count: int) -> ByteArray:
-    """`count` soft colours that are easy to tell apart, uint8 (count, 3) sRGB: evenly light, hues a golden turn apart.
+    """Return `count` soft colours that are easy to tell apart, uint8 (count, 3) sRGB.
 
-    A colour depends on its index only, so label 3 looks the same in every picture.
+    They are evenly light, with hues a golden turn apart. A colour depends only on its index, so label 3 looks the same
+    in every picture.
     """
     index = np.arange(count)
     hue = 2.0 * np.pi * (0.09 + index * GOLDEN_TURN)
@@ -32,14 +33,14 @@ def label_colors(count: int) -> ByteArray:
 
 
 def srgb_to_linear(color: ByteArray) -> FloatArray:
-    """uint8 sRGB to linear light 0..1."""
+    """Convert uint8 sRGB to linear light 0..1."""
     value = color / 255.0
     linear: FloatArray = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
     return linear
 
 
 def linear_to_srgb(light: FloatArray) -> ByteArray:
-    """Linear light to uint8 sRGB; what is brighter than white is white."""
+    """Convert linear light to uint8 sRGB, clipped to white."""
     value = np.clip(light, 0.0, 1.0)
     encoded = np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
     return np.rint(255.0 * encoded).astype(np.uint8)

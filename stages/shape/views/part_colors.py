@@ -9,7 +9,7 @@ from stages.shape.shape import Shape
 from stages.shape.views.palette import label_colors
 
 MAX_COLOR_RANGE = 12
-"""Levels by which colours of one blob differ at most."""
+"""Levels by which colours that count as one differ at most."""
 
 
 def part_paint(shape: Shape) -> ByteArray | None:

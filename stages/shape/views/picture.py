@@ -1,4 +1,4 @@
-"""A picture of one shape, for whoever wants to see what they have made."""
+"""A picture of one shape."""
 
 from __future__ import annotations
 
@@ -12,6 +12,10 @@ ABOVE = Camera(azimuth=-40.0, elevation=25.0)
 
 
 def shape_png(shape: Shape, camera: Camera = ABOVE, size: tuple[int, int] = (640, 640)) -> bytes:
-    """A shaded picture of `shape` as PNG, of `size` (width, height) in pixels, from the left and above unless `camera`
-    says otherwise. Raises ShardFailed for a shape of which nothing is seen."""
+    """Return a shaded picture of `shape` as PNG, by default from the left and above.
+
+    size: (width, height) in pixels
+
+    Raises ShardFailed for a shape that is not visible.
+    """
     return picture_png(portrait(scene_of(shape), camera, size))

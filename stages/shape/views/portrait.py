@@ -31,24 +31,26 @@ def portrait(
     camera: Camera,
     size: tuple[int, int],
     part_colors: ByteArray | None = None,
-    backend: RendererName = "raster",
+    renderer: RendererName = "raster",
 ) -> ByteArray:
-    """A shaded picture of a scene, uint8 (height, width, 3) for `size` (width, height).
+    """Return a shaded picture of a scene, uint8 (height, width, 3).
 
-    A soft key light from the upper left with its shadows, sky and ground light, darker corners, thin lines where
-    parts meet, and a shadow on the ground. `part_colors` uint8 (n, 3) paints each part in one colour instead of its
-    faces' own. Raises ShardFailed for a blank picture.
+    size: (width, height)
+    part_colors: colour of each part instead of its faces' own, uint8 (n, 3)
+
+    A soft key light from the upper left with shadows, sky and ground light, darker corners, thin lines where parts
+    meet, and a shadow on the ground. Raises ShardFailed for a blank picture.
     """
     from stages.shape.views.pixel_normals import smooth_normals
     from stages.shape.views.screen import surface_buffers
 
     width, height = size[0] * SUBPIXELS_PER_PIXEL, size[1] * SUBPIXELS_PER_PIXEL
-    seen = visible_triangles(scene, camera, (width, height), backend)
+    seen = visible_triangles(scene, camera, (width, height), renderer)
     depth, _, part, color = surface_buffers(scene, seen.view, seen.triangles, seen.screen, seen.normals)
     normal = smooth_normals(seen)
     if part_colors is not None:
         color = np.where(part[..., None] >= 0, part_colors[part], color)
-    light = key_light(scene, camera.azimuth - 52.0, 52.0, backend)
+    light = key_light(scene, camera.azimuth - 52.0, 52.0, renderer)
     shown = part >= 0
     picture = np.broadcast_to(srgb_to_linear(np.array(PAPER, dtype=np.uint8)), (height, width, 3)).copy()
     if camera.elevation > 0.0:
@@ -59,7 +61,7 @@ def portrait(
     up = upright[:, 1 if scene.up == "y" else 2]
     sky = (0.5 + 0.5 * up)[:, None] * SKY + (0.5 - 0.5 * up)[:, None] * GROUND
     open_sky = openness(depth, normal, seen.view, 0.10 * seen.view.radius)[shown][:, None]
-    # Bright albedos are held back a little, so that white models keep their shading.
+    # Bright albedos are reduced a little, so that white models keep their shading.
     albedo = 0.02 + 0.90 * srgb_to_linear(color[shown])
     picture[shown] = albedo * (lit[:, None] * KEY * (0.35 + 0.65 * open_sky) + sky * open_sky)
     drawn = _ink(seen, size)[..., None]
@@ -75,10 +77,12 @@ def points_portrait(
     up: Literal["y", "z"],
     paint: ByteArray | None = None,
 ) -> ByteArray:
-    """Points (n, 3) as small shaded balls coloured by `labels` (n,), uint8 (height, width, 3) for (width, height).
+    """Return points (n, 3) as small shaded balls coloured by `labels` (n,), uint8 (height, width, 3).
 
-    paint: uint8 (k, 3) sRGB, the colour of each label; without, labels have colours that differ well. The more points,
-    the smaller the balls. Raises ValueError where there are no points.
+    size: (width, height)
+    paint: colour of each label, uint8 (k, 3) sRGB; by default distinct colours
+
+    More points make smaller balls. Raises ValueError for no points.
     """
     width, height = size[0] * SUBPIXELS_PER_PIXEL, size[1] * SUBPIXELS_PER_PIXEL
     view = camera.look(points, up, width / height)
@@ -99,12 +103,11 @@ def points_portrait(
 
 
 def _ground_light(scene: Scene, view: View, light: KeyLight, hidden: BoolArray) -> FloatArray:
-    """What the shadow on the ground leaves of the light, float64 (h, w, 3); 1 where no ground is seen, as where it is
-    `hidden`, bool (h, w)."""
+    """Return what the ground shadow leaves of the light, float64 (h, w, 3); 1 where ground is `hidden` or not seen."""
     height, width = hidden.shape
     axis = 1 if scene.up == "y" else 2
     middle = (scene.points.min(axis=0) + scene.points.max(axis=0)) / 2
-    # Where a shadow would leave the picture it fades out, so that pictures stand side by side without a seam.
+    # A shadow fades out at the border, so that pictures join without a seam.
     rows, columns = np.arange(height) + 0.5, np.arange(width) + 0.5
     edge = np.minimum(np.minimum(rows, height - rows)[:, None], np.minimum(columns, width - columns)[None, :])
     inside = np.clip(edge / (0.10 * min(height, width)), 0.0, 1.0)
@@ -120,18 +123,18 @@ def _ground_light(scene: Scene, view: View, light: KeyLight, hidden: BoolArray) 
 
 
 def _ink(seen: Visible, size: tuple[int, int]) -> FloatArray:
-    """Thin lines over the picture, (height, width) 0..1."""
+    """Return thin lines over the picture, (height, width) 0..1."""
     from stages.shape.views.corner_normals import CREASE_ANGLE_DEGREES
     from stages.shape.views.ink import ink_strokes
-    from stages.shape.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, find_strokes
+    from stages.shape.views.strokes import BOUNDARY_LINE, CONTOUR_LINE, CREASE_LINE, OUTLINE_LINE, find_strokes
 
     strokes = find_strokes(seen, CREASE_ANGLE_DEGREES, 0.5 * SUBPIXELS_PER_PIXEL, 4.0 * SUBPIXELS_PER_PIXEL)
-    widths = {OUTLINE: 1.1, CONTOUR: 0.9, BOUNDARY: 0.7, CREASE: 0.35}
+    widths = {OUTLINE_LINE: 1.1, CONTOUR_LINE: 0.9, BOUNDARY_LINE: 0.7, CREASE_LINE: 0.35}
     return 0.62 * ink_strokes(strokes, widths, size[0], size[1], 1.0 / SUBPIXELS_PER_PIXEL, 4.0)
 
 
 def _reduced(picture: FloatArray) -> FloatArray:
-    """The mean over each square of SUPERSAMPLE pixels."""
+    """Return the mean over each square of SUBPIXELS_PER_PIXEL pixels."""
     height, width, channels = picture.shape
     tiles = picture.reshape(
         height // SUBPIXELS_PER_PIXEL, SUBPIXELS_PER_PIXEL, width // SUBPIXELS_PER_PIXEL, SUBPIXELS_PER_PIXEL, channels
@@ -142,7 +145,7 @@ def _reduced(picture: FloatArray) -> FloatArray:
 
 @numba.njit(cache=True, error_model="numpy")
 def _balls(local, radius, projection, width, height):
-    """Depth float32, normal float32 (3) and owner int32 of each pixel, for balls around eye-space points (n, 3)."""
+    """Return what the ground shadow leaves of the light, float64 (h, w, 3); 1 where ground is not seen."""
     depth = np.full((height, width), np.inf, dtype=np.float32)
     normal = np.zeros((height, width, 3), dtype=np.float32)
     owner = np.full((height, width), -1, dtype=np.int32)

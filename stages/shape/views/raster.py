@@ -1,10 +1,10 @@
-"""Which triangle each pixel shows, by rasterising: no display, no driver, no OpenGL context, the same on every machine.
+"""Which triangle each pixel shows, by rasterising: no display, no driver, no OpenGL, the same on every machine.
 
-Corners are snapped to a grid far finer than a pixel. What follows is whole numbers: on which side of an edge the
-centre of a pixel lies, and whose it is where it lies on the edge itself (the top-left rule, so that two triangles with
-a common edge leave no pixel between them and share none). Depth is taken from the plane of the unsnapped triangle, in
-double precision, and rounded: of triangles at one depth the first is seen. The nearest and first triangle of a pixel
-is the smallest of whole numbers, so it does not matter in which order triangles are drawn.
+Corners are snapped to a grid far finer than a pixel. The rest is integers: on which side of an edge the centre of a
+pixel lies, and which triangle owns it if it lies on the edge (the top-left rule: two triangles with a common edge leave
+no pixel between them and share none). Depth comes from the plane of the unsnapped triangle, in double precision, and is
+rounded. Of triangles at one depth the first is seen. The nearest and first triangle of a pixel is a minimum of
+integers, so the order of drawing does not matter.
 
 Nothing is clipped: `Camera.look` keeps every point in front of the eye.
 """
@@ -21,34 +21,37 @@ from stages.shape.views.scene import Scene
 from stages.shape.views.screen import project_triangles
 
 GRID_BITS = 16
-"""Corners are snapped to this power of a half of a pixel, or to less where they lie far outside of the picture."""
+"""Corners are snapped to this power of a half of a pixel, or to less if they lie far outside of the picture."""
 COORDINATE_BITS = 29
-"""Snapped coordinates stay below this power of two, so that an edge function, twice a product of two differences,
-stays below 2**61."""
+"""Snapped coordinates stay below this power of two.
+
+So an edge function, twice a product of two differences, stays below 2**61.
+"""
 DEPTH_STEPS = 2.0**28
-"""Depths that are told apart between the middle of the clip range and its end."""
+"""Distinct depths between the middle of the clip range and its end."""
 NOTHING = np.iinfo(np.int64).max
 
 
 class RasterRenderer:
-    """Draws on one thread; nothing is held."""
+    """Draws on one thread and holds no resources."""
 
     name = "Shapemill's rasteriser 1"
 
     def triangles(self, scene: Scene, view: View, width: int, height: int) -> IntArray:
-        """The triangle that each pixel shows, int32 (height, width), -1 for none."""
+        """Return the triangle that each pixel shows, int32 (height, width), -1 for none."""
         return raster(project_triangles(scene, view, layered_moves(scene, view), width, height), width, height)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: no resources are held."""
 
 
 def raster(screen: FloatArray, width: int, height: int) -> IntArray:
-    """The nearest triangle at the centre of each pixel, int32 (height, width), -1 for none.
+    """Return the nearest triangle at the centre of each pixel, int32 (height, width), -1 for none.
 
-    screen: float64 (t, 3, 3), the corners of triangles in pixels and clip depth, as `stages/shape/views/screen.py`
-    says. A triangle is seen from both sides; one without area on the grid is seen from none.
-    Raises ValueError for corners that are no numbers, or too far outside of the picture to be told apart.
+    screen: corners of triangles in pixels and clip depth (see `stages/shape/views/screen.py`), float64 (t, 3, 3)
+
+    A triangle is seen from both sides, and not at all if it has no area on the grid. Raises ValueError for corners that
+    are not finite, or too far outside of the picture.
     """
     farthest = float(np.abs(screen[:, :, :2]).max(initial=1.0))
     bits = COORDINATE_BITS - int(np.frexp(farthest)[1]) if np.isfinite(farthest) else 0
@@ -111,7 +114,7 @@ def _raster(screen, width, height, bits):
 
 @numba.njit(cache=True, error_model="numpy")
 def _centres(corners, bits, size):
-    """The first and the last of `size` pixels whose centres lie between the corners of a triangle, along one axis."""
+    """Return the first and last of `size` pixels whose centres lie between the corners of a triangle along one axis."""
     half = (1 << bits) >> 1
     first = ((min(corners[0], corners[1], corners[2]) - half - 1) >> bits) + 1
     last = (max(corners[0], corners[1], corners[2]) - half) >> bits
@@ -120,8 +123,10 @@ def _centres(corners, bits, size):
 
 @numba.njit(cache=True, error_model="numpy")
 def _plane(corners, x, y):
-    """Depth of a triangle's plane at a point of the screen, its change a pixel to the right and a pixel down, and the
-    smallest and largest depth of the corners, all in steps."""
+    """Return the depth of a triangle's plane at a point of the screen and its changes per pixel to the right and down.
+
+    Then follow the smallest and largest depth of the corners; all are in steps.
+    """
     ax, ay = corners[1, 0] - corners[0, 0], corners[1, 1] - corners[0, 1]
     bx, by = corners[2, 0] - corners[0, 0], corners[2, 1] - corners[0, 1]
     first, second, third = corners[0, 2] * DEPTH_STEPS, corners[1, 2] * DEPTH_STEPS, corners[2, 2] * DEPTH_STEPS

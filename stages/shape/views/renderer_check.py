@@ -20,26 +20,28 @@ RENDERERS: tuple[RendererName, ...] = get_args(RendererName)
 CHECK_SECONDS = 120.0
 
 
-def check_renderer(backend: RendererName, asked: str) -> None:
-    """Raises ConfigError, with the mend, where `backend` cannot draw on this machine; `asked` names the config's key.
+def check_renderer(renderer: RendererName, key: str) -> None:
+    """Raise ConfigError, with the mend, if a renderer cannot draw on this machine.
 
-    Our own rasteriser needs nothing but numba, so it is not tried.
+    key: config key that asks for it
+
+    Our own rasteriser needs only numba, so it is not tried.
     """
-    wrong = None if backend == "raster" else check_in_subprocess(backend)
+    wrong = None if renderer == "raster" else check_in_subprocess(renderer)
     if wrong is not None:
         raise ConfigError(
-            f"{asked}: {backend} cannot draw on this machine: {wrong}; `make doctor` says what is missing, and "
+            f"{key}: {renderer} cannot draw on this machine: {wrong}; `make doctor` says what is missing, and "
             "raster draws everywhere, with a few other pixels"
         )
 
 
-def check_triangle(backend: RendererName) -> str | None:
-    """Render a triangle with `backend` in this process; None if it is right, else what is wrong."""
+def check_triangle(renderer: RendererName) -> str | None:
+    """Render a triangle in this process. Returns None if it is right, else what is wrong."""
     vertices = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0]])
     red = np.array([[200, 30, 20]], dtype=np.uint8)
     scene = mesh_scene(vertices, np.array([[0, 1, 2]], dtype=np.int32), red, "y")
     try:
-        buffers = render_buffers(scene, Camera(0.0, 0.0, "orthographic", margin=0.0), (32, 32), 1, backend)
+        buffers = render_buffers(scene, Camera(0.0, 0.0, "orthographic", margin=0.0), (32, 32), 1, renderer)
     except (ShardFailed, ImportError, OSError) as error:
         return str(error)
     inside = np.tri(32, dtype=bool, k=-1)
@@ -52,10 +54,10 @@ def check_triangle(backend: RendererName) -> str | None:
 
 
 @lru_cache(maxsize=len(RENDERERS))
-def check_in_subprocess(backend: RendererName) -> str | None:
-    """`check_triangle` in a process of its own, so that a driver that crashes or hangs takes nothing with it."""
+def check_in_subprocess(renderer: RendererName) -> str | None:
+    """Run `check_triangle` in a process of its own, so that a driver that crashes or hangs does no harm."""
     root = Path(__file__).resolve().parents[3]
-    command = [sys.executable, "-m", "stages.shape.views.renderer_check", backend]
+    command = [sys.executable, "-m", "stages.shape.views.renderer_check", renderer]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=CHECK_SECONDS, cwd=root, check=False)
     except subprocess.TimeoutExpired:
@@ -67,14 +69,13 @@ def check_in_subprocess(backend: RendererName) -> str | None:
 
 
 def main() -> int:
-    """Entry point: prints what draws, or what is wrong, in one line; 0 if the backend draws, 1 if it does not, 2 for a
-    wrong call."""
+    """Print the renderer's version or the fault. Returns 0 if it draws, 1 if not, 2 for a wrong call."""
     if len(sys.argv) != 2 or sys.argv[1] not in RENDERERS:
         print(f"usage: python -m stages.shape.views.renderer_check {'|'.join(RENDERERS)}", file=sys.stderr)
         return 2
-    backend = RENDERERS[RENDERERS.index(sys.argv[1])]
-    wrong = check_triangle(backend)
-    print(renderer_version(backend) if wrong is None else wrong)
+    renderer = RENDERERS[RENDERERS.index(sys.argv[1])]
+    wrong = check_triangle(renderer)
+    print(renderer_version(renderer) if wrong is None else wrong)
     return 0 if wrong is None else 1
 
 

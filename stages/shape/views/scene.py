@@ -1,4 +1,4 @@
-"""Scenes: meshes that are stored once, and the posed instances of them that make a shape."""
+"""Scenes: meshes stored once, and the posed instances of them that make a shape."""
 
 from __future__ import annotations
 
@@ -15,17 +15,19 @@ from stages.shape.kit import PartMesh
 from stages.shape.shape import Shape
 
 WELD_DISTANCE_SHARE = 2e-6
-"""Vertices closer than this share of half their mesh's longest side are one vertex where faces are asked for those
-beside them."""
+"""Vertices closer than this share of half their mesh's longest side count as one vertex."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshSet:
-    """Meshes in one block, compared by identity, so that a renderer keeps what it has uploaded.
+    """Meshes in one block, compared by identity, so that a renderer keeps its uploads.
 
-    vertices: float64 (v, 3), each mesh around the middle of its own box (a model far from the origin keeps its
-    digits in single precision); faces: int32 (f, 3) into `vertices`; colors: uint8 (f, 3) sRGB;
-    vertex_first, face_first: int64 (m + 1,), where each mesh begins and ends; centers: float64 (m, 3), the middles.
+    vertices: each mesh around the middle of its box, so that a distant model keeps its digits in single precision,
+        float64 (v, 3)
+    faces: rows of `vertices`, int32 (f, 3)
+    colors: sRGB, uint8 (f, 3)
+    vertex_first, face_first: where each mesh begins and ends, int64 (m + 1,)
+    centers: the middles, float64 (m, 3)
     """
 
     vertices: FloatArray
@@ -37,7 +39,7 @@ class MeshSet:
 
     @staticmethod
     def of(meshes: Sequence[tuple[FloatArray, IntArray, ByteArray]]) -> MeshSet:
-        """The set of `(vertices (v, 3), faces (f, 3), face colors (f, 3))`."""
+        """Return the set of `(vertices (v, 3), faces (f, 3), face colors (f, 3))`."""
         middles = [(v.min(axis=0) + v.max(axis=0)) / 2 if len(v) else np.zeros(3) for v, _, _ in meshes]
         vertex_first = np.cumsum([0, *(len(v) for v, _, _ in meshes)])
         face_first = np.cumsum([0, *(len(f) for _, f, _ in meshes)])
@@ -65,7 +67,7 @@ class MeshSet:
 
     @cached_property
     def _welded(self) -> np.ndarray:
-        """The corners of each face, int64 (f, 3), with one number for all that are at one place."""
+        """The corners of each face, int64 (f, 3), with one number for all at one position."""
         mesh_of = np.repeat(np.arange(len(self.centers)), np.diff(self.vertex_first))
         size = np.zeros(len(self.centers))
         np.maximum.at(size, mesh_of, np.abs(self.vertices).max(axis=1))
@@ -75,10 +77,10 @@ class MeshSet:
 
     @cached_property
     def neighbours(self) -> IntArray:
-        """For each face the face across each of its edges (0-1, 1-2, 2-0), int32 (f, 3); -1 where none is alone.
+        """The face across each edge (0-1, 1-2, 2-0) of each face, int32 (f, 3); -1 if there is not exactly one.
 
-        Vertices at the same place (within a millionth of the mesh) count as one, so that seams of texture or
-        shading are no borders. An edge of more than two faces has no single surface across it: -1.
+        Vertices at the same position (within a millionth of the mesh) count as one, so seams of texture or shading are
+        not borders.
         """
         corners = self._welded
         starts, ends = corners.ravel(), corners[:, [1, 2, 0]].ravel()
@@ -97,9 +99,11 @@ class MeshSet:
 class Scene:
     """Posed instances of meshes.
 
-    mesh_of: int32 (n,), the mesh of each part; poses: float64 (n, 4, 4), rigid; up: the axis that points up.
-    layers: int32 (n,): where faces of two parts lie in one plane, the part of the lower layer is seen.
-    one_surface: whether no line is drawn where the surface of one part goes on in that of the next.
+    mesh_of: mesh of each part, int32 (n,)
+    poses: rigid, float64 (n, 4, 4)
+    layers: of faces of two parts in one plane, that of the lower layer is seen, int32 (n,)
+    up: axis that points up
+    one_surface: whether no line is drawn where the surface of one part continues in the next
     """
 
     meshes: MeshSet
@@ -121,7 +125,7 @@ class Scene:
 
     @cached_property
     def triangle_first(self) -> np.ndarray:
-        """Number of the first triangle of each part, and of all, int64 (n + 1,)."""
+        """Number of the first triangle of each part, then the total, int64 (n + 1,)."""
         counts = np.diff(self.meshes.face_first)[self.mesh_of]
         return np.concatenate([[0], np.cumsum(counts)])
 
@@ -149,7 +153,7 @@ class Scene:
 
 
 def scene_of(shape: Shape) -> Scene:
-    """The scene of a shape. Scenes of shapes with the same meshes share one mesh set."""
+    """Return the scene of a shape. Scenes of shapes with the same meshes share one mesh set."""
     parts = shape.assembly
     layers = _layers(len(parts), parts.edges)
     types = parts.types.astype(np.int32)
@@ -157,19 +161,19 @@ def scene_of(shape: Shape) -> Scene:
 
 
 def mesh_scene(vertices: FloatArray, faces: IntArray, face_colors: ByteArray, up: Literal["y", "z"]) -> Scene:
-    """A scene of one part, vertices (v, 3), faces (f, 3), face_colors uint8 (f, 3)."""
+    """Return a scene of one part: vertices (v, 3), faces (f, 3), face_colors uint8 (f, 3)."""
     single = np.zeros(1, dtype=np.int32)
     return Scene(MeshSet.of([(vertices, faces, face_colors)]), single, np.eye(4)[None], single, up)
 
 
 @lru_cache(maxsize=16)
 def mesh_set(meshes: tuple[PartMesh, ...]) -> MeshSet:
-    """The set of these meshes; the same object for the same meshes, so that a renderer keeps what it has uploaded."""
+    """Return the set of these meshes, the same object for the same meshes."""
     return MeshSet.of([(mesh.vertices, mesh.faces, mesh.face_colors) for mesh in meshes])
 
 
 def _layers(parts: int, edges: IntArray) -> IntArray:
-    """A small number for each part that differs from those of all parts it touches, int32 (parts,)."""
+    """Return a small number for each part that differs from those of all parts it touches, int32 (parts,)."""
     lower: list[list[int]] = [[] for _ in range(parts)]
     for i, j in edges.tolist():
         lower[max(i, j)].append(min(i, j))

@@ -1,9 +1,9 @@
-"""What the pixels of a view show: triangles on the screen, and depth, normal, part and colour where they are seen.
+"""What the pixels of a view show: triangles on the screen, and depth, normal, part and colour of the seen points.
 
-Both backends only say which triangle each pixel shows. Everything else is computed here from that triangle's plane,
-in double precision, so two backends that see the same triangles give the same buffers.
+Both renderers only return the triangle of each pixel. The rest is computed here from that triangle's plane, in double
+precision. So two renderers that see the same triangles give the same buffers.
 
-Screen coordinates are pixels, x to the right and y down, the centre of the first pixel at (0.5, 0.5); the third
+Screen coordinates are pixels, x to the right and y down, the centre of the first pixel at (0.5, 0.5). The third
 coordinate is clip depth, which is linear across the screen on every plane.
 """
 
@@ -18,13 +18,15 @@ from stages.shape.views.scene import Scene
 
 
 def screen_triangles(scene: Scene, view: View, width: int, height: int) -> FloatArray:
-    """The corners of all triangles on the screen, float64 (t, 3, 3)."""
+    """Return the corners of all triangles on the screen, float64 (t, 3, 3)."""
     return project_triangles(scene, view, view.eye @ scene.placed, width, height)
 
 
 def project_triangles(scene: Scene, view: View, moves: FloatArray, width: int, height: int) -> FloatArray:
-    """The corners of all triangles on the screen, float64 (t, 3, 3), where `moves`, float64 (n, 4, 4), takes the mesh
-    coordinates of each part to eye space."""
+    """Return the corners of all triangles on the screen, float64 (t, 3, 3).
+
+    moves: transforms from the mesh coordinates of each part to eye space, float64 (n, 4, 4)
+    """
     parts, faces = scene.triangle_part, scene.triangle_face
     screen: FloatArray = _project(
         scene.meshes.vertices, scene.meshes.faces, parts, faces, moves, view.projection, width, height
@@ -33,7 +35,7 @@ def project_triangles(scene: Scene, view: View, moves: FloatArray, width: int, h
 
 
 def screen_normals(scene: Scene, view: View, screen: FloatArray) -> FloatArray:
-    """Unit normals of all triangles in eye space, turned towards the viewer, float64 (t, 3)."""
+    """Return unit normals of all triangles in eye space, turned towards the viewer, float64 (t, 3)."""
     rotations = (view.eye @ scene.poses)[:, :3, :3]
     parts, faces = scene.triangle_part, scene.triangle_face
     normals: FloatArray = _facing_normals(scene.meshes.normals, parts, faces, rotations, screen)
@@ -43,10 +45,11 @@ def screen_normals(scene: Scene, view: View, screen: FloatArray) -> FloatArray:
 def surface_buffers(
     scene: Scene, view: View, triangles: IntArray, screen: FloatArray, normals: FloatArray
 ) -> tuple[Float32Array, Float32Array, IntArray, ByteArray]:
-    """Depth float32 (h, w), normal float32 (h, w, 3), part int32 (h, w) and colour uint8 (h, w, 3) of the pixels.
+    """Return depth float32 (h, w), normal float32 (h, w, 3), part int32 (h, w) and colour uint8 (h, w, 3) of the
+    pixels.
 
-    `triangles` int32 (h, w) is the triangle each pixel shows, -1 for none; there depth is infinite, the normal
-    zero, the part -1 and the colour white.
+    triangles: triangle of each pixel, int32 (h, w); where it is -1, depth is infinite, the normal zero, the part -1 and
+        the colour white
     """
     parts, faces, colors = scene.triangle_part, scene.triangle_face, scene.meshes.colors
     shaded: tuple[Float32Array, Float32Array, IntArray, ByteArray] = _shade(
@@ -87,7 +90,7 @@ def _facing_normals(mesh_normals, parts, face_of, rotations, screen):
 
 @numba.njit(cache=True, error_model="numpy")
 def clip_at(screen, t, x, y):
-    """Clip depth of the plane of triangle `t` at a point of the screen, held within the triangle's own depths."""
+    """Return the clip depth of the plane of triangle `t` at a point of the screen, clamped to the triangle's depths."""
     ax, ay = screen[t, 1, 0] - screen[t, 0, 0], screen[t, 1, 1] - screen[t, 0, 1]
     bx, by = screen[t, 2, 0] - screen[t, 0, 0], screen[t, 2, 1] - screen[t, 0, 1]
     first, second, third = screen[t, 0, 2], screen[t, 1, 2], screen[t, 2, 2]
@@ -103,7 +106,7 @@ def clip_at(screen, t, x, y):
 
 @numba.njit(cache=True, error_model="numpy")
 def eye_depth(clip, projection):
-    """Distance along the viewing axis of a clip depth."""
+    """Return the distance along the viewing axis of a clip depth."""
     return -(projection[2, 3] - clip * projection[3, 3]) / (clip * projection[3, 2] - projection[2, 2])
 
 

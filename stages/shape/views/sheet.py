@@ -17,12 +17,12 @@ TITLE_INK = (32, 30, 34)
 CAPTION_INK = (122, 116, 112)
 RULE_COLOR = (226, 221, 213)
 MIN_NOTE_WIDTH = 180
-"""Pixels beside a title, of a cell of 320, that a note has at least."""
+"""Pixels next to a title, of a cell of 320, that a note has at least."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A picture, uint8 (h, w) or (h, w, 3), and a line under it (may be empty)."""
+    """A picture, uint8 (h, w) or (h, w, 3), and a caption (may be empty)."""
 
     picture: ByteArray
     caption: str = ""
@@ -30,7 +30,11 @@ class Cell:
 
 @dataclass(frozen=True)
 class Section:
-    """Rows of cells under a heading; `note` stands beside it in small print. A cell is `span` columns wide."""
+    """Rows of cells under a heading.
+
+    note: small print next to the heading
+    span: width of a cell in columns
+    """
 
     title: str
     rows: Sequence[Sequence[Cell]]
@@ -39,10 +43,11 @@ class Section:
 
 
 def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int = 320) -> ByteArray:
-    """The sheet, uint8 (h, w, 3). Pictures are scaled to `cell_width` pixels (times the section's span, and the gaps
-    between); rows of unequal length stay ragged. Where titles are longer than rows, the sheet is as wide as they are.
+    """Return the sheet, uint8 (h, w, 3).
 
-    Margins and letters grow with `cell_width`. Raises ValueError where there is no picture at all.
+    Pictures are scaled to `cell_width` pixels (times the section's span, with the gaps between). Rows of unequal length
+    stay ragged. If titles are longer than rows, the sheet is as wide as they are. Margins and letters grow with
+    `cell_width`. Raises ValueError for no pictures.
     """
     from PIL import Image, ImageDraw
 
@@ -91,7 +96,7 @@ def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int 
 
 
 def picture_png(picture: ByteArray) -> bytes:
-    """A picture, uint8 (h, w) or (h, w, 3), as PNG; equal pictures give equal bytes."""
+    """Return a picture, uint8 (h, w) or (h, w, 3), as PNG; equal pictures give equal bytes."""
     import io
 
     from PIL import Image
@@ -114,7 +119,7 @@ def _row_heights(sections: Sequence[Section], widths: Sequence[int], unit: float
 
 
 def _scaled(picture: ByteArray, width: int) -> Any:
-    """A PIL image of the width given; paper shows through the white of drawings of one channel."""
+    """Return a PIL image of the given width; the paper shows through the white of drawings of one channel."""
     from PIL import Image
 
     image = Image.fromarray(picture)
@@ -128,7 +133,7 @@ def _scaled(picture: ByteArray, width: int) -> Any:
 
 
 def _longest(sections: Sequence[Section], title: str, fonts: Mapping[str, Any], unit: float) -> int:
-    """Pixels that titles take, and some of each note beside them."""
+    """Return the pixels that titles take, with a minimum for the notes next to them."""
     lengths: list[float] = [fonts["title"].getlength(title)]
     lengths += [fonts["head"].getlength(section.title) for section in sections]
     lengths += [
@@ -138,13 +143,13 @@ def _longest(sections: Sequence[Section], title: str, fonts: Mapping[str, Any], 
 
 
 def _after(section: Section, fonts: Mapping[str, Any], unit: float) -> float:
-    """Where the note of a section begins, from where its title does."""
+    """Return where the note of a section begins, relative to its title."""
     length: float = fonts["head"].getlength(section.title) + 14 * unit
     return length
 
 
 def _note_lines(section: Section, fonts: Mapping[str, Any], width: int, unit: float) -> list[str]:
-    """The note of a section in lines that fit beside its title; a word that is longer stands alone."""
+    """Return the note of a section in lines that fit next to its title; a longer word gets a line of its own."""
     room = width - _after(section, fonts, unit)
     lines: list[str] = []
     for word in section.note.split(" "):
@@ -157,7 +162,7 @@ def _note_lines(section: Section, fonts: Mapping[str, Any], width: int, unit: fl
 
 
 def _fitting(pen: Any, text: str, font: Any, width: int) -> str:
-    """`text`, cut with an ellipsis to fit the width."""
+    """Return `text`, cut with an ellipsis to fit the width."""
     if pen.textlength(text, font) <= width:
         return text
     while text and pen.textlength(text + "…", font) > width:
@@ -167,7 +172,7 @@ def _fitting(pen: Any, text: str, font: Any, width: int) -> str:
 
 @lru_cache(maxsize=16)
 def _font(size: int, bold: bool) -> Any:
-    """DejaVu Sans as it comes with matplotlib: the same letters on every machine."""
+    """Return DejaVu Sans from matplotlib: the same letters on every machine."""
     from matplotlib import get_data_path
     from PIL import ImageFont
 

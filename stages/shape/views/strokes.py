@@ -1,18 +1,17 @@
 """Strokes: the lines that a person would draw, found between the pixels of a view.
 
-Two neighbouring pixels that show different triangles have a line between them, or none. The surface itself decides:
-it is walked across the edges of its triangles from the one pixel towards the other.
+Two neighbouring pixels that show different triangles have one line between them, or none. The surface itself decides.
+It is walked across the edges of its triangles from the one pixel towards the other.
 
-- The walk arrives: one surface. A sharp edge on the way is a crease, and it lies where the walk crossed it.
-- The walk ends at a border or where the surface turns away from the viewer. If what the other pixel shows lies
-  farther back there, that end is a contour; if it lies at the same depth, two surfaces meet: a boundary where they
-  belong to two parts that are no pieces of one surface, else a crease where they meet at an angle, nothing where one
-  plane goes on.
-- Both surfaces go on under each other: they pass through each other, and the line is where their depths are equal.
+- The walk arrives: one surface. A sharp edge on the way is a crease, where the walk crossed it.
+- The walk ends at a border or where the surface turns away from the viewer. If the other pixel shows something farther
+  back, that end is a contour. If it has the same depth, two surfaces meet: a boundary if they belong to two parts that
+  are not pieces of one surface, else a crease if they meet at an angle, and nothing if one plane continues.
+- Both surfaces continue under each other: they pass through each other, and the line is where their depths are equal.
 
-So every crossing is known to a fraction of a pixel, a tessellated plane or cylinder has no lines of its own, and
-what is hidden cannot leave a trace: nothing is ever looked at but what some pixel shows. Crossings are then joined
-inside each square of four pixel centres into segments of lines.
+So every crossing is known to a fraction of a pixel, a tessellated plane or cylinder has no lines of its own, and hidden
+surfaces leave no trace: only what some pixel shows is used. Crossings are then joined inside each square of four pixel
+centres into segments of lines.
 """
 
 from __future__ import annotations
@@ -27,29 +26,33 @@ from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.views.buffers import Visible
 from stages.shape.views.screen import clip_at, eye_depth
 
-CREASE, BOUNDARY, CONTOUR, OUTLINE = 1, 2, 3, 4
+CREASE_LINE, BOUNDARY_LINE, CONTOUR_LINE, OUTLINE_LINE = 1, 2, 3, 4
 """Kinds of strokes, the weightier ones with the higher numbers; an outline is a contour against the background."""
 
-MOST_STEPS = 24
+MAX_WALK_STEPS = 24
 """Triangles that a walk between two pixels may cross before it counts as ended."""
-ROUNDED_TURN = 60.0
-"""A smooth surface that turns by more than so many degrees between two pixels, both well visible, is a rounded edge
-finer than a pixel, and drawn as a crease."""
+ROUNDED_TURN_DEGREES = 60.0
+"""A smooth surface that turns by more degrees between two visible pixels is a rounded edge, drawn as a crease."""
 
 
 @dataclass(frozen=True)
 class Strokes:
-    """Segments of lines: ends float64 (n, 2, 2) as (x, y) in pixels of the view; kind uint8 (n,)."""
+    """Segments of lines.
+
+    ends: (x, y) in pixels of the view, float64 (n, 2, 2)
+    kinds: uint8 (n,)
+    """
 
     ends: FloatArray
     kinds: ByteArray
 
 
 def find_strokes(seen: Visible, crease_angle: float, step: float, shortest: float) -> Strokes:
-    """The strokes of a view.
+    """Return the strokes of a view.
 
-    crease_angle: degrees between the normals of two faces above which their edge is drawn. step: smallest jump in
-    depth that is a contour; shortest: connected lines shorter in all than this are left out; both in pixels.
+    crease_angle: degrees between the normals of two faces above which their edge is drawn
+    step: smallest jump in depth that is a contour, pixels
+    shortest: connected lines of less total length are left out, pixels
     """
     crossings = _crossings(
         seen.triangles, _triangles(seen), _parts(seen), _thresholds(seen, crease_angle, step), seen.view.projection
@@ -60,8 +63,13 @@ def find_strokes(seen: Visible, crease_angle: float, step: float, shortest: floa
 
 
 class _Triangles(NamedTuple):
-    """All triangles of a view: where they stand on the screen, float64 (t, 3, 3), their normals, float64 (t, 3), the
-    face of each in its mesh, (t,), and the neighbours of each face of the meshes, or -1, (f, 3)."""
+    """All triangles of a view.
+
+    screen: corners on the screen, float64 (t, 3, 3)
+    normals: float64 (t, 3)
+    faces: face of each triangle in its mesh, (t,)
+    neighbours: neighbours of each face of the meshes, or -1, (f, 3)
+    """
 
     screen: np.ndarray
     normals: np.ndarray
@@ -70,8 +78,13 @@ class _Triangles(NamedTuple):
 
 
 class _Parts(NamedTuple):
-    """Whose the triangles are: the part of each, (t,); by part what is to be added to a face for its triangle, and the
-    layer, both (n,); whether parts are pieces of one surface."""
+    """The parts of the triangles.
+
+    of: part of each triangle, (t,)
+    shifts: number to add to a face of each part to get its triangle, (n,)
+    layers: (n,)
+    one_surface: whether parts are pieces of one surface
+    """
 
     of: np.ndarray
     shifts: np.ndarray
@@ -82,9 +95,11 @@ class _Parts(NamedTuple):
 class _Thresholds(NamedTuple):
     """What makes a line.
 
-    crease, rounded: cosines of the angles between normals, across an edge and between two pixels on a smooth surface,
-    above which there is a crease. jump: smallest jump in depth that is a contour, in units of the scene; where
-    `perspective`, at a depth of 1, and it grows with the depth.
+    crease: cosine between normals across an edge above which there is a crease
+    rounded: the same between two pixels on a smooth surface
+    jump: smallest jump in depth that is a contour, in units of the scene; in perspective at a depth of 1, growing with
+        the depth
+    perspective: whether the view is in perspective
     """
 
     crease: float
@@ -107,16 +122,16 @@ def _thresholds(seen: Visible, crease_angle: float, step: float) -> _Thresholds:
     pixel = 2.0 / (seen.view.projection[1, 1] * len(seen.triangles))
     return _Thresholds(
         crease=float(np.cos(np.radians(crease_angle))),
-        rounded=float(np.cos(np.radians(ROUNDED_TURN))),
+        rounded=float(np.cos(np.radians(ROUNDED_TURN_DEGREES))),
         jump=float(step * pixel),
         perspective=seen.view.perspective,
     )
 
 
-# What is called for each pair of pixels is inlined: passing arrays on takes half of the time otherwise.
+# Functions called for each pair of pixels are inlined: passing arrays would take half of the time.
 @numba.njit(cache=True, error_model="numpy", inline="always")
 def _side(screen, t, edge, x, y):
-    """Twice the signed area of (x, y) and an edge of the triangle `t` on the screen."""
+    """Return twice the signed area of (x, y) and an edge of the triangle `t` on the screen."""
     end = edge + 1 if edge < 2 else 0
     ax, ay = screen[t, edge, 0], screen[t, edge, 1]
     return (screen[t, end, 0] - ax) * (y - ay) - (screen[t, end, 1] - ay) * (x - ax)
@@ -124,22 +139,23 @@ def _side(screen, t, edge, x, y):
 
 @numba.njit(cache=True, error_model="numpy", inline="always")
 def _cosine(normals, a, b):
-    """Cosine of the angle between the normals of two triangles."""
+    """Return the cosine of the angle between the normals of two triangles."""
     return normals[a, 0] * normals[b, 0] + normals[a, 1] * normals[b, 1] + normals[a, 2] * normals[b, 2]
 
 
 @numba.njit(cache=True, error_model="numpy", inline="always")
 def _walk(triangles, shift, crease, start, goal, p, q):
-    """Walk on the surface from triangle `start` at the point `p` of the screen straight to the point `q`;
-    `shift` is that of its part.
+    """Walk on the surface from triangle `start` at the point `p` of the screen straight to the point `q`.
 
-    Returns (arrived, s, last, sharp): whether the walk ended on `goal`; the share of the way where the surface ends
-    (1 if it reaches q); the last triangle; the share of the way at the sharpest edge above the crease angle, or -1.
+    shift: that of its part
+
+    Returns (arrived, s, last, sharp): whether the walk ended on `goal`; the share of the way where the surface ends (1
+    if it reaches q); the last triangle; the share of the way at the sharpest edge above the crease angle, or -1.
     """
     screen, normals, faces, neighbours = triangles
     triangle, entry = start, -1
     s, sharp, sharpest = 0.0, -1.0, crease
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_WALK_STEPS):
         if triangle == goal:
             return True, s, triangle, sharp
         area = _side(screen, triangle, 0, screen[triangle, 2, 0], screen[triangle, 2, 1])
@@ -179,13 +195,16 @@ def _walk(triangles, shift, crease, start, goal, p, q):
 
 @numba.njit(cache=True, error_model="numpy", inline="always")
 def _between(triangles, parts, thresholds, projection, a, b, p, q):
-    """Kind and place (share of the way from p to q) of the line between the pixels at `p` and `q` of the screen, which
-    show the triangles `a` and `b`, one of them perhaps none."""
+    """Return kind and position (share of the way from p to q) of the line between two pixels.
+
+    p, q: pixels on the screen
+    a, b: triangles that they show, one of them perhaps none
+    """
     screen, normals, crease = triangles.screen, triangles.normals, thresholds.crease
     if b < 0:
-        return OUTLINE, _walk(triangles, parts.shifts[parts.of[a]], crease, a, -1, p, q)[1]
+        return OUTLINE_LINE, _walk(triangles, parts.shifts[parts.of[a]], crease, a, -1, p, q)[1]
     if a < 0:
-        return OUTLINE, 1.0 - _walk(triangles, parts.shifts[parts.of[b]], crease, b, -1, q, p)[1]
+        return OUTLINE_LINE, 1.0 - _walk(triangles, parts.shifts[parts.of[b]], crease, b, -1, q, p)[1]
     part_a, part_b = parts.of[a], parts.of[b]
     goal_a, goal_b = (b, a) if part_a == part_b else (-1, -1)
     arrived, end_a, last_a, sharp = _walk(triangles, parts.shifts[part_a], crease, a, goal_a, p, q)
@@ -213,36 +232,36 @@ def _between(triangles, parts, thresholds, projection, a, b, p, q):
     else:
         s, gap = start_b, at_start
     if abs(gap) > tolerance:
-        return CONTOUR, s
+        return CONTOUR_LINE, s
     if part_a != part_b and not parts.one_surface:
-        return BOUNDARY, s
+        return BOUNDARY_LINE, s
     if _cosine(normals, last_a, last_b) < crease:
-        return CREASE, s
+        return CREASE_LINE, s
     return 0, 0.0
 
 
 @numba.njit(cache=True, error_model="numpy", inline="always")
 def _gap(screen, projection, a, b, p, q, s):
-    """How much farther triangle `a` is than triangle `b` at the share `s` of the way from p to q."""
+    """Return how much farther triangle `a` is than triangle `b` at the share `s` of the way from p to q."""
     x, y = p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])
     return eye_depth(clip_at(screen, a, x, y), projection) - eye_depth(clip_at(screen, b, x, y), projection)
 
 
 @numba.njit(cache=True, error_model="numpy", inline="always")
 def _on_one_surface(normals, rounded, a, b, sharp):
-    """Kind and place of the line between two triangles that a walk joins, with `sharp` as the walk says."""
+    """Return kind and position of the line between two triangles that a walk joins, with `sharp` from the walk."""
     if sharp >= 0.0:
-        return CREASE, sharp
+        return CREASE_LINE, sharp
     if normals[a, 2] > 0.3 and normals[b, 2] > 0.3 and _cosine(normals, a, b) < rounded:
-        return CREASE, 0.5
+        return CREASE_LINE, 0.5
     return 0, 0.0
 
 
 @numba.njit(cache=True, error_model="numpy", inline="always")
 def _runs_on(triangles, crease, a, b):
-    """Whether two triangles of one part share an edge that is neither sharp nor one where the surface turns away.
+    """Return whether two triangles of one part share an edge that is neither sharp nor a silhouette.
 
-    Most pairs are like that, and need no walk.
+    Most pairs do, and need no walk.
     """
     screen, normals, faces, neighbours = triangles
     if _cosine(normals, a, b) < crease:
@@ -259,10 +278,13 @@ def _runs_on(triangles, crease, a, b):
 
 @numba.njit(cache=True, error_model="numpy")
 def _crossings(shown, triangles, parts, thresholds, projection):
-    """The lines between the pixels, of which each shows the triangle `shown` or none (-1).
+    """Find the lines between pixels.
+
+    shown: triangle of each pixel, or -1
 
     Returns the number of the line between pixel (r, c) and (r, c + 1), or -1, int32 (h, w); that of the line between
-    (r, c) and (r + 1, c); and of each line the share of the way at which it lies, (n,), and its kind, (n,)."""
+    (r, c) and (r + 1, c); and of each line its share of the way, (n,), and its kind, (n,).
+    """
     height, width = shown.shape
     across, down = np.full((height, width), -1, dtype=np.int32), np.full((height, width), -1, dtype=np.int32)
     most = _differing(shown)
@@ -295,7 +317,7 @@ def _crossings(shown, triangles, parts, thresholds, projection):
 
 @numba.njit(cache=True, error_model="numpy")
 def _differing(shown):
-    """How many pairs of neighbouring pixels show different triangles."""
+    """Return how many pairs of neighbouring pixels show different triangles."""
     height, width = shown.shape
     total = 0
     for r in range(height):
@@ -356,7 +378,7 @@ def _join(across, down, shares, kinds_of):
 
 @numba.njit(cache=True, error_model="numpy")
 def _meeting(places, found, size):
-    """Where three or four lines meet: on the chord between the two weightiest if they outweigh the rest."""
+    """Return where three or four lines meet: on the chord of the two weightiest if they outweigh the rest."""
     middle = np.zeros(2)
     heaviest = found[:size].max()
     chord = 0
@@ -381,7 +403,7 @@ def _root(parent, node):
 
 @numba.njit(cache=True, error_model="numpy")
 def _long_enough(ends, nodes, shortest):
-    """Which segments (n,) belong to a connected drawing of at least the length `shortest`."""
+    """Return which segments (n,) belong to a connected drawing of at least the length `shortest`."""
     size = nodes.max() + 1 if len(nodes) else 0
     parent = np.arange(size)
     for k in range(len(nodes)):

@@ -94,7 +94,7 @@ def test_a_record_says_pose_and_stretch_in_one_matrix(kit: Kit, tmp_path: Path) 
     parts = [
         {"name": name, "pose": placed} for name, placed in zip(shape.part_names, shape.placements.tolist(), strict=True)
     ]
-    again = LANGUAGE.anew(places)({"kit": "toy", "parts": parts}, shape.assembly.edges)
+    again = LANGUAGE.rebuild(places)({"kit": "toy", "parts": parts}, shape.assembly.edges)
     assert again.part_names == shape.part_names
     np.testing.assert_allclose(again.placements, shape.placements, atol=1e-11)
     np.testing.assert_allclose(again.assembly.poses, shape.assembly.poses, atol=1e-11)

@@ -131,7 +131,7 @@ def test_where_the_backend_of_the_config_cannot_draw_nothing_starts(tmp_path, mo
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     check_in_subprocess.cache_clear()
     try:
-        with pytest.raises(ConfigError, match=r"toys\.yaml: sketches\.backend: egl cannot draw .*libXrender.*doctor"):
+        with pytest.raises(ConfigError, match=r"toys\.yaml: sketches\.renderer: egl cannot draw .*libXrender.*doctor"):
             turn(tmp_path / "out", renderer="egl")
     finally:
         check_in_subprocess.cache_clear()

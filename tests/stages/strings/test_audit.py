@@ -57,7 +57,7 @@ def test_strings_of_each_kind_are_good_where_the_config_says_so(
 ) -> None:
     found = sample(written(edges), said)
     assert list(string_faults(found)) == []
-    assert list(AUDIT.anew(found, places)) == []
+    assert list(AUDIT.recheck(found, places)) == []
 
 
 @pytest.mark.parametrize(("edges", "said"), [("all", "tree"), ("tree", "all"), ("faces", "all"), ("faces", "tree")])
@@ -67,7 +67,7 @@ def test_strings_of_another_kind_are_found(edges: Edges, said: Edges) -> None:
 
 def test_strings_that_tell_of_all_contacts_are_no_strings_of_faces(places: DatasetPaths) -> None:
     found = sample(written("all"), "faces")
-    assert list(AUDIT.anew(found, places)) == ["its txt does not tell of its face contacts"]
+    assert list(AUDIT.recheck(found, places)) == ["its txt does not tell of its face contacts"]
     faces = written("faces")
     mixed = sample([faces[0], written("all")[1]], "faces")
     assert list(string_faults(mixed)) == ["the lines of its txt stand for different graphs"]

@@ -147,8 +147,8 @@ def test_contradictions_between_joints_and_physics_are_found() -> None:
     assert faults(joints[:0]) == ["its joints do not make as many components as physics says"]
     assert faults(rooted=False) == ["its json says rooted: False and counts 0 floating parts"]
     assert faults(stable=False) == ["its json says stable: False, with a margin of 0.5 for a push of 0.01"]
-    assert faults(joints[:, ::-1]) == [f"{JOINTS} holds what is no pair of its parts"]
-    assert faults(joints.astype(np.int64)) == [f"{JOINTS} is no array int32 (2, m)"]
+    assert faults(joints[:, ::-1]) == [f"{JOINTS} holds entries that are not pairs of its parts"]
+    assert faults(joints.astype(np.int64)) == [f"{JOINTS} is not an array int32 (2, m)"]
 
 
 @pytest.mark.parametrize("friction", [-0.1, 11.0])

@@ -160,7 +160,7 @@ def test_a_config_that_makes_no_shapes_is_refused(tmp_path: Path) -> None:
         "string_sampling.sources",
         "exemplars.kits",
     )
-    assert "a dataset needs one of " in printed
+    assert "a dataset needs exactly one of " in printed
     assert all(way in printed for way in ways)
     assert "this has none" in printed
 

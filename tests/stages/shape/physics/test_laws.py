@@ -97,11 +97,11 @@ def both_ways(
 ) -> tuple[FloatArray, FloatArray]:
     """The factors by the interior point method, with no HiGHS behind it, and by HiGHS."""
     with monkeypatch.context() as patch:
-        patch.setattr(equilibrium, "SMALL", 0)
-        patch.setattr(equilibrium, "PATIENCE", 0)
+        patch.setattr(equilibrium, "MAX_HIGHS_COLUMNS", 0)
+        patch.setattr(equilibrium, "MAX_HIGHS_ITERATIONS", 0)
         by_interior = limits(problem).factors
     with monkeypatch.context() as patch:
-        patch.setattr(equilibrium, "SMALL", 10**9)
+        patch.setattr(equilibrium, "MAX_HIGHS_COLUMNS", 10**9)
         by_highs = limits(problem).factors
     return by_interior, by_highs
 

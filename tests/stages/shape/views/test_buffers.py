@@ -109,7 +109,7 @@ def test_the_same_view_gives_the_same_pixels_again_and_with_a_new_context(backen
     camera = Camera(30.0, 20.0)
     first = visible_triangles(scene, camera, (64, 64), backend).triangles
     other = visible_triangles(boxes_scene([(0, 0, 0)]), camera, (80, 60), backend).triangles
-    monkeypatch.setattr(module, "RENDERS_A_CONTEXT", 1)
+    monkeypatch.setattr(module, "MAX_RENDERS_PER_CONTEXT", 1)
     again = visible_triangles(scene, camera, (64, 64), backend).triangles
     assert other.shape == (60, 80)
     assert (first == again).all()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from stages.shape.views.buffers import visible_triangles
 from stages.shape.views.camera import Camera
 from stages.shape.views.scene import MeshSet, Scene, mesh_scene
-from stages.shape.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, find_strokes
+from stages.shape.views.strokes import BOUNDARY_LINE, CONTOUR_LINE, CREASE_LINE, OUTLINE_LINE, find_strokes
 from tests.stages.shape.views.solids import BOX_CORNERS, BOX_EDGES, box, boxes_scene, cylinder
 
 SIZE = 256
@@ -54,8 +54,8 @@ def test_a_box_from_a_corner_has_its_nine_visible_edges_and_nothing_else():
     assert lengths(strokes).sum() == pytest.approx(total, rel=0.01)
     inner = [k for k, edge in enumerate(visible) if np.argmax(BOX_CORNERS @ [0.5, 0.42, 0.8]) in edge]
     creased = np.linalg.norm((ends - starts)[inner], axis=1).sum()
-    assert lengths(strokes)[strokes.kinds == CREASE].sum() == pytest.approx(creased, rel=0.03)
-    assert set(strokes.kinds.tolist()) == {CREASE, OUTLINE}
+    assert lengths(strokes)[strokes.kinds == CREASE_LINE].sum() == pytest.approx(creased, rel=0.03)
+    assert set(strokes.kinds.tolist()) == {CREASE_LINE, OUTLINE_LINE}
 
 
 def test_lines_are_straight_to_a_tenth_of_a_pixel():
@@ -90,7 +90,7 @@ def test_the_crease_angle_decides_whether_sides_are_drawn():
     vertices, faces = cylinder(12)
     scene = mesh_scene(vertices, faces, np.zeros((len(faces), 3), dtype=np.uint8), "y")
     sharp, smooth = (strokes_of(scene, Camera(0.0, 20.0), crease_angle=angle) for angle in (25.0, 35.0))
-    inner = lengths(sharp)[sharp.kinds == CREASE].sum() - lengths(smooth)[smooth.kinds == CREASE].sum()
+    inner = lengths(sharp)[sharp.kinds == CREASE_LINE].sum() - lengths(smooth)[smooth.kinds == CREASE_LINE].sum()
     side = np.ptp(on_screen(Camera(0.0, 20.0).look(scene.points, "y"), np.array([[0, 1.0, 1], [0, -1, 1]]))[:, 1])
     assert inner > 4 * side
 
@@ -98,8 +98,8 @@ def test_the_crease_angle_decides_whether_sides_are_drawn():
 def test_two_boxes_side_by_side_differ_from_one_long_box_by_their_seam():
     long = strokes_of(boxes_scene([(0.5, 0, 0)], [(2, 1, 1)]), CORNER)
     two = strokes_of(boxes_scene([(0, 0, 0), (1, 0, 0)], edges=[(0, 1)]), CORNER)
-    assert BOUNDARY not in long.kinds
-    seam = lengths(two)[two.kinds == BOUNDARY].sum()
+    assert BOUNDARY_LINE not in long.kinds
+    seam = lengths(two)[two.kinds == BOUNDARY_LINE].sum()
     assert lengths(two).sum() - lengths(long).sum() == pytest.approx(seam, abs=3.0)
     view = CORNER.look(boxes_scene([(0.5, 0, 0)], [(2, 1, 1)]).points, "y")
     ring = on_screen(view, np.array([[0.5, -0.5, 0.5], [0.5, 0.5, 0.5], [0.5, 0.5, -0.5]]))
@@ -114,12 +114,12 @@ def test_pieces_of_one_surface_have_no_line_where_it_goes_on_and_a_crease_where_
     mesh, twice = MeshSet.of([(vertices, half, np.full((len(half), 3), 128))]), np.zeros(2, dtype=np.int32)
     one = Scene(mesh, twice, np.array([np.eye(4), turned]), twice, "y", one_surface=True)
     long = strokes_of(boxes_scene([(0.5, 0, 0)], [(2, 1, 1)]), CORNER)
-    assert BOUNDARY in strokes_of(replace(one, one_surface=False), CORNER).kinds
+    assert BOUNDARY_LINE in strokes_of(replace(one, one_surface=False), CORNER).kinds
     assert lengths(strokes_of(one, CORNER)).sum() == pytest.approx(lengths(long).sum(), abs=3.0)
     scene = boxes_scene([(0, 0, 0), (0, 0.45, 0)], [(1, 1, 1), (0.5, 1, 0.5)])
     met, creased = strokes_of(scene, CORNER), strokes_of(replace(scene, one_surface=True), CORNER)
-    assert BOUNDARY in met.kinds
-    assert BOUNDARY not in creased.kinds
+    assert BOUNDARY_LINE in met.kinds
+    assert BOUNDARY_LINE not in creased.kinds
     assert lengths(creased).sum() == pytest.approx(lengths(met).sum(), rel=0.01)
 
 
@@ -129,10 +129,10 @@ def test_where_two_boxes_pass_into_each_other_the_line_is_where_they_meet():
     view = CORNER.look(scene.points, "y")
     square = np.array([[x, 0.5, z] for x, z in ((-0.25, 0.25), (0.25, 0.25), (0.25, -0.25))])
     ring = on_screen(view, square)
-    meeting = strokes.ends[strokes.kinds == BOUNDARY].reshape(-1, 2)
+    meeting = strokes.ends[strokes.kinds == BOUNDARY_LINE].reshape(-1, 2)
     assert segment_distances(meeting, ring[:-1], ring[1:]).max() < 1.0
     total = np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()
-    assert lengths(strokes)[strokes.kinds == BOUNDARY].sum() == pytest.approx(total, rel=0.05)
+    assert lengths(strokes)[strokes.kinds == BOUNDARY_LINE].sum() == pytest.approx(total, rel=0.05)
 
 
 def test_a_box_behind_another_leaves_no_line_on_it():
@@ -149,7 +149,7 @@ def test_a_box_behind_another_leaves_no_line_on_it():
 def test_an_overlapping_box_in_front_is_a_contour_and_the_background_an_outline():
     scene = boxes_scene([(0, 0, 0), (0, 0, 2)], [(3, 3, 0.2), (1, 1, 0.2)])
     strokes = strokes_of(scene, Camera(0.0, 0.0))
-    assert set(strokes.kinds.tolist()) == {CONTOUR, OUTLINE}
+    assert set(strokes.kinds.tolist()) == {CONTOUR_LINE, OUTLINE_LINE}
 
 
 def test_specks_are_left_out_and_a_limit_of_zero_keeps_them():
