@@ -1,4 +1,4 @@
-"""A scene whose placements are the pieces that its symmetries cut it into."""
+"""A scene whose surface is cut into the pieces that its symmetries or its sections make."""
 
 from __future__ import annotations
 
@@ -10,37 +10,45 @@ import numpy as np
 from stages.exemplars.formats.scene import ModelScene, Placement, Surface
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
-from stages.symmetry.pieces import RADIUS, SurfacePiece, repeated_pieces
+from stages.symmetry.pieces import RADIUS_SHARE, SurfacePiece, repeated_pieces
 from stages.symmetry.sections.slabs import slab_pieces
 from stages.symmetry.surface.grid import estimate_grid_size, has_area
 from stages.symmetry.surface.soup import Soup
 from stages.symmetry.surface.welding import weld
 
-LEFT_OUT = 1e-5
-"""Share of the surface from which on it is told that it is left out."""
-STRAINED = 0.02
-"""Share of the surface of what runs along a row from which on it is told that one copy stands for others."""
+MIN_WARNED_LOSS = 1e-5
+"""A warning tells if a larger share of the surface is left out."""
+MIN_WARNED_STRAIN = 0.02
+"""A warning tells if chunks along a row that are made equal differed by a larger share."""
 
 
 def cut_by_symmetry(scene: ModelScene) -> ModelScene:
-    """The scene as one mesh in the world, cut into `repeated_pieces`: a surface for each of them, `piece-00` and so on,
-    with a placement for each of its poses. Triangles without area are left out, with a warning that counts them; where
-    there are no others, the scene stays as it is."""
-    return _parted(scene, repeated_pieces)
+    """Cut a scene, as one mesh in world coordinates, into repeated pieces.
+
+    Each piece is a surface, `piece-00` and so on, with a placement for each of its poses. Triangles without area are
+    left out, with a warning that counts them; a scene of such triangles alone stays as it is.
+    """
+    return _cut(scene, repeated_pieces)
 
 
 def cut_by_sections(scene: ModelScene) -> ModelScene:
-    """The scene as one mesh in the world, cut into `slab_pieces`; as `cut_by_symmetry`."""
-    return _parted(scene, slab_pieces)
+    """Cut a scene, as one mesh in world coordinates, into pieces of slabs; otherwise like `cut_by_symmetry`."""
+    return _cut(scene, slab_pieces)
 
 
-def _parted(scene: ModelScene, pieces_of: Callable[[FloatArray, IntArray], list[SurfacePiece]]) -> ModelScene:
-    vertices, joined = _in_the_world(scene)
-    real = has_area(vertices[joined])
+def search_size(scene: ModelScene) -> int:
+    """Estimate the size of a search for symmetries of the scene: triangles and cells."""
+    vertices, faces = _world_mesh(scene)
+    return estimate_grid_size(vertices[faces], RADIUS_SHARE)
+
+
+def _cut(scene: ModelScene, pieces_of: Callable[[FloatArray, IntArray], list[SurfacePiece]]) -> ModelScene:
+    vertices, faces = _world_mesh(scene)
+    real = has_area(vertices[faces])
     if not real.any():
         return scene
     colors = np.concatenate([scene.surfaces[placement.surface].face_colors for placement in scene.placements])
-    pieces = pieces_of(vertices, joined)
+    pieces = pieces_of(vertices, faces)
     width = max(2, len(str(len(pieces))))
     surfaces: list[Surface] = []
     placements: list[Placement] = []
@@ -48,40 +56,35 @@ def _parted(scene: ModelScene, pieces_of: Callable[[FloatArray, IntArray], list[
         name = f"piece-{number:0{width}d}"
         surfaces.append(_surface(name, piece, colors))
         placements += [Placement(f"{name}.{copy}", None, number, pose) for copy, pose in enumerate(piece.poses)]
-    flat = len(joined) - int(real.sum())
+    flat = len(faces) - int(real.sum())
     warnings = (*scene.warnings, f"{flat} triangles without area are left out") if flat else scene.warnings
-    whole = float(Soup(vertices[joined], np.arange(len(joined), dtype=np.int32)).area)
-    left = 1.0 - sum(len(each.poses) * each.triangles.area for each in pieces) / whole
-    if left > LEFT_OUT:
-        warnings = (*warnings, f"splinters between copies, {left:.2%} of the surface, are left out")
-    strained = max(each.strained for each in pieces)
-    if strained > STRAINED:
-        warnings = (*warnings, f"what runs along a row is alike at all its copies now; it differed by {strained:.0%}")
+    whole = float(Soup(vertices[faces], np.arange(len(faces), dtype=np.int32)).area)
+    lost = 1.0 - sum(len(piece.poses) * piece.triangles.area for piece in pieces) / whole
+    if lost > MIN_WARNED_LOSS:
+        warnings = (*warnings, f"splinters between copies, {lost:.2%} of the surface, are left out")
+    strain = max(piece.strain for piece in pieces)
+    if strain > MIN_WARNED_STRAIN:
+        warnings = (*warnings, f"what runs along a row was made equal at its copies; it differed by {strain:.0%}")
     return replace(scene, kind="nodes", surfaces=tuple(surfaces), placements=tuple(placements), warnings=warnings)
 
 
-def search_size(scene: ModelScene) -> int:
-    """How large a search for symmetries of the scene would be: `estimate_grid_size`."""
-    vertices, faces = _in_the_world(scene)
-    return estimate_grid_size(vertices[faces], RADIUS)
-
-
-def _in_the_world(scene: ModelScene) -> tuple[FloatArray, IntArray]:
-    """All surfaces where they are placed, as one mesh: vertices float64 (v, 3), faces int32 (f, 3)."""
+def _world_mesh(scene: ModelScene) -> tuple[FloatArray, IntArray]:
+    """Return all placed surfaces as one mesh in world coordinates: vertices float64 (v, 3), faces int32 (f, 3)."""
+    surfaces = [scene.surfaces[placement.surface] for placement in scene.placements]
     moved = [
-        transform_points(placement.pose, scene.surfaces[placement.surface].vertices) for placement in scene.placements
+        transform_points(placement.pose, surface.vertices)
+        for placement, surface in zip(scene.placements, surfaces, strict=True)
     ]
     shifts = np.cumsum([0, *map(len, moved[:-1])])
-    own = [scene.surfaces[placement.surface] for placement in scene.placements]
-    turned = [np.linalg.det(placement.pose[:3, :3]) < 0 for placement in scene.placements]
+    mirrored = [np.linalg.det(placement.pose[:3, :3]) < 0 for placement in scene.placements]
     faces = [
-        (each.faces[:, ::-1] if mirrored else each.faces) + shift
-        for each, shift, mirrored in zip(own, shifts, turned, strict=True)
+        (surface.faces[:, ::-1] if is_mirrored else surface.faces) + shift
+        for surface, shift, is_mirrored in zip(surfaces, shifts, mirrored, strict=True)
     ]
     return np.concatenate(moved), np.concatenate(faces).astype(np.int32)
 
 
 def _surface(name: str, piece: SurfacePiece, colors: ByteArray) -> Surface:
-    """The surface of a piece, corners at one position one vertex."""
-    places, vertices = weld(piece.triangles.corners, 0.0)
-    return Surface(name, vertices, places, colors[piece.triangles.faces])
+    """Return the surface of a piece, with corners at equal positions welded."""
+    indices, vertices = weld(piece.triangles.corners, 0.0)
+    return Surface(name, vertices, indices, colors[piece.triangles.faces])

@@ -1,4 +1,4 @@
-"""Values that are costly to make and large to hold: those asked for last."""
+"""A cache of values that are costly to make and large, bounded in bytes."""
 
 from __future__ import annotations
 
@@ -11,25 +11,24 @@ Value = TypeVar("Value")
 
 
 class BoundedCache(Generic[Key, Value]):
-    """Values by their keys, each made when it is asked for. As soon as all take more than so many bytes, those are
-    forgotten that were not asked for the longest, and made anew if they are needed again."""
+    """Values by their keys, made on first use; the least recently used are dropped as soon as all exceed the limit."""
 
-    def __init__(self, make: Callable[[Key], Value], size: Callable[[Value], int], most: int) -> None:
-        """make: a value of its key, always the same; size: the bytes of a value; most: the bytes of all."""
-        self._make, self._size_of, self._most = make, size, most
-        self._held: OrderedDict[Key, Value] = OrderedDict()
-        self._size = 0
+    def __init__(self, make: Callable[[Key], Value], size_of: Callable[[Value], int], max_bytes: int) -> None:
+        """Bound the values of `make`, a pure function of the key, by their sizes in bytes."""
+        self._make, self._size_of, self._max_bytes = make, size_of, max_bytes
+        self._values: OrderedDict[Key, Value] = OrderedDict()
+        self._bytes = 0
 
     def __len__(self) -> int:
-        return len(self._held)
+        return len(self._values)
 
     def __getitem__(self, key: Key) -> Value:
-        if key in self._held:
-            self._held.move_to_end(key)
-            return self._held[key]
+        if key in self._values:
+            self._values.move_to_end(key)
+            return self._values[key]
         value = self._make(key)
-        self._held[key] = value
-        self._size += self._size_of(value)
-        while self._size > self._most and len(self._held) > 1:
-            self._size -= self._size_of(self._held.popitem(last=False)[1])
+        self._values[key] = value
+        self._bytes += self._size_of(value)
+        while self._bytes > self._max_bytes and len(self._values) > 1:
+            self._bytes -= self._size_of(self._values.popitem(last=False)[1])
         return value

@@ -1,4 +1,4 @@
-"""Whether a piece of a grammar runs into others: it may come near them at seams alone, or as it does in the exemplar
+"""Whether a terminal collides with others: it may come near them only at seams, or as in the exemplar
 (symmetry §3.2, §3.4.3)."""
 
 from __future__ import annotations
@@ -10,106 +10,108 @@ from typing import Any
 import numpy as np
 
 from stages.grammars.bounded_cache import BoundedCache
-from stages.grammars.derivation import Derivation, row_seams
-from stages.grammars.derivation_text import PlacedTerminal, ResizedGrid, placed_terminals
+from stages.grammars.derivation import Derivation, ResizedGrid, row_seams
+from stages.grammars.derived_shape import PlacedTerminal, placed_terminals
 from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.terminal_samples import TerminalSamples
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
-NEAR = 1.8
-"""Pieces are apart where no two of their points, one in each cell, are closer than so many cells."""
-BESIDE = 2.0
-"""At a seam they may be near as far as so many radii from it."""
-DECIMALS = 6
-"""Digits of relative poses, shifts in cells, that count."""
-HELD = 100_000_000
-"""Bytes of answers that are held."""
-BYTES_A_KEY = 500
-"""Of an answer's key, about."""
-SAME = 0.5
-"""Cells by which the corners of a piece may lie elsewhere and the piece still stand as another one does."""
+NEAR_CELLS = 1.8
+"""Terminals are near each other if two of their points, one per cell, are closer, in cells."""
+SEAM_RADII = 2.0
+"""Terminals may be near each other within this distance of a seam, in radii of similarity."""
+POSE_DECIMALS = 6
+"""Decimals of relative poses that count, with translations in cells."""
+MAX_CACHE_BYTES = 100_000_000
+BYTES_PER_KEY = 500
+"""About the size of a key of the cache."""
+SAME_POSE_CELLS = 0.5
+"""Distance of the corners of a box, in cells, up to which two poses are the same."""
 
 
 class Collisions:
-    """What stands near what in the exemplar, as far as the grammar shows it, and whether anything else is near."""
+    """What is near what in the exemplar, as far as the grammar shows it, and whether anything else is near."""
 
     def __init__(self, grammar: ShapeGrammar) -> None:
         self._grammar = grammar
         self.samples = TerminalSamples(grammar)
         self._cell = self.samples.cell
-        self._answers: BoundedCache[tuple[int, int, bytes], IntArray] = BoundedCache(
-            lambda key: self._points_near(*key), lambda near: BYTES_A_KEY + near.nbytes, HELD
+        self._near_cache: BoundedCache[tuple[int, int, bytes], IntArray] = BoundedCache(
+            lambda key: self._points_near(*key), lambda near: BYTES_PER_KEY + near.nbytes, MAX_CACHE_BYTES
         )
         self._seam_trees: dict[int, Any] = {}
 
     def collides(
-        self, piece: PlacedTerminal, others: Sequence[PlacedTerminal], seams: Sequence[tuple[int, FloatArray]]
+        self, terminal: PlacedTerminal, others: Sequence[PlacedTerminal], seams: Sequence[tuple[int, FloatArray]]
     ) -> bool:
-        """Whether a piece is near one of others where no seam is, a class of sites and its frame (4, 4) each, and
-        nothing in the exemplar is so near."""
+        """Return whether a terminal is near another one away from all seams and unlike anything in the exemplar.
+
+        seams: the class of a site and its frame (4, 4) each
+        """
         for other in others:
-            near = self._near(piece, other)
-            if not len(near) or self._as_in_exemplar(piece, other):
+            near = self._near(terminal, other)
+            if not len(near) or self._as_in_exemplar(terminal, other):
                 continue
-            points = transform_points(piece.pose, self.samples[piece.mesh].points[near])
+            points = transform_points(terminal.pose, self.samples[terminal.mesh].points[near])
             if not self._at_seams(points, seams).all():
                 return True
         return False
 
-    def whole(self, made: ResizedGrid) -> bool:
-        """Whether pieces of a resized grid run into each other."""
-        grid = self._grammar.grids[made.grid]
-        seams = row_seams(grid.transforms, grid.frames, grid.sites, made.counts)
-        pieces = placed_terminals(self._grammar, made)
-        return any(self.collides(each, pieces[:place], seams) for place, each in enumerate(pieces))
+    def grid_collides(self, resized: ResizedGrid) -> bool:
+        """Return whether pieces of a resized grid collide."""
+        grid = self._grammar.grids[resized.grid]
+        seams = row_seams(grid.transforms, grid.frames, grid.sites, resized.counts)
+        pieces = placed_terminals(self._grammar, resized)
+        return any(self.collides(piece, pieces[:number], seams) for number, piece in enumerate(pieces))
 
     @cached_property
     def _known(self) -> dict[tuple[int, int], list[FloatArray]]:
-        """For each two meshes how the second stands to the first in the exemplar, near to it or not."""
+        """For each two meshes the poses of the second relative to the first in the exemplar, near or not."""
         grammar = self._grammar
         shown: list[Derivation | ResizedGrid] = [
-            Derivation(number, tuple(place.original for place in rule.non_terminals))
-            for number, rule in enumerate(grammar.productions)
+            Derivation(number, tuple(non_terminal.original for non_terminal in production.non_terminals))
+            for number, production in enumerate(grammar.productions)
         ]
         shown += [ResizedGrid(number, grid.counts) for number, grid in enumerate(grammar.grids)]
-        found: dict[tuple[int, int], list[FloatArray]] = {}
-        for made in shown:
-            pieces = placed_terminals(grammar, made)
-            for place, one in enumerate(pieces):
-                for other in pieces[:place]:
+        known: dict[tuple[int, int], list[FloatArray]] = {}
+        for derivation in shown:
+            terminals = placed_terminals(grammar, derivation)
+            for number, one in enumerate(terminals):
+                for other in terminals[:number]:
                     pose = invert(one.pose) @ other.pose
-                    listed = found.setdefault((one.mesh, other.mesh), [])
-                    if not self._listed(listed, other.mesh, pose):
-                        listed.append(pose)
-                        found.setdefault((other.mesh, one.mesh), []).append(invert(pose))
-        return found
+                    poses = known.setdefault((one.mesh, other.mesh), [])
+                    if not self._is_listed(poses, other.mesh, pose):
+                        poses.append(pose)
+                        known.setdefault((other.mesh, one.mesh), []).append(invert(pose))
+        return known
 
     def _as_in_exemplar(self, one: PlacedTerminal, other: PlacedTerminal) -> bool:
-        listed = self._known.get((one.mesh, other.mesh), [])
-        return self._listed(listed, other.mesh, invert(one.pose) @ other.pose)
+        poses = self._known.get((one.mesh, other.mesh), [])
+        return self._is_listed(poses, other.mesh, invert(one.pose) @ other.pose)
 
-    def _listed(self, listed: Sequence[FloatArray], mesh: int, pose: FloatArray) -> bool:
-        """Whether a pose of a mesh is one of those listed."""
+    def _is_listed(self, poses: Sequence[FloatArray], mesh: int, pose: FloatArray) -> bool:
+        """Return whether a pose of a mesh is about one of `poses`."""
         corners = self._grammar.bounds[mesh]
-        here = transform_points(pose, corners)
-        return any(np.abs(transform_points(each, corners) - here).max() < SAME * self._cell for each in listed)
+        own, limit = transform_points(pose, corners), SAME_POSE_CELLS * self._cell
+        return any(np.abs(transform_points(known, corners) - own).max() < limit for known in poses)
 
     def _near(self, one: PlacedTerminal, other: PlacedTerminal) -> IntArray:
-        """Which points of a piece are near another piece, int32 (k,). Relative poses recur, so that answers are held,
-        each for the rounded value of its pose."""
+        """Return which points of a terminal are near another one, int32 (k,); cached, because relative poses recur."""
         pose = invert(other.pose) @ one.pose
         pose[:3, 3] /= self._cell
-        pose = np.round(pose, DECIMALS) + 0.0
-        return self._answers[one.mesh, other.mesh, pose.tobytes()]
+        pose = np.round(pose, POSE_DECIMALS) + 0.0
+        return self._near_cache[one.mesh, other.mesh, pose.tobytes()]
 
     def _points_near(self, mesh: int, other: int, key: bytes) -> IntArray:
-        """Which points of a mesh are near another in whose coordinates it has a pose, float64 (4, 4), shifts in cells,
-        as bytes."""
+        """Return which points of a mesh are near another one, int32 (k,).
+
+        key: bytes of the pose, float64 (4, 4), in the coordinates of the other one, with its translation in cells
+        """
         pose = np.frombuffer(key).reshape(4, 4).copy()
         pose[:3, 3] *= self._cell
         low, high = self._grammar.bounds[other]
-        reach = NEAR * self._cell
+        reach = NEAR_CELLS * self._cell
         box = self._grammar.bounds[mesh]
         middle, half = box.mean(axis=0), (box[1] - box[0]) / 2
         around, wide = transform_points(pose, middle), np.abs(pose[:3, :3]) @ half
@@ -117,20 +119,20 @@ class Collisions:
             return np.empty(0, dtype=np.int32)
         moved = transform_points(pose, self.samples[mesh].points)
         close = np.flatnonzero(((moved > low - reach) & (moved < high + reach)).all(axis=1))
-        away, _ = self.samples[other].tree.query(moved[close], distance_upper_bound=reach)
-        near: IntArray = close[np.isfinite(away)].astype(np.int32)
+        distance, _ = self.samples[other].tree.query(moved[close], distance_upper_bound=reach)
+        near: IntArray = close[np.isfinite(distance)].astype(np.int32)
         return near
 
     def _at_seams(self, points: FloatArray, seams: Sequence[tuple[int, FloatArray]]) -> BoolArray:
-        """Which of some points lie beside a seam, bool (n,)."""
+        """Return which points (n, 3) lie near a seam, bool (n,)."""
         from scipy.spatial import KDTree
 
-        found = np.zeros(len(points), dtype=bool)
+        near = np.zeros(len(points), dtype=bool)
         for site, frame in seams:
             if site not in self._seam_trees:
                 self._seam_trees[site] = KDTree(self._grammar.seams[site])
-            away, _ = self._seam_trees[site].query(
-                transform_points(invert(frame), points), distance_upper_bound=BESIDE * self._grammar.radius
+            distance, _ = self._seam_trees[site].query(
+                transform_points(invert(frame), points), distance_upper_bound=SEAM_RADII * self._grammar.radius
             )
-            found |= np.isfinite(away)
-        return found
+            near |= np.isfinite(distance)
+        return near

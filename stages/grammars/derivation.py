@@ -1,4 +1,4 @@
-"""How shapes of a grammar are derived: productions in productions, and grids of so many cells (symmetry §3.4)."""
+"""How shapes of a grammar are derived: productions in productions, and resized grids (symmetry §3.4)."""
 
 from __future__ import annotations
 
@@ -11,24 +11,36 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert
 
-START = -1
+START_SITE = -1
 """The site of the start symbol: the whole shape."""
-ENDS = ("rest", "cell", "end")
-"""What a piece of a grid is along each of its rows: before the row, the cell that is repeated, or after it."""
+GRID_PARTS = ("rest", "cell", "end")
+"""What a piece of a grid is in each of its rows: before the row, the cell that is repeated, or after the row."""
 
 
 @dataclass(frozen=True)
 class Derivation:
-    """A shape of a grammar: a production, by its place among all, and what stands at its places, in their order."""
+    """A shape of a grammar: a production, by its index, and the derivations of its non-terminals, in their order."""
 
     production: int
     parts: tuple[Derivation, ...] = ()
 
 
 @dataclass(frozen=True)
+class ResizedGrid:
+    """A shape of a grammar: a grid, by its index, with these numbers of cells in its rows."""
+
+    grid: int
+    counts: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class NonTerminal:
-    """A non-terminal in a production: a site of class `site`, where it is in the exemplar, `frame` (4, 4), and what the
-    exemplar has there."""
+    """A non-terminal in a production.
+
+    site: class of its site
+    frame: float64 (4, 4), where it is in the exemplar
+    original: what the exemplar has there
+    """
 
     site: int
     frame: FloatArray
@@ -36,44 +48,41 @@ class NonTerminal:
 
 
 def grid_poses(
-    motions: FloatArray, own: Sequence[int], pieces: Sequence[Sequence[int]], counts: Sequence[int]
+    transforms: FloatArray, own: Sequence[int], pieces: Sequence[Sequence[int]], counts: Sequence[int]
 ) -> list[tuple[int, FloatArray]]:
-    """Where the pieces of a grid stand that has `counts` cells along its rows: a place among them and a pose (4, 4).
+    """Return the pieces of a grid that has `counts` cells in its rows: an index and a pose (4, 4) each.
 
-    motions, own and pieces: those of a `Grid`, its counts, and of each piece where it is along the rows.
+    transforms: float64 (k, 4, 4), of the grid's rows
+    own: cells of its rows in the exemplar
+    pieces: for each piece its part in each row, as in GRID_PARTS
     """
-    found = []
-    for number, where in enumerate(pieces):
+    placed = []
+    for number, parts in enumerate(pieces):
         along = [
-            (range(1), range(count), range(count - had, count - had + 1))[place]
-            for place, count, had in zip(where, counts, own, strict=True)
+            (range(1), range(count), range(count - had, count - had + 1))[part]
+            for part, count, had in zip(parts, counts, own, strict=True)
         ]
-        for multiples in product(*along):
-            pose = np.eye(4)
-            for motion, times in zip(motions, multiples, strict=True):
-                pose = pose @ _power(motion, times)
-            found.append((number, pose))
-    return found
+        placed += [(number, _powers(transforms, multiples)) for multiples in product(*along)]
+    return placed
 
 
 def row_seams(
-    motions: FloatArray, frames: FloatArray, sites: Sequence[int], counts: Sequence[int]
+    transforms: FloatArray, frames: FloatArray, sites: Sequence[int], counts: Sequence[int]
 ) -> list[tuple[int, FloatArray]]:
-    """The seams of a grid that has `counts` cells along its rows: of each the class of its site, and its frame (4, 4).
+    """Return the seams of a grid that has `counts` cells in its rows: the class of a site and its frame (4, 4) each.
 
-    motions, frames and sites: those of a `Grid`.
+    transforms, frames, sites: of the grid's rows
     """
-    found = []
-    for frame, site in zip(frames, sites, strict=True):
-        for multiples in product(*(range(count + 1) for count in counts)):
-            pose = np.eye(4)
-            for motion, times in zip(motions, multiples, strict=True):
-                pose = pose @ _power(motion, times)
-            found.append((site, pose @ frame))
-    return found
+    return [
+        (site, _powers(transforms, multiples) @ frame)
+        for frame, site in zip(frames, sites, strict=True)
+        for multiples in product(*(range(count + 1) for count in counts))
+    ]
 
 
-def _power(motion: FloatArray, times: int) -> FloatArray:
-    """A motion so many times, or its inverse."""
-    found: FloatArray = np.linalg.matrix_power(motion if times >= 0 else invert(motion), abs(times))
-    return found
+def _powers(transforms: FloatArray, multiples: Sequence[int]) -> FloatArray:
+    """Return the product of the transforms, each to its power."""
+    pose: FloatArray = np.eye(4)
+    for transform, times in zip(transforms, multiples, strict=True):
+        pose = pose @ np.linalg.matrix_power(transform if times >= 0 else invert(transform), abs(times))
+    return pose

@@ -1,4 +1,4 @@
-"""A grammar as JSON that a person can read: sites, what may dock there, rules, terminals, grids."""
+"""A grammar as JSON that people can read: sites, docked pieces, productions, terminals, grids."""
 
 from __future__ import annotations
 
@@ -6,109 +6,112 @@ from typing import Any
 
 import numpy as np
 
-from stages.grammars.derivation import ENDS, Derivation
+from stages.grammars.derivation import GRID_PARTS, Derivation
 from stages.grammars.derivation_text import format_derivation
 from stages.grammars.editing import editing_options
 from stages.grammars.extraction.extract import ExtractedGrammar
-from stages.grammars.grammar import Grid, site_name
+from stages.grammars.grammar import Grid, Production, ShapeGrammar, site_name
 
 
-def describe_grammar(found: ExtractedGrammar) -> dict[str, Any]:
-    """All that there is to say of a grammar, with the editing options at each docking site. `tree` and `frame` are what
-    programs read: an original as places among the rules, and poses (4, 4)."""
-    grammar = found.grammar
-    whole = float(found.grid.area.sum())
-    options = editing_options(found)
-    terminals = [
-        {
-            "name": each.name,
-            grammar.made_of: len(each.faces),
-            "size": [round(float(side), 6) for side in np.ptp(each.bounds, axis=0)],
-            "middle": middle.tolist(),
-        }
-        for each, middle in zip(grammar.meshes, grammar.middles, strict=True)
-    ]
+def describe_grammar(extracted: ExtractedGrammar) -> dict[str, Any]:
+    """Describe a grammar, with the editing options at each docking site.
+
+    Programs read `tree`, an original as indices of productions, and `frame`, a pose (4, 4).
+    """
+    grammar = extracted.grammar
+    pieces = extracted.docked_pieces
+    options = editing_options(extracted)
     return {
         "grammar": grammar.name,
         "up": grammar.up,
         "radius": grammar.radius,
         "made_of": grammar.made_of,
         grammar.made_of: len(grammar.exemplar.faces),
-        "area": whole,
-        "motions": found.transforms,
-        "dockers": len(found.docked_pieces),
-        "non_terminals": [
+        "area": float(extracted.grid.area.sum()),
+        "transforms": extracted.transforms,
+        "docked_pieces": len(pieces),
+        "sites": [
             {
                 "name": site_name(site),
                 "site": site,
-                "dockers": sum(each.site == site for each in found.docked_pieces),
-                "rules": [grammar.productions[each].name for each in rules],
+                "docked_pieces": sum(piece.site == site for piece in pieces),
+                "productions": [grammar.productions[number].name for number in numbers],
             }
-            for site, rules in grammar.productions_of_site.items()
+            for site, numbers in grammar.productions_of_site.items()
         ],
-        "rules": [
+        "productions": [_production(grammar, production) for production in grammar.productions],
+        "grids": [_grid(grid) for grid in grammar.grids],
+        "terminals": [
             {
-                "name": each.name,
-                "site": each.site,
-                "frame": each.frame.tolist(),
-                "places": [
-                    {
-                        "site": place.site,
-                        "non_terminal": site_name(place.site),
-                        "frame": place.frame.tolist(),
-                        "original": format_derivation(grammar, place.original),
-                        "tree": _tree(place.original),
-                    }
-                    for place in each.non_terminals
-                ],
+                "name": mesh.name,
+                grammar.made_of: len(mesh.faces),
+                "size": [round(float(side), 6) for side in np.ptp(mesh.bounds, axis=0)],
+                "middle": middle.tolist(),
             }
-            for each in grammar.productions
+            for mesh, middle in zip(grammar.meshes, grammar.middles, strict=True)
         ],
-        "grids": [_described_grid(each) for each in grammar.grids],
-        "terminals": terminals,
         "editing": [
             {
-                "docker": place,
-                "non_terminal": site_name(docker.site),
-                "share": round(docker.area, 6),
-                "at": [round(float(each), 6) for each in _middle(found, place)],
+                "docked_piece": number,
+                "site": site_name(piece.site),
+                "share": round(piece.area, 6),
+                "at": [round(float(coordinate), 6) for coordinate in _middle(extracted, number)],
                 "options": [
                     {
-                        "docker": each.other,
-                        "kind": each.kind,
-                        "share": round(found.docked_pieces[each.other].area, 6),
-                        "motion": each.transform.tolist(),
+                        "docked_piece": option.other,
+                        "kind": option.kind,
+                        "share": round(pieces[option.other].area, 6),
+                        "transform": option.transform.tolist(),
                     }
-                    for each in options.get(place, [])
+                    for option in options.get(number, [])
                 ],
             }
-            for place, docker in enumerate(found.docked_pieces)
+            for number, piece in enumerate(pieces)
         ],
     }
 
 
-def _middle(found: ExtractedGrammar, docker: int) -> np.ndarray:
-    cells = found.docked_pieces[docker].border
-    middle: np.ndarray = found.grid.origin + (found.grid.cells[cells].mean(axis=0) + 0.5) * found.grid.cell_size
-    return middle
+def _production(grammar: ShapeGrammar, production: Production) -> dict[str, Any]:
+    return {
+        "name": production.name,
+        "site": production.site,
+        "frame": production.frame.tolist(),
+        "non_terminals": [
+            {
+                "site": non_terminal.site,
+                "name": site_name(non_terminal.site),
+                "frame": non_terminal.frame.tolist(),
+                "original": format_derivation(grammar, non_terminal.original),
+                "tree": _tree(non_terminal.original),
+            }
+            for non_terminal in production.non_terminals
+        ],
+    }
 
 
-def _described_grid(grid: Grid) -> dict[str, Any]:
+def _grid(grid: Grid) -> dict[str, Any]:
     return {
         "name": grid.name,
         "rows": [
             {
                 "site": site,
-                "non_terminal": site_name(site),
+                "name": site_name(site),
                 "cells": count,
-                "motion": motion.tolist(),
+                "transform": transform.tolist(),
                 "frame": frame.tolist(),
             }
-            for site, count, motion, frame in zip(grid.sites, grid.counts, grid.transforms, grid.frames, strict=True)
+            for site, count, transform, frame in zip(grid.sites, grid.counts, grid.transforms, grid.frames, strict=True)
         ],
-        "pieces": [{"terminal": mesh, "along": [ENDS[each] for each in where]} for mesh, where in grid.pieces],
+        "pieces": [{"terminal": mesh, "along": [GRID_PARTS[part] for part in parts]} for mesh, parts in grid.pieces],
     }
 
 
-def _tree(made: Derivation) -> list[Any]:
-    return [made.production, *map(_tree, made.parts)]
+def _middle(extracted: ExtractedGrammar, number: int) -> np.ndarray:
+    grid = extracted.grid
+    cells = grid.cells[extracted.docked_pieces[number].border]
+    middle: np.ndarray = grid.origin + (cells.mean(axis=0) + 0.5) * grid.cell_size
+    return middle
+
+
+def _tree(derivation: Derivation) -> list[Any]:
+    return [derivation.production, *map(_tree, derivation.parts)]

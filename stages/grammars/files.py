@@ -1,4 +1,4 @@
-"""A grammar on disk: `<name>.json`, for people to read, and `<name>.tar`, the arrays for programs."""
+"""A grammar on disk: `<name>.json` for people and programs, and `<name>.tar` with the arrays."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ import numpy as np
 
 from pipeline.paths import DatasetPaths
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, read_shard
-from stages.grammars.derivation import ENDS, Derivation, NonTerminal
+from stages.grammars.derivation import GRID_PARTS, Derivation, NonTerminal
 from stages.grammars.grammar import Grid, Production, ShapeGrammar
 from stages.shape.kit import PartMesh
 
 
-def write_grammar(described: Mapping[str, Any], grammar: ShapeGrammar, text: Any, arrays: Any) -> None:
-    """Write a grammar to two binary streams: what `describe_grammar` says of it to `text`, the tar to `arrays`."""
-    text.write(json.dumps(described, indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n")
+def write_grammar(description: Mapping[str, Any], grammar: ShapeGrammar, text: Any, arrays: Any) -> None:
+    """Write a grammar to two binary streams: what `describe_grammar` returns to `text`, the tar to `arrays`."""
+    text.write(json.dumps(description, indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n")
     with ShardWriter(arrays) as writer:
-        for number, each in enumerate(chain(grammar.meshes, (grammar.exemplar,))):
+        for number, mesh in enumerate(chain(grammar.meshes, (grammar.exemplar,))):
             members = {
-                "vertices.npy": array_bytes(each.vertices),
-                "faces.npy": array_bytes(each.faces),
-                "colors.npy": array_bytes(each.face_colors),
+                "vertices.npy": array_bytes(mesh.vertices),
+                "faces.npy": array_bytes(mesh.faces),
+                "colors.npy": array_bytes(mesh.face_colors),
             }
             writer.write(f"mesh-{number:05d}", members)
         for site, points in sorted(grammar.seams.items()):
@@ -35,9 +35,9 @@ def write_grammar(described: Mapping[str, Any], grammar: ShapeGrammar, text: Any
 
 @lru_cache(maxsize=8)
 def load_grammar(text: Path, arrays: Path) -> ShapeGrammar:
-    """The grammar that `write_grammar` wrote to these two files; read once for each process."""
-    said = json.loads(text.read_text())
-    names = [*(each["name"] for each in said["terminals"]), "exemplar"]
+    """Load a grammar that `write_grammar` wrote to these two files; it is read once per process."""
+    stored = json.loads(text.read_text())
+    names = [*(terminal["name"] for terminal in stored["terminals"]), "exemplar"]
     meshes: list[PartMesh] = []
     seams: dict[int, np.ndarray] = {}
     for key, members in read_shard(arrays):
@@ -48,45 +48,48 @@ def load_grammar(text: Path, arrays: Path) -> ShapeGrammar:
         vertices, faces = bytes_array(members["vertices.npy"]), bytes_array(members["faces.npy"])
         meshes.append(PartMesh(names[len(meshes)], vertices, faces, bytes_array(members["colors.npy"])))
     return ShapeGrammar(
-        name=said["grammar"],
-        up=said["up"],
-        radius=said["radius"],
+        name=stored["grammar"],
+        up=stored["up"],
+        radius=stored["radius"],
         meshes=tuple(meshes[:-1]),
-        middles=np.array([each["middle"] for each in said["terminals"]]).reshape(-1, 3),
-        productions=tuple(_rule(number, each) for number, each in enumerate(said["rules"])),
-        grids=tuple(map(_grid, said["grids"])),
+        middles=np.array([terminal["middle"] for terminal in stored["terminals"]]).reshape(-1, 3),
+        productions=tuple(_production(number, production) for number, production in enumerate(stored["productions"])),
+        grids=tuple(map(_grid, stored["grids"])),
         seams=seams,
         exemplar=meshes[-1],
-        splats=said["made_of"] == "points",
+        splats=stored["made_of"] == "points",
     )
 
 
-def _rule(number: int, said: Mapping[str, Any]) -> Production:
-    places = [NonTerminal(each["site"], np.array(each["frame"]), _derivation(each["tree"])) for each in said["places"]]
-    return Production(said["name"], said["site"], np.array(said["frame"]), number, tuple(places))
+def _production(number: int, stored: Mapping[str, Any]) -> Production:
+    non_terminals = [
+        NonTerminal(known["site"], np.array(known["frame"]), _derivation(known["tree"]))
+        for known in stored["non_terminals"]
+    ]
+    return Production(stored["name"], stored["site"], np.array(stored["frame"]), number, tuple(non_terminals))
 
 
 def _derivation(tree: Sequence[Any]) -> Derivation:
     return Derivation(tree[0], tuple(map(_derivation, tree[1:])))
 
 
-def _grid(said: Mapping[str, Any]) -> Grid:
-    rows = said["rows"]
+def _grid(stored: Mapping[str, Any]) -> Grid:
+    rows = stored["rows"]
     return Grid(
-        name=said["name"],
-        transforms=np.array([each["motion"] for each in rows]),
-        counts=tuple(each["cells"] for each in rows),
-        sites=tuple(each["site"] for each in rows),
-        frames=np.array([each["frame"] for each in rows]),
-        pieces=tuple((each["terminal"], tuple(map(ENDS.index, each["along"]))) for each in said["pieces"]),
+        name=stored["name"],
+        transforms=np.array([row["transform"] for row in rows]),
+        counts=tuple(row["cells"] for row in rows),
+        sites=tuple(row["site"] for row in rows),
+        frames=np.array([row["frame"] for row in rows]),
+        pieces=tuple((piece["terminal"], tuple(map(GRID_PARTS.index, piece["along"]))) for piece in stored["pieces"]),
     )
 
 
-def load_grammars(places: DatasetPaths) -> dict[str, ShapeGrammar]:
-    """The grammars of a dataset out of the mill's folder."""
-    made = places.stage("grammars").root
+def load_grammars(paths: DatasetPaths) -> dict[str, ShapeGrammar]:
+    """Load the grammars of a dataset from its work folder."""
+    folder = paths.stage("grammars").root
     return {
         path.stem: load_grammar(path, path.with_suffix(".tar"))
-        for path in sorted(made.glob("*.json"))
+        for path in sorted(folder.glob("*.json"))
         if path.with_suffix(".tar").is_file()
     }

@@ -1,4 +1,4 @@
-"""A shape grammar of an exemplar: what may stand at which site, and which grids there are (symmetry §3.4)."""
+"""A shape grammar of an exemplar: which terminals fit which sites, and its grids (symmetry §3.4)."""
 
 from __future__ import annotations
 
@@ -9,18 +9,21 @@ from typing import Literal
 
 import numpy as np
 
-from stages.grammars.derivation import START, NonTerminal
+from stages.grammars.derivation import START_SITE, NonTerminal
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartMesh
 
-LETTERS = "ABCDEFHIJKLMNOPQRTUVWXYZ"
+SITE_LETTERS = "ABCDEFHIJKLMNOPQRTUVWXYZ"
 
 
 @dataclass(frozen=True, eq=False)
 class Production:
-    """A production: at a site of class `site` may stand the mesh `terminal`, with `places` for others.
+    """What may replace a non-terminal: a terminal mesh with non-terminals of its own.
 
-    frame: float64 (4, 4), of the site where the exemplar has it; places: where the exemplar has them.
+    site: class of the site where it fits
+    frame: float64 (4, 4), of the site where the exemplar has it
+    terminal: index of the mesh
+    non_terminals: where the exemplar has them
     """
 
     name: str
@@ -34,8 +37,11 @@ class Production:
 class Grid:
     """A grid of k rows that cross.
 
-    motions: float64 (k, 4, 4), from cell to cell; counts: of the exemplar; sites, frames float64 (k, 4, 4): where the
-    rows begin. pieces: the mesh of each piece, and for each row 0 before it, 1 a cell of it, 2 after it.
+    transforms: float64 (k, 4, 4), from cell to cell of each row
+    counts: cells of each row in the exemplar
+    sites: class of the site where each row begins
+    frames: float64 (k, 4, 4), of these sites
+    pieces: for each piece the index of its mesh, and its part in each row, as in GRID_PARTS
     """
 
     name: str
@@ -50,10 +56,13 @@ class Grid:
 class ShapeGrammar:
     """The grammar of one exemplar.
 
-    radius: of similarity, in units of the exemplar; meshes: terminals of the rules, then pieces of the grids, each
-    around the middle of its box, which stands at `middles` float64 (m, 3) in the exemplar. rules: those of the start
-    symbol first. seams: for each class of sites points on the first of them, float64 (k, 3). exemplar: the whole.
-    splats: whether the exemplar is a point cloud, and triangles stand for its points, one each.
+    radius: of similarity, in units of the exemplar
+    meshes: terminals of the productions, then pieces of the grids, each around the middle of its box
+    middles: float64 (m, 3), where these middles are in the exemplar
+    productions: those of the start symbol first
+    seams: for each class of sites points on its first site, float64 (k, 3)
+    exemplar: the whole surface
+    splats: whether the exemplar is a point cloud, and triangles stand for its points, one each
     """
 
     name: str
@@ -69,37 +78,37 @@ class ShapeGrammar:
 
     @property
     def made_of(self) -> str:
-        """What surfaces are made of."""
+        """What surfaces consist of."""
         return "points" if self.splats else "triangles"
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
         """The names of all meshes."""
-        return tuple(each.name for each in self.meshes)
+        return tuple(mesh.name for mesh in self.meshes)
 
     @cached_property
     def bounds(self) -> FloatArray:
         """Lowest and highest corner of the box around each mesh, float64 (m, 2, 3)."""
-        return np.array([each.bounds for each in self.meshes]).reshape(-1, 2, 3)
+        return np.array([mesh.bounds for mesh in self.meshes]).reshape(-1, 2, 3)
 
     @cached_property
     def productions_of_site(self) -> Mapping[int, tuple[int, ...]]:
-        """The rules of each class of sites, by their places."""
-        found: dict[int, list[int]] = {}
-        for number, rule in enumerate(self.productions):
-            found.setdefault(rule.site, []).append(number)
-        return {site: tuple(each) for site, each in found.items()}
+        """Indices of the productions of each class of sites."""
+        numbers: dict[int, list[int]] = {}
+        for number, production in enumerate(self.productions):
+            numbers.setdefault(production.site, []).append(number)
+        return {site: tuple(of_site) for site, of_site in numbers.items()}
 
-    def standing(self, mesh: int, motion: FloatArray) -> FloatArray:
-        """The pose (4, 4) of a mesh that a motion takes from where the exemplar has it."""
-        pose = motion.copy()
-        pose[:3, 3] = motion[:3, :3] @ self.middles[mesh] + motion[:3, 3]
+    def mesh_pose(self, mesh: int, transform: FloatArray) -> FloatArray:
+        """Return the pose (4, 4) of a mesh that is transformed from where the exemplar has it."""
+        pose = transform.copy()
+        pose[:3, 3] = transform[:3, :3] @ self.middles[mesh] + transform[:3, 3]
         return np.asarray(pose + 0.0)
 
 
 def site_name(site: int) -> str:
-    """What a class of sites is called: a letter and, after the last, a number; S is the start symbol, G a grid."""
-    if site == START:
+    """Return the name of a class of sites: a letter, after the last with a number; S is the start symbol, G a grid."""
+    if site == START_SITE:
         return "S"
-    turn, place = divmod(site, len(LETTERS))
-    return LETTERS[place] + (f"{turn}_" if turn else "")
+    turn, letter = divmod(site, len(SITE_LETTERS))
+    return SITE_LETTERS[letter] + (f"{turn}_" if turn else "")

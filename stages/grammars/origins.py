@@ -1,4 +1,4 @@
-"""Where the meshes of a dataset come from, and whose they are."""
+"""Where the meshes of a dataset come from, and who made them."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from stages.shape.collection.origin import Origin
 
 
 def mesh_origins(plan: Plan) -> list[Origin]:
-    """The model files of all grammars, in the order of the config."""
+    """Return the origins of the model files of all grammars, in the order of the config."""
     return [
         Origin(
-            kit=each.name,
-            file="/".join(each.model.parts[-2:]),
-            sha256=file_digest(each.model),
-            key=f"grammars.models[{each.name}].credit",
-            **each.credit.model_dump(),
+            kit=model.name,
+            file="/".join(model.model.parts[-2:]),
+            sha256=file_digest(model.model),
+            key=f"grammars.models[{model.name}].credit",
+            **model.credit.model_dump(),
         )
-        for each in plan.config.section(GrammarsConfig).models
+        for model in plan.config.section(GrammarsConfig).models
     ]

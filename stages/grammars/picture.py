@@ -1,4 +1,4 @@
-"""The picture of a grammar: the exemplar with its docking sites, what may dock at each, and its grids resized."""
+"""The picture of a grammar: the exemplar with its docking sites, what may dock at each, and its resized grids."""
 
 from __future__ import annotations
 
@@ -9,13 +9,8 @@ from typing import Literal
 
 import numpy as np
 
-from stages.grammars.derivation_text import (
-    PlacedTerminal,
-    ResizedGrid,
-    compact_shape_of_text,
-    exemplar_shape,
-    placed_terminals,
-)
+from stages.grammars.derivation import ResizedGrid
+from stages.grammars.derived_shape import PlacedTerminal, compact_shape_of_text, exemplar_shape, placed_terminals
 from stages.grammars.editing import EditingOption, apply_option, editing_options
 from stages.grammars.extraction.extract import ExtractedGrammar
 from stages.grammars.grammar import Grid, ShapeGrammar, site_name
@@ -32,164 +27,175 @@ from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.symmetry.surface.soup import Soup, carve
 from stages.symmetry.surface.welding import weld
 
-CELL = 200
-COLUMNS = 4
+Color = tuple[int, int, int]
+
+CELL_PIXELS = 200
+GRID_COLUMNS = 4
 CAMERA = Camera(azimuth=-36.0, elevation=24.0, fov=24.0, margin=0.06)
 STAYS, COMES, GOES = (196, 192, 186), (204, 72, 58), (232, 186, 64)
-SITES = 5
-"""So many classes of sites are shown, those at which what may dock differs most in size."""
-SIDES = 4
-"""From so many sides it is looked at editing options, each time from that which the docker faces most."""
-POINTS = 100_000
-"""So many points of a cloud are drawn at most."""
-OPTIONS = 3
-"""So many editing options of one site, those that change most."""
+MAX_SITES_SHOWN = 5
+"""Classes of sites whose editing options are shown, those with the largest differences in size."""
+CAMERA_SIDES = 4
+"""Directions from which editing options may be shown; the one that the docked piece faces most is taken."""
+MAX_POINTS_SHOWN = 100_000
+MAX_OPTIONS_SHOWN = 3
+"""Editing options of one site that are shown, those that change most."""
 
 
-def grammar_sheet(found: ExtractedGrammar) -> bytes:
-    """A PNG: the exemplar, its sites in a colour for each class, and dockers; at a site of each class what may take the
-    place of what is there, yellow, in red; and each grid with other numbers of cells."""
-    grammar, whole = found.grammar, _whole(found)
-    dockers = len(found.docked_pieces)
-    classes = len({each.site for each in found.docked_pieces})
+def grammar_sheet(extracted: ExtractedGrammar) -> bytes:
+    """Return a PNG of a grammar.
+
+    It shows the exemplar, its sites in a colour for each class, what may replace the piece at a site of each class
+    (yellow) in red, and each grid with other numbers of cells.
+    """
+    grammar, whole = extracted.grammar, _whole(extracted)
     exemplar = [
-        _cell(found, [(whole, STAYS)], f"{len(grammar.exemplar.faces):,} {grammar.made_of}"),
-        _cell(found, _sites(found), f"{dockers} docking sites of {classes} classes"),
+        _cell(extracted, [(whole, STAYS)], f"{len(grammar.exemplar.faces):,} {grammar.made_of}"),
+        _cell(extracted, _sites(extracted), _sites_caption(extracted)),
     ]
-    sections = [Section("Exemplar", [exemplar], f"{len(grammar.productions)} rules, {len(grammar.grids)} grids", 2)]
-    rows = list(_editing(found))
+    note = f"{len(grammar.productions)} productions, {len(grammar.grids)} grids"
+    sections = [Section("Exemplar", [exemplar], note, 2)]
+    rows = list(_editing_rows(extracted))
     if rows:
-        sections.append(Section("Editing options", rows, "yellow: what a site holds; red: what may take its place"))
-    resized = [_grid_row(found, number, grid) for number, grid in enumerate(grammar.grids[:SITES])]
+        sections.append(Section("Editing options", rows, "yellow: what a site holds; red: what may replace it"))
+    resized = [_grid_row(extracted, number, grid) for number, grid in enumerate(grammar.grids[:MAX_SITES_SHOWN])]
     if resized:
         sections.append(Section("Grids", resized, "cells along each row"))
-    return picture_png(contact_sheet(sections, grammar.name, CELL))
+    return picture_png(contact_sheet(sections, grammar.name, CELL_PIXELS))
 
 
 def shapes_sheet(grammar: ShapeGrammar, texts: Sequence[str]) -> bytes:
-    """A PNG: the exemplar, and the shapes of some derivations."""
-    cells = [Cell(_pictured(exemplar_shape(grammar), grammar.splats), "the model"), *shapes_row(grammar, texts)]
-    rows = [cells[place : place + COLUMNS] for place in range(0, len(cells), COLUMNS)]
-    return picture_png(contact_sheet([Section("Shapes of the grammar", rows)], grammar.name, CELL))
+    """Return a PNG of the exemplar and the shapes of some derivations."""
+    cells = [Cell(_render(exemplar_shape(grammar), grammar.splats), "the model"), *shapes_row(grammar, texts)]
+    rows = [cells[begin : begin + GRID_COLUMNS] for begin in range(0, len(cells), GRID_COLUMNS)]
+    return picture_png(contact_sheet([Section("Shapes of the grammar", rows)], grammar.name, CELL_PIXELS))
 
 
 def shapes_row(grammar: ShapeGrammar, texts: Sequence[str]) -> list[Cell]:
-    """The shapes of some derivations, each with its text."""
-    return [Cell(_pictured(compact_shape_of_text(grammar, each), grammar.splats), each) for each in texts]
+    """Return the shapes of some derivations, each with its text."""
+    return [Cell(_render(compact_shape_of_text(grammar, text), grammar.splats), text) for text in texts]
 
 
-def docked_pieces_row(found: ExtractedGrammar, most: int) -> list[Cell]:
-    """The exemplar with its sites, and, of at most so many classes of sites, those at which most dock, the smallest
-    docker."""
-    classes = Counter(each.site for each in found.docked_pieces)
-    cells = [_cell(found, _sites(found), f"{len(found.docked_pieces)} docking sites of {len(classes)} classes")]
-    for site, count in sorted(classes.items(), key=lambda each: (-each[1], each[0]))[:most]:
-        docker = next(each for each in found.docked_pieces if each.site == site)
-        inside, outside = carve(_whole(found), found.grid, docker.cells, np.eye(4))
-        caption = f"{site_name(site)}, one of {count}: {docker.area:.1%}"
-        cells.append(_cell(found, [(outside, STAYS), (inside, GOES)], caption))
+def docked_pieces_row(extracted: ExtractedGrammar, max_classes: int) -> list[Cell]:
+    """Return the exemplar with its sites, and the smallest piece of each of the largest `max_classes` classes."""
+    pieces = extracted.docked_pieces
+    classes = Counter(piece.site for piece in pieces)
+    cells = [_cell(extracted, _sites(extracted), _sites_caption(extracted))]
+    for site, count in sorted(classes.items(), key=lambda item: (-item[1], item[0]))[:max_classes]:
+        piece = next(piece for piece in pieces if piece.site == site)
+        inside, outside = carve(_whole(extracted), extracted.grid, piece.cells, np.eye(4))
+        caption = f"{site_name(site)}, one of {count}: {piece.area:.1%}"
+        cells.append(_cell(extracted, [(outside, STAYS), (inside, GOES)], caption))
     return cells
 
 
-def _whole(found: ExtractedGrammar) -> Soup:
-    return Soup(found.grid.corners, np.arange(len(found.grid.corners), dtype=np.int32))
+def _sites_caption(extracted: ExtractedGrammar) -> str:
+    return f"{len(extracted.docked_pieces)} docking sites of {extracted.site_classes} classes"
 
 
-def _sites(found: ExtractedGrammar) -> list[tuple[Soup, tuple[int, int, int]]]:
-    """The exemplar with what lies in the cells of docking sites in the colour of their class."""
-    rest, parts = _whole(found), []
-    colors = label_colors(1 + max((each.site for each in found.docked_pieces), default=0)).tolist()
-    for docker in found.docked_pieces:
-        red, green, blue = colors[docker.site]
-        inside, rest = carve(rest, found.grid, docker.border, np.eye(4))
+def _whole(extracted: ExtractedGrammar) -> Soup:
+    return Soup(extracted.grid.corners, np.arange(len(extracted.grid.corners), dtype=np.int32))
+
+
+def _sites(extracted: ExtractedGrammar) -> list[tuple[Soup, Color]]:
+    """Return the exemplar with the cells of docking sites in the colour of their class."""
+    rest, parts = _whole(extracted), []
+    colors = label_colors(1 + max((piece.site for piece in extracted.docked_pieces), default=0)).tolist()
+    for piece in extracted.docked_pieces:
+        red, green, blue = colors[piece.site]
+        inside, rest = carve(rest, extracted.grid, piece.border, np.eye(4))
         parts.append((inside, (red, green, blue)))
     return [*parts, (rest, STAYS)]
 
 
-def _editing(found: ExtractedGrammar) -> Iterator[list[Cell]]:
-    """For the site of each class at which sizes differ most what is there, and what may be."""
-    options = editing_options(found)
+def _editing_rows(extracted: ExtractedGrammar) -> Iterator[list[Cell]]:
+    """Yield what is and what may be at the site of each class where sizes differ most."""
+    options = editing_options(extracted)
+    pieces = extracted.docked_pieces
 
-    def most(place: int) -> float:
-        return max(
-            abs(found.docked_pieces[each.other].area - found.docked_pieces[place].area) for each in options[place]
-        )
+    def largest_change(index: int) -> float:
+        return max(abs(pieces[option.other].area - pieces[index].area) for option in options[index])
 
     best: dict[int, int] = {}
-    for place in sorted(options, key=lambda each: (-most(each), each)):
-        best.setdefault(found.docked_pieces[place].site, place)
-    for site, place in list(best.items())[:SITES]:
-        docker = found.docked_pieces[place]
-        inside, outside = carve(_whole(found), found.grid, docker.cells, np.eye(4))
-        camera = _facing(inside, found.grammar.up)
-        caption = f"{site_name(site)}: {docker.area:.0%} of it"
-        cells = [_cell(found, [(outside, STAYS), (inside, GOES)], caption, camera)]
-        chosen = sorted(options[place], key=lambda each: -abs(found.docked_pieces[each.other].area - docker.area))
-        cells += [_option(found, each, camera) for each in chosen[:OPTIONS]]
+    for index in sorted(options, key=lambda index: (-largest_change(index), index)):
+        best.setdefault(pieces[index].site, index)
+    for site, index in list(best.items())[:MAX_SITES_SHOWN]:
+        piece = pieces[index]
+        inside, outside = carve(_whole(extracted), extracted.grid, piece.cells, np.eye(4))
+        camera = _camera_facing(inside, extracted.grammar.up)
+        caption = f"{site_name(site)}: {piece.area:.0%} of it"
+        cells = [_cell(extracted, [(outside, STAYS), (inside, GOES)], caption, camera)]
+        chosen = sorted(options[index], key=lambda option: -abs(pieces[option.other].area - piece.area))
+        cells += [_option_cell(extracted, option, camera) for option in chosen[:MAX_OPTIONS_SHOWN]]
         yield cells
 
 
-def _facing(soup: Soup, up: Literal["y", "z"]) -> Camera:
-    """Of cameras all around that which sees most of a surface, if nothing stands before it."""
-    sides = [replace(CAMERA, azimuth=CAMERA.azimuth + 360.0 / SIDES * each) for each in range(SIDES)]
-    ways = area_vectors(soup.corners)
-    seen = [np.clip(ways @ eye_rotation(each.azimuth, each.elevation, up)[2], 0.0, None).sum() for each in sides]
-    return sides[int(np.argmax(np.round(seen, 9)))]
-
-
-def _option(found: ExtractedGrammar, option: EditingOption, camera: Camera) -> Cell:
-    stays, comes = apply_option(found, option)
-    return _cell(found, [(stays, STAYS), (comes, COMES)], f"{option.kind}: docker {option.other}", camera)
-
-
-def _grid_row(found: ExtractedGrammar, number: int, grid: Grid) -> list[Cell]:
-    """A grid with no cells, as in the exemplar, and with more along each row."""
-    wanted: Sequence[tuple[int, ...]] = [
-        tuple(0 for _ in grid.counts),
-        grid.counts,
-        *(tuple(each + 2 * (row == way) for row, each in enumerate(grid.counts)) for way in range(len(grid.counts))),
-        tuple(each + 3 for each in grid.counts),
+def _camera_facing(soup: Soup, up: Literal["y", "z"]) -> Camera:
+    """Return the camera, of CAMERA_SIDES around, that sees most of a surface if nothing hides it."""
+    cameras = [
+        replace(CAMERA, azimuth=CAMERA.azimuth + 360.0 / CAMERA_SIDES * number) for number in range(CAMERA_SIDES)
     ]
-    return [_resized(found, number, counts) for counts in dict.fromkeys(wanted)][:COLUMNS]
+    vectors = area_vectors(soup.corners)
+    seen = [
+        np.clip(vectors @ eye_rotation(camera.azimuth, camera.elevation, up)[2], 0.0, None).sum() for camera in cameras
+    ]
+    return cameras[int(np.argmax(np.round(seen, 9)))]
 
 
-def _resized(found: ExtractedGrammar, number: int, counts: tuple[int, ...]) -> Cell:
-    grammar = found.grammar
-    pieces = placed_terminals(grammar, ResizedGrid(number, counts))
+def _option_cell(extracted: ExtractedGrammar, option: EditingOption, camera: Camera) -> Cell:
+    stays, comes = apply_option(extracted, option)
+    return _cell(extracted, [(stays, STAYS), (comes, COMES)], f"{option.kind}: docked piece {option.other}", camera)
+
+
+def _grid_row(extracted: ExtractedGrammar, number: int, grid: Grid) -> list[Cell]:
+    """Return a grid without cells, as in the exemplar, and with more cells in each row."""
+    rows = range(len(grid.counts))
+    wanted: Sequence[tuple[int, ...]] = [
+        tuple(0 for _ in rows),
+        grid.counts,
+        *(tuple(count + 2 * (row == longer) for row, count in enumerate(grid.counts)) for longer in rows),
+        tuple(count + 3 for count in grid.counts),
+    ]
+    return [_resized_cell(extracted, number, counts) for counts in dict.fromkeys(wanted)][:GRID_COLUMNS]
+
+
+def _resized_cell(extracted: ExtractedGrammar, number: int, counts: tuple[int, ...]) -> Cell:
+    grammar = extracted.grammar
+    terminals = placed_terminals(grammar, ResizedGrid(number, counts))
     paint = dict(zip((mesh for mesh, _ in grammar.grids[number].pieces), label_colors(27).tolist(), strict=False))
-    parts = [(_soup(grammar.meshes[each.mesh], each), tuple(paint[each.mesh])) for each in pieces]
-    return _cell(found, parts, f"{grammar.grids[number].name}[{','.join(map(str, counts))}]")
+    parts = [(_soup(grammar.meshes[placed.mesh], placed), tuple(paint[placed.mesh])) for placed in terminals]
+    return _cell(extracted, parts, f"{grammar.grids[number].name}[{','.join(map(str, counts))}]")
 
 
-def _soup(mesh: PartMesh, piece: PlacedTerminal) -> Soup:
-    corners = transform_points(piece.pose, mesh.vertices)[mesh.faces]
+def _soup(mesh: PartMesh, placed: PlacedTerminal) -> Soup:
+    corners = transform_points(placed.pose, mesh.vertices)[mesh.faces]
     return Soup(corners, np.zeros(len(corners), dtype=np.int32))
 
 
 def _cell(
-    found: ExtractedGrammar, parts: Sequence[tuple[Soup, tuple[int, int, int]]], caption: str, camera: Camera = CAMERA
+    extracted: ExtractedGrammar, parts: Sequence[tuple[Soup, Color]], caption: str, camera: Camera = CAMERA
 ) -> Cell:
-    filled = [(each, color) for each, color in parts if len(each)]
-    meshes = tuple(_mesh(each.corners, color) for each, color in filled)
+    meshes = tuple(_mesh(soup.corners, color) for soup, color in parts if len(soup))
     types = np.arange(len(meshes), dtype=np.int16)
     assembly = Assembly(types, np.tile(np.eye(4), (len(meshes), 1, 1)), np.empty((0, 2), np.int32))
-    shape = Shape(meshes, assembly, found.grammar.up, ("part",), one_surface=True)
-    return Cell(_pictured(shape, found.grammar.splats, camera), caption)
+    shape = Shape(meshes, assembly, extracted.grammar.up, ("part",), one_surface=True)
+    return Cell(_render(shape, extracted.grammar.splats, camera), caption)
 
 
-def _pictured(shape: Shape, splats: bool, camera: Camera = CAMERA) -> ByteArray:
-    """A portrait of a shape, or of the points that its splats stand for, of evenly many of them."""
+def _render(shape: Shape, splats: bool, camera: Camera = CAMERA) -> ByteArray:
+    """Render a shape, or evenly chosen points of its splats."""
     if not splats:
-        return portrait(scene_of(shape), camera, (CELL, CELL))
+        return portrait(scene_of(shape), camera, (CELL_PIXELS, CELL_PIXELS))
     placed = [(shape.meshes[kind], pose) for kind, pose in zip(shape.assembly.types, shape.assembly.poses, strict=True)]
-    step = 1 + sum(len(mesh.faces) for mesh, _ in placed) // POINTS
-    points = [transform_points(pose, mesh.vertices[mesh.faces[::step]].mean(axis=1)) for mesh, pose in placed]
-    paint: ByteArray = np.concatenate([mesh.face_colors[::step] for mesh, _ in placed])
-    every = np.concatenate(points)
-    return points_portrait(every, np.arange(len(every), dtype=np.int32), camera, (CELL, CELL), shape.up, paint)
+    step = 1 + sum(len(mesh.faces) for mesh, _ in placed) // MAX_POINTS_SHOWN
+    centres = [transform_points(pose, mesh.vertices[mesh.faces[::step]].mean(axis=1)) for mesh, pose in placed]
+    colors: ByteArray = np.concatenate([mesh.face_colors[::step] for mesh, _ in placed])
+    points = np.concatenate(centres)
+    labels = np.arange(len(points), dtype=np.int32)
+    return points_portrait(points, labels, camera, (CELL_PIXELS, CELL_PIXELS), shape.up, colors)
 
 
-def _mesh(corners: FloatArray, color: tuple[int, int, int]) -> PartMesh:
+def _mesh(corners: FloatArray, color: Color) -> PartMesh:
     colors: ByteArray = np.tile(np.array(color, np.uint8), (len(corners), 1))
-    places, vertices = weld(corners, 0.0)
-    return PartMesh("part", vertices, places, colors)
+    indices, vertices = weld(corners, 0.0)
+    return PartMesh("part", vertices, indices, colors)

@@ -1,4 +1,4 @@
-"""What stage `grammars` says of itself as a producer of samples."""
+"""Stage `grammars` as a producer of samples."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ PRODUCER = Producer(
     language="derivation",
     keys="grammars.models",
     asked=lambda config: bool(config.section(GrammarsConfig).models),
-    sentence="a shape grammar is found in a mesh in one piece, by its partial symmetries, and its rules and grids are "
-    "carried out; a shape's derivation is its `txt`.",
+    sentence="the partial symmetries of a mesh in one piece make a shape grammar, whose productions and grids make "
+    "shapes; a shape's derivation is its `txt`.",
     origins=mesh_origins,
     limits=(
-        "Every neighbourhood of the radius of similarity is one of the mesh's; nothing new is seen from nearby.",
-        "Parts are terminals of the grammar: pieces between docking sites, which mean nothing.",
+        "Every neighbourhood of the radius of similarity is one of the mesh's; seen from nearby, nothing is new.",
+        "Parts are terminals of the grammar: pieces between docking sites, without a meaning.",
     ),
     splits="No two samples look alike, within a split or across splits: the radius of similarity counts as nothing.",
     graphs_share_split=True,

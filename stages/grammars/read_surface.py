@@ -1,4 +1,4 @@
-"""Meshes and point clouds from files, each read in a process of its own, which may take so much and no more."""
+"""Meshes and point clouds from files, each read in a child process with limited time and memory."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from stages.exemplars.settings import ReadLimits
 from stages.grammars.extraction.extract import SurfaceMesh, model_surface
 from stages.grammars.scans.scanned_grid import ScannedCloud
 
-TABLES = {".xyz": None, ".xyzn": "normals", ".xyzrgb": "colours"}
-"""Clouds as text, a point a line: x, y, z, and what else, colours from 0 to 1 (as Open3D writes them)."""
-MESH = b""
-"""What the child says of a PLY file with faces."""
+TEXT_COLUMNS = {".xyz": None, ".xyzn": "normals", ".xyzrgb": "colours"}
+"""Further columns of clouds as text, one point a line, after x, y, z; colours from 0 to 1, as Open3D writes them."""
+IS_MESH = b""
+"""Answer of the child process for a PLY file with faces."""
 
 
 def read_surface(
     path: Path, limits: ReadLimits | None = None
 ) -> tuple[SurfaceMesh | ScannedCloud, Literal["y", "z"] | None]:
-    """The surface in a model file, all of it one mesh, or in a cloud; and the axis that the file says points up.
+    """Read a model file as one mesh, or a cloud; also return the up axis that the file states.
 
     Raises ConfigError as `read_model` and `read_cloud` do.
     """
@@ -39,17 +39,17 @@ def read_surface(
 
 
 def is_point_cloud(path: Path, limits: ReadLimits | None = None) -> bool:
-    """Whether a file is a point cloud. Raises ConfigError as `read_cloud` does."""
-    return path.suffix.lower() in TABLES or read_cloud(path, limits) is not None
+    """Return whether a file is a point cloud. Raises ConfigError as `read_cloud` does."""
+    return path.suffix.lower() in TEXT_COLUMNS or read_cloud(path, limits) is not None
 
 
 def read_cloud(path: Path, limits: ReadLimits | None = None) -> ScannedCloud | None:
-    """The cloud in a PLY file without faces, or a table of numbers; None for any other file.
+    """Read the cloud in a PLY file without faces, or in a table of numbers; None for any other file.
 
-    Raises ConfigError for a file that cannot be read as such. Which clouds are scans of a surface, `cloud_grid` says.
+    Raises ConfigError for a file that cannot be read as such. `scanned_grid` decides which clouds are scans.
     """
     suffix = path.suffix.lower()
-    if suffix not in (*TABLES, ".ply") or not path.is_file():
+    if suffix not in (*TEXT_COLUMNS, ".ply") or not path.is_file():
         return None
     limits = limits or ReadLimits()
     try:
@@ -60,7 +60,7 @@ def read_cloud(path: Path, limits: ReadLimits | None = None) -> ScannedCloud | N
         raise ConfigError(
             f"{path}: cannot be read: {error}; thin the cloud out, or raise exemplars.limits in the config"
         ) from None
-    if content == MESH:
+    if content == IS_MESH:
         return None
     with np.load(io.BytesIO(content), allow_pickle=False) as stored:
         normals = stored["normals"]
@@ -68,11 +68,11 @@ def read_cloud(path: Path, limits: ReadLimits | None = None) -> ScannedCloud | N
 
 
 def _packed(path: Path) -> bytes:
-    """A cloud as an npz file of plain arrays; MESH where there are faces."""
+    """Return a cloud as an npz file of plain arrays; IS_MESH for a file with faces."""
     if path.suffix.lower() == ".ply":
         read = read_ply_points(path, Enclosure(path))
         if read is None:
-            return MESH
+            return IS_MESH
     else:
         read = _table(path)
     points, normals, colors = read
@@ -84,15 +84,15 @@ def _packed(path: Path) -> bytes:
 
 
 def _table(path: Path) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
-    """Points, normals and colours of a text file, a point a line."""
-    more = TABLES[path.suffix.lower()]
+    """Return points, normals and colours of a text file with one point a line."""
+    columns = TEXT_COLUMNS[path.suffix.lower()]
     try:
         rows = np.loadtxt(path, ndmin=2)
     except ValueError as error:
         raise ConfigError(f"{path}: no table of numbers ({error}); export it again") from None
-    if rows.shape[1] < (6 if more else 3):
-        raise ConfigError(f"{path}: {rows.shape[1]} numbers a line; a point has {'6' if more else '3'} at least")
+    if rows.shape[1] < (6 if columns else 3):
+        raise ConfigError(f"{path}: {rows.shape[1]} numbers a line; a point has {'6' if columns else '3'} at least")
     points, last = np.ascontiguousarray(rows[:, :3]), rows[:, 3:6]
-    if more == "colours":
+    if columns == "colours":
         return points, None, np.rint(np.clip(last, 0, 1) * 255).astype(np.uint8)
-    return points, last if more == "normals" else None, None
+    return points, last if columns == "normals" else None, None

@@ -1,4 +1,4 @@
-"""The terminals of a grammar as points, one in each cell of the lattice for each way that their surface faces."""
+"""The terminals of a grammar as points, one per cell of the lattice and facing direction of the surface there."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from stages.symmetry.surface.clip import fragments
 from stages.symmetry.surface.grid import CELLS_PER_RADIUS
 from stages.symmetry.surface.lattice import pack
 
-TILT = np.array([1.0, 1.0137, 1.0271])
-"""By so much an axis weighs more where a surface faces between two: what faces halfway must not go by rounding."""
-FACING = 3
-"""Bits of a key that say which way the surface faces."""
-HELD = 300_000_000
-"""Bytes of samples that are held. Hundreds of terminals that have most of a large surface each have gigabytes."""
-BYTES_A_POINT = 72
-"""Of a point, its normal, and its place in a tree."""
+AXIS_WEIGHTS = np.array([1.0, 1.0137, 1.0271])
+"""Weights of the axes for a surface that faces between two: rounding must not decide what faces halfway."""
+FACING_BITS = 3
+"""Bits of a key for the facing direction."""
+MAX_SAMPLE_BYTES = 300_000_000
+"""Samples of hundreds of terminals that each have most of a large surface take gigabytes."""
+BYTES_PER_POINT = 72
+"""Size of a point, its normal, and its entry in a tree."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,36 +43,36 @@ class SurfaceSamples:
 
 
 class TerminalSamples:
-    """The samples of each mesh of a grammar, taken when they are asked for; those asked for last are held."""
+    """The samples of each mesh of a grammar, made on demand and cached."""
 
     def __init__(self, grammar: ShapeGrammar) -> None:
         self._grammar = grammar
-        self._taken: BoundedCache[int, SurfaceSamples] = BoundedCache(
-            lambda mesh: sample_surface(grammar.meshes[mesh], self.cell),
-            lambda taken: BYTES_A_POINT * len(taken.points),
-            HELD,
+        self._samples: BoundedCache[int, SurfaceSamples] = BoundedCache(
+            lambda mesh: sample_mesh(grammar.meshes[mesh], self.cell),
+            lambda samples: BYTES_PER_POINT * len(samples.points),
+            MAX_SAMPLE_BYTES,
         )
 
     @property
     def cell(self) -> float:
-        """The width of a cell of the lattice."""
+        """Width of a cell of the lattice."""
         return self._grammar.radius / CELLS_PER_RADIUS
 
     def __getitem__(self, mesh: int) -> SurfaceSamples:
-        return self._taken[mesh]
+        return self._samples[mesh]
 
 
-def sample_surface(part: PartMesh, size: float) -> SurfaceSamples:
-    """The samples of a mesh on a lattice of cells of this size."""
+def sample_mesh(part: PartMesh, size: float) -> SurfaceSamples:
+    """Return the samples of a mesh on a lattice of cells of this size."""
     corners = part.vertices[part.faces]
     normals = unit_normals(corners)
-    where, owner, middles = fragments(corners, corners.min(axis=(0, 1)) - size / 3, size)
-    _, first = np.unique((pack(where) << FACING) + facing_axis(normals)[owner], return_index=True)
+    cells, owner, middles = fragments(corners, corners.min(axis=(0, 1)) - size / 3, size)
+    _, first = np.unique((pack(cells) << FACING_BITS) + facing_direction(normals)[owner], return_index=True)
     return SurfaceSamples(np.ascontiguousarray(middles[first, :3]), normals[owner[first]])
 
 
-def facing_axis(normals: FloatArray) -> np.ndarray:
-    """Along which axis normals (n, 3) point most, int64 (n,): 0 to 2 along x, y, z, 3 to 5 against them."""
-    axis = np.abs(normals * TILT).argmax(axis=1)
-    found: np.ndarray = axis + 3 * (normals[np.arange(len(normals)), axis] < 0)
-    return found
+def facing_direction(normals: FloatArray) -> np.ndarray:
+    """Return the axis along which each normal (n, 3) points most, int64 (n,): 0 to 2 along x, y, z, 3 to 5 against."""
+    axis = np.abs(normals * AXIS_WEIGHTS).argmax(axis=1)
+    direction: np.ndarray = axis + 3 * (normals[np.arange(len(normals)), axis] < 0)
+    return direction

@@ -1,5 +1,7 @@
-"""How much of a shape one sees to be different from another: more than the cuts of its pieces, or what lies within the
-radius of similarity."""
+"""How much of the visible surface of a shape differs from another, by voxels as wide as the radius of similarity.
+
+Differences between cuts of the pieces, or within the radius, do not count.
+"""
 
 from __future__ import annotations
 
@@ -8,28 +10,40 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.grammars.derivation_text import PlacedTerminal
+from stages.grammars.derived_shape import PlacedTerminal
 from stages.grammars.grammar import ShapeGrammar
-from stages.grammars.terminal_samples import FACING, SurfaceSamples, TerminalSamples, facing_axis, sample_surface
+from stages.grammars.terminal_samples import (
+    FACING_BITS,
+    SurfaceSamples,
+    TerminalSamples,
+    facing_direction,
+    sample_mesh,
+)
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import transform_points
 
-ASKED = 8
-"""Every so many-th voxel is looked for in the other shape."""
-AXIS = 16
-"""Bits of a key that say where a voxel lies along an axis."""
-EDGE = 0.381966
-"""Where in its voxel the box's corner lies: surfaces of models stand at round numbers."""
-STEPS = np.array([(x << 2 * AXIS) + (y << AXIS) + z for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)])
-AROUND = STEPS << FACING
-"""What a voxel and its 26 neighbours have more in their keys."""
+VOXEL_STRIDE = 8
+"""Every eighth voxel is looked up in the other shape."""
+BITS_PER_AXIS = 16
+"""Bits of a key for the position of a voxel along one axis."""
+CORNER_OFFSET = 0.381966
+"""Position of the box's corner in its voxel: surfaces of models lie at round numbers."""
+SAME_SIZE_VOXELS = 2.0
+"""Boxes whose sides differ by more belong to different shapes."""
+_STEPS = [
+    (x << 2 * BITS_PER_AXIS) + (y << BITS_PER_AXIS) + z for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)
+]
+NEIGHBOUR_OFFSETS = np.array(_STEPS) << FACING_BITS
+"""Differences of the keys of a voxel and its 26 neighbours."""
 
 
 @dataclass(frozen=True, eq=False)
 class VoxelSignature:
-    """What one sees of a shape: the voxels, as wide as the radius of similarity, that its surface is in, and which way
-    it faces in each, as keys int64 (n,) ascending, counted from the low corner of the box and from its high corner;
-    sides: float64 (3,), of the box, in voxels."""
+    """The voxels that the surface of a shape occupies, with its facing direction in each.
+
+    from_low, from_high: int64 (n,), keys counted from the low and from the high corner of the box, ascending
+    sides: float64 (3,), of the box, in voxels
+    """
 
     from_low: np.ndarray
     from_high: np.ndarray
@@ -39,65 +53,66 @@ class VoxelSignature:
 def voxel_signature(
     placed: Sequence[tuple[SurfaceSamples, FloatArray]], low: FloatArray, high: FloatArray, size: float
 ) -> VoxelSignature:
-    """What one sees of samples, each at a pose (4, 4), in a box from `low` to `high` (3,), by voxels of this size."""
-    points = np.concatenate([transform_points(pose, each.points) for each, pose in placed])
-    ways = facing_axis(np.concatenate([each.normals @ pose[:3, :3].T for each, pose in placed]))
-    return VoxelSignature(_keys((points - low) / size, ways), _keys((high - points) / size, ways), (high - low) / size)
+    """Return the signature of samples at poses (4, 4) in a box from `low` to `high` (3,), with voxels of this size."""
+    points = np.concatenate([transform_points(pose, samples.points) for samples, pose in placed])
+    facing = facing_direction(np.concatenate([samples.normals @ pose[:3, :3].T for samples, pose in placed]))
+    return VoxelSignature(
+        _keys((points - low) / size, facing), _keys((high - points) / size, facing), (high - low) / size
+    )
 
 
 def difference(one: VoxelSignature, other: VoxelSignature) -> float:
-    """The share of what one sees of a shape that the other one has nowhere near, of both the greater, 0.0 to 1.0.
+    """Return the share of the surface of a shape that the other one lacks, the larger of both, from 0.0 to 1.0.
 
-    Near is the same voxel or one beside it, for surface that faces alike: what moves by less than the radius has not
-    moved. Shapes are laid onto each other at the low corners of their boxes, or the high ones, whatever differs less.
+    Surface in the same voxel or a neighbouring one that faces the same way is equal: what moves by less than the radius
+    has not moved. Shapes are aligned at the low or the high corners of their boxes, whichever differs less.
     """
     return min(
-        max(_lacking(first, second), _lacking(second, first))
+        max(_missing_share(first, second), _missing_share(second, first))
         for first, second in ((one.from_low, other.from_low), (one.from_high, other.from_high))
     )
 
 
 class KnownShapes:
-    """The exemplar of a grammar, and the shapes that were drawn of it."""
+    """The exemplar of a grammar, and the shapes that were sampled from it."""
 
     def __init__(self, grammar: ShapeGrammar, samples: TerminalSamples) -> None:
         self._grammar, self._samples = grammar, samples
-        whole, (low, high) = sample_surface(grammar.exemplar, samples.cell), grammar.exemplar.bounds
+        whole, (low, high) = sample_mesh(grammar.exemplar, samples.cell), grammar.exemplar.bounds
         self.exemplar = voxel_signature([(whole, np.eye(4))], low, high, grammar.radius)
-        self._drawn: list[VoxelSignature] = []
+        self._sampled: list[VoxelSignature] = []
 
-    def sight(self, pieces: Sequence[PlacedTerminal]) -> VoxelSignature:
-        """What one sees of pieces."""
-        corners = (transform_points(each.pose, self._grammar.meshes[each.mesh].vertices) for each in pieces)
-        boxes = np.array([(each.min(axis=0), each.max(axis=0)) for each in corners])
+    def signature(self, terminals: Sequence[PlacedTerminal]) -> VoxelSignature:
+        """Return the signature of placed terminals."""
+        corners = (transform_points(placed.pose, self._grammar.meshes[placed.mesh].vertices) for placed in terminals)
+        boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in corners])
         low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
-        return voxel_signature(
-            [(self._samples[each.mesh], each.pose) for each in pieces], low, high, self._grammar.radius
-        )
+        samples = [(self._samples[placed.mesh], placed.pose) for placed in terminals]
+        return voxel_signature(samples, low, high, self._grammar.radius)
 
-    def nearest(self, sight: VoxelSignature) -> float:
-        """The least difference to a shape that was drawn before; 1.0 where there is none."""
-        return min((difference(sight, each) for each in self._drawn if _as_large(sight, each)), default=1.0)
+    def min_difference(self, signature: VoxelSignature) -> float:
+        """Return the smallest difference to a sampled shape; 1.0 before the first."""
+        near = (known for known in self._sampled if _same_size(signature, known))
+        return min((difference(signature, known) for known in near), default=1.0)
 
-    def add(self, sight: VoxelSignature) -> None:
-        """Hold a shape as drawn."""
-        self._drawn.append(sight)
-
-
-def _as_large(one: VoxelSignature, other: VoxelSignature) -> bool:
-    """Whether the boxes of two shapes differ by no more than what counts as near: else nobody takes one for the
-    other."""
-    return bool((np.abs(one.sides - other.sides) <= 2.0).all())
+    def add(self, signature: VoxelSignature) -> None:
+        """Record a shape as sampled."""
+        self._sampled.append(signature)
 
 
-def _keys(at: FloatArray, ways: np.ndarray) -> np.ndarray:
-    cells = np.floor(at + EDGE).astype(np.int64) + 1
-    packed = (cells[:, 0] << 2 * AXIS) + (cells[:, 1] << AXIS) + cells[:, 2]
-    return np.unique((packed << FACING) + ways)
+def _same_size(one: VoxelSignature, other: VoxelSignature) -> bool:
+    """Return whether the boxes of two shapes differ by no more than SAME_SIZE_VOXELS."""
+    return bool((np.abs(one.sides - other.sides) <= SAME_SIZE_VOXELS).all())
 
 
-def _lacking(keys: np.ndarray, others: np.ndarray) -> float:
-    """The share of keys that have nothing near them among others."""
-    asked = keys[::ASKED, None] + AROUND
-    place = np.minimum(np.searchsorted(others, asked), len(others) - 1)
-    return float(1 - (others[place] == asked).any(axis=1).mean())
+def _keys(at: FloatArray, facing: np.ndarray) -> np.ndarray:
+    cells = np.floor(at + CORNER_OFFSET).astype(np.int64) + 1
+    packed = (cells[:, 0] << 2 * BITS_PER_AXIS) + (cells[:, 1] << BITS_PER_AXIS) + cells[:, 2]
+    return np.unique((packed << FACING_BITS) + facing)
+
+
+def _missing_share(keys: np.ndarray, others: np.ndarray) -> float:
+    """Return the share of keys without an equal or a neighbour among others."""
+    near = keys[::VOXEL_STRIDE, None] + NEIGHBOUR_OFFSETS
+    index = np.minimum(np.searchsorted(others, near), len(others) - 1)
+    return float(1 - (others[index] == near).any(axis=1).mean())

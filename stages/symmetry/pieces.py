@@ -1,4 +1,4 @@
-"""A surface cut into repeated pieces and what is left between them: parts for a mesh that has none."""
+"""A surface cut into repeated pieces and the rest between them: parts for a mesh that has none."""
 
 from __future__ import annotations
 
@@ -9,95 +9,94 @@ import numpy as np
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 from stages.symmetry.matching.equality import soups_match
-from stages.symmetry.matching.repetitions import PART, Repetition, find_repetitions
+from stages.symmetry.matching.repetitions import PART_COST, Repetition, find_repetitions
 from stages.symmetry.rows import chunks_along, find_row
 from stages.symmetry.surface.clip import fragments
 from stages.symmetry.surface.grid import SurfaceGrid, surface_grid
-from stages.symmetry.surface.soup import Soup, carve, connected_soups, join_soups
+from stages.symmetry.surface.soup import NEIGHBOUR_CELLS, Soup, carve, connected_soups, join_soups
 
-RADIUS = 0.016
+RADIUS_SHARE = 0.016
 """Radius of similarity, as a share of the longest side of the model's box (symmetry §5)."""
-TRIED = 10
-"""So many repetitions are tried, those that save most first."""
-BETTER = 0.98
+MAX_TRIED_REPETITIONS = 10
+MAX_COST_RATIO = 0.98
 """Cuts must lower the cost at least by this factor."""
-SPLINTER = 5e-4
-"""A piece that touches no other is a part if it is more than this share of the whole surface."""
-ROUNDS = 3
-"""So many times what is left in one piece is searched again: rows hide others that save less."""
-LOOSE = 0.3
-"""Share of their surface by which chunks of what runs along a row may differ; they lie less than a cell apart."""
-BESIDE = 1.8
-"""Cells whose middles are closer than this are neighbours."""
-CRUMB = 1e-7
-"""What is smaller than this share of the surface is rounding."""
+MIN_PART_SHARE = 5e-4
+"""A piece that touches no other is a part if it is more than this share of the surface."""
+MAX_ROUNDS = 3
+"""How often the largest single piece is searched again: rows hide others that save less."""
+MAX_CHUNK_DIFFERENCE = 0.3
+"""Share of their surface by which chunks along a row may differ; they lie less than a cell from each other."""
+ROUNDING_SHARE = 1e-7
+"""Pieces of less than this share of the surface are rounding errors."""
 
 
 @dataclass(frozen=True)
 class SurfacePiece:
-    """A piece of the surface and everywhere it stands.
+    """A piece of the surface and all its copies.
 
-    triangles: in the world, where it stands at the identity; poses: rigid (4, 4), the identity first; strained: by what
-    share of its surface what runs along a row, and goes with this piece, was larger or smaller at another pose.
+    triangles: in the world, at the first pose
+    poses: float64 (4, 4) each, rigid, the identity first
+    strain: largest relative difference of surface between the chunks that run along the row of this piece
     """
 
     triangles: Soup
     poses: tuple[FloatArray, ...]
-    strained: float = 0.0
+    strain: float = 0.0
 
 
 def repeated_pieces(vertices: FloatArray, faces: IntArray) -> list[SurfacePiece]:
-    """The pieces of a mesh, vertices (v, 3) and faces (f, 3): cut between copies of what repeats, those that are equal
-    once with all their poses. One piece alone where nothing repeats.
+    """Cut a mesh, vertices (v, 3) and faces (f, 3), between the copies of what repeats.
 
-    Repetitions are taken one after another, that which saves most surface first, as long as the surface of the pieces
-    that differ gets smaller by more than `PART` a piece; two that cross cut the pieces of a 2-grid. Triangles without
-    area are left out.
+    Equal pieces are one, with all their poses; a mesh without repetition is one piece. Repetitions are taken in the
+    order of the surface that they save, as long as the surface of distinct pieces shrinks by more than PART_COST a
+    piece. Two repetitions that cross cut the pieces of a 2-grid. Triangles without area are left out.
     """
     corners = vertices[faces]
-    grid = surface_grid(corners, RADIUS)
+    grid = surface_grid(corners, RADIUS_SHARE)
     whole = Soup(grid.corners, grid.faces)
-    pieces, cost = [SurfacePiece(whole, (np.eye(4),))], 1.0 + PART
-    for turn in range(ROUNDS):
-        left = max(
-            (each for each in pieces if len(each.poses) == 1), key=lambda each: each.triangles.area, default=None
-        )
-        if left is None or not len(left.triangles):
+    pieces, cost = [SurfacePiece(whole, (np.eye(4),))], 1.0 + PART_COST
+    for turn in range(MAX_ROUNDS):
+        single = [piece for piece in pieces if len(piece.poses) == 1]
+        largest = max(single, key=lambda piece: piece.triangles.area, default=None)
+        if largest is None or not len(largest.triangles):
             break
         before = cost
-        others = [each for each in pieces if each is not left]
-        pieces, cost = _searched(left, others, grid if turn == 0 else _grid_like(grid, left), whole.area, cost)
+        others = [piece for piece in pieces if piece is not largest]
+        pieces, cost = _searched(
+            largest, others, grid if turn == 0 else _grid_of_piece(grid, largest), whole.area, cost
+        )
         if cost == before:
             break
     if len(pieces) == 1:
         return pieces
-    for place in range(len(pieces)):
-        pieces = _with_what_runs_along(pieces, place, grid)
-    return [part for part in _parts(pieces, grid) if part.triangles.area > CRUMB * whole.area]
+    for index in range(len(pieces)):
+        pieces = _with_chunks_along_row(pieces, index, grid)
+    return [part for part in _parts(pieces, grid) if part.triangles.area > ROUNDING_SHARE * whole.area]
 
 
-def _grid_like(grid: SurfaceGrid, piece: SurfacePiece) -> SurfaceGrid:
-    """A grid of a piece alone, with cells as large as those of `grid`."""
+def _grid_of_piece(grid: SurfaceGrid, piece: SurfacePiece) -> SurfaceGrid:
+    """Build a grid of one piece, with cells as large as those of `grid`."""
     corners = piece.triangles.corners
     return surface_grid(corners, grid.radius / float(np.ptp(corners.reshape(-1, 3), axis=0).max()))
 
 
 def _searched(
-    left: SurfacePiece, others: list[SurfacePiece], grid: SurfaceGrid, whole: float, cost: float
+    piece: SurfacePiece, others: list[SurfacePiece], grid: SurfaceGrid, whole_area: float, cost: float
 ) -> tuple[list[SurfacePiece], float]:
-    """`left` cut by what it repeats, with the other pieces, and what they all cost."""
-    pieces = [left]
-    for each in find_repetitions(grid)[:TRIED]:
-        cut = [part for piece in pieces for part in _cut(piece, grid, each)]
+    """Cut a piece by what it repeats; return it with the other pieces, and the cost of all."""
+    pieces = [piece]
+    for repetition in find_repetitions(grid)[:MAX_TRIED_REPETITIONS]:
+        cut = [part for known in pieces for part in _cut(known, grid, repetition)]
         every = [*others, *cut]
-        price = sum(piece.triangles.area for piece in every) / whole + PART * sum(len(piece.poses) for piece in every)
-        if price < BETTER * cost:
+        area = sum(known.triangles.area for known in every)
+        price = area / whole_area + PART_COST * sum(len(known.poses) for known in every)
+        if price < MAX_COST_RATIO * cost:
             pieces, cost = cut, price
     return [*others, *pieces], cost
 
 
 def _cut(piece: SurfacePiece, grid: SurfaceGrid, repetition: Repetition) -> list[SurfacePiece]:
-    """A piece cut along the copies of a repetition; copies with one shape are one piece."""
+    """Cut a piece along the copies of a repetition; copies of equal shape are one piece."""
     rest = piece.triangles
     cut: list[tuple[SurfacePiece, FloatArray]] = []
     for pose in repetition.poses:
@@ -105,86 +104,87 @@ def _cut(piece: SurfacePiece, grid: SurfaceGrid, repetition: Repetition) -> list
         if repetition.ahead is not None:
             beyond, inside = carve(inside, grid, repetition.band, pose @ repetition.ahead)
             rest = join_soups(rest, beyond)
-        if inside.area <= CRUMB * grid.area.sum():
+        if inside.area <= ROUNDING_SHARE * grid.area.sum():
             continue
-        for place, (known, first) in enumerate(cut):
-            way = pose @ invert(first)
-            if soups_match(known.triangles, inside, way, grid.tolerance):
-                cut[place] = SurfacePiece(known.triangles, (*known.poses, *(pose @ way for pose in piece.poses))), first
+        for number, (known, first) in enumerate(cut):
+            transform = pose @ invert(first)
+            if soups_match(known.triangles, inside, transform, grid.tolerance):
+                poses = (*known.poses, *(pose @ transform for pose in piece.poses))
+                cut[number] = SurfacePiece(known.triangles, poses), first
                 break
         else:
             cut.append((SurfacePiece(inside, piece.poses), pose))
-    found = [each for each, _ in cut]
-    return [*found, SurfacePiece(rest, piece.poses)] if len(rest) else found
+    copies = [known for known, _ in cut]
+    return [*copies, SurfacePiece(rest, piece.poses)] if len(rest) else copies
 
 
-def _with_what_runs_along(pieces: list[SurfacePiece], place: int, grid: SurfaceGrid) -> list[SurfacePiece]:
-    """The pieces, where those at `place` make a row with what runs along it; all as they are where it has none, or not
-    about the same at all copies.
+def _with_chunks_along_row(pieces: list[SurfacePiece], index: int, grid: SurfaceGrid) -> list[SurfacePiece]:
+    """Give a piece that makes a row the chunks of other pieces that run along the row.
 
-    A cable beside a mast hangs as it likes: the chunk of the first copy stands for those that lie within a cell of it.
+    The pieces stay as they are without such a row, or where the chunks of its copies are not about the same. A cable
+    next to a mast hangs freely: the chunk of the first copy replaces those that lie within a cell of it.
     """
-    piece = pieces[place]
+    piece = pieces[index]
     row = find_row(piece.poses, grid.tolerance)
     if row is None:
         return pieces
-    found = list(pieces)
-    gained, strained = piece.triangles, piece.strained
+    changed = list(pieces)
+    gained, strain = piece.triangles, piece.strain
     for other, single in enumerate(pieces):
-        if other == place or len(single.poses) > 1:
+        if other == index or len(single.poses) > 1:
             continue
         chunks, rest = chunks_along(piece.triangles, row, single.triangles, grid)
         first = chunks[0]
         if not len(first) or not all(
-            len(chunk) and soups_match(first, chunk, pose, grid.cell_size / 2, LOOSE)
+            len(chunk) and soups_match(first, chunk, pose, grid.cell_size / 2, MAX_CHUNK_DIFFERENCE)
             for chunk, pose in zip(chunks, piece.poses, strict=True)
         ):
             continue
-        strained = max(strained, *(abs(chunk.area / first.area - 1) for chunk in chunks))
-        gained, found[other] = join_soups(gained, first), SurfacePiece(rest, single.poses)
-    found[place] = SurfacePiece(gained, piece.poses, strained)
-    return found
+        strain = max(strain, *(abs(chunk.area / first.area - 1) for chunk in chunks))
+        gained, changed[other] = join_soups(gained, first), SurfacePiece(rest, single.poses)
+    changed[index] = SurfacePiece(gained, piece.poses, strain)
+    return changed
 
 
 def _parts(pieces: list[SurfacePiece], grid: SurfaceGrid) -> list[SurfacePiece]:
-    """Each piece as the pieces that do not touch each other, if they are large enough to be parts.
+    """Split pieces into connected ones that are large enough for parts.
 
-    What is smaller stays with the largest of them, but what lies between copies and is of no copy is left out: it would
-    make a neighbour of all of them of what is left.
+    Smaller ones stay with the largest. Splinters between copies that belong to no copy are left out: they would make
+    the remaining piece a neighbour of all copies.
     """
     copies = [
-        transform_points(pose, each.triangles.corners.reshape(-1, 3))
-        for each in pieces
-        if len(each.poses) > 1
-        for pose in each.poses
+        transform_points(pose, piece.triangles.corners.reshape(-1, 3))
+        for piece in pieces
+        if len(piece.poses) > 1
+        for pose in piece.poses
     ]
-    beside = _cells(np.concatenate(copies).reshape(-1, 3, 3), grid) if copies else np.empty((0, 3))
-    found: list[SurfacePiece] = []
+    copy_cells = _cells(np.concatenate(copies).reshape(-1, 3, 3), grid) if copies else np.empty((0, 3))
+    parts: list[SurfacePiece] = []
     for piece in pieces:
         if not len(piece.triangles):
             continue
-        soups = sorted(connected_soups(piece.triangles, grid.origin, grid.cell_size), key=lambda each: -each.area)
-        parts = [each for each in soups if each.area > SPLINTER * grid.area.sum()]
-        if not parts and len(piece.poses) > 1:
-            parts = soups[:1]
-        crumbs = soups[len(parts) :]
-        if len(piece.poses) == 1 and len(beside):
-            crumbs = [each for each in crumbs if not _near(_cells(each.corners, grid), beside)]
-        if not parts:
-            parts, crumbs = crumbs[:1], crumbs[1:]
-        for crumb in crumbs:
-            parts[0] = join_soups(parts[0], crumb)
-        found += [SurfacePiece(each, piece.poses, piece.strained) for each in parts]
-    return found
+        soups = sorted(connected_soups(piece.triangles, grid.origin, grid.cell_size), key=lambda soup: -soup.area)
+        large = [soup for soup in soups if soup.area > MIN_PART_SHARE * grid.area.sum()]
+        if not large and len(piece.poses) > 1:
+            large = soups[:1]
+        splinters = soups[len(large) :]
+        if len(piece.poses) == 1 and len(copy_cells):
+            splinters = [soup for soup in splinters if not _touch(_cells(soup.corners, grid), copy_cells)]
+        if not large:
+            large, splinters = splinters[:1], splinters[1:]
+        for splinter in splinters:
+            large[0] = join_soups(large[0], splinter)
+        parts += [SurfacePiece(soup, piece.poses, piece.strain) for soup in large]
+    return parts
 
 
 def _cells(corners: FloatArray, grid: SurfaceGrid) -> np.ndarray:
-    """The cells of triangles (t, 3, 3), int64 (n, 3)."""
+    """Return the cells of triangles (t, 3, 3), int64 (n, 3)."""
     return np.unique(fragments(corners, grid.origin, grid.cell_size)[0], axis=0)
 
 
-def _near(cells: np.ndarray, others: np.ndarray) -> bool:
-    """Whether one of some cells is, or is beside, one of others."""
+def _touch(cells: np.ndarray, others: np.ndarray) -> bool:
+    """Return whether one of some cells is one of the others or a neighbour of one."""
     from scipy.spatial import KDTree
 
-    return bool((KDTree(others).query(cells, distance_upper_bound=BESIDE)[0] < BESIDE).any())
+    return bool((KDTree(others).query(cells, distance_upper_bound=NEIGHBOUR_CELLS)[0] < NEIGHBOUR_CELLS).any())

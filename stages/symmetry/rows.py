@@ -1,5 +1,7 @@
-"""What runs along a row without being part of it, a cable beside a mast: cut where the row's copies meet, it goes with
-them, so that the row can be longer or shorter."""
+"""What runs along a row without being part of it, such as a cable next to a mast.
+
+It is cut where the row's copies meet, and its chunks go with the copies, so that the row can be longer or shorter.
+"""
 
 from __future__ import annotations
 
@@ -15,77 +17,82 @@ from stages.symmetry.surface.grid import SurfaceGrid
 from stages.symmetry.surface.soup import Soup, join_soups
 from stages.symmetry.surface.welding import weld
 
-FEWEST = 3
-"""So many copies make a row."""
-SPANS = 2.0
-"""What runs along a row is longer than so many of its steps."""
+MIN_COPIES_PER_ROW = 3
+MIN_STEPS_ALONG = 2.0
+"""What runs along a row is longer than this many of its steps."""
 
 
 @dataclass(frozen=True)
 class CopyRow:
-    """Copies that stand at multiples of a shift. way: float64 (3,), of length 1; step: how far apart neighbours stand;
-    places: int64 (n,), of each copy the multiple."""
+    """Copies at multiples of a translation.
 
-    way: FloatArray
+    direction: float64 (3,), unit length
+    step: distance between neighbouring copies
+    multiples: int64 (n,), of each copy
+    """
+
+    direction: FloatArray
     step: float
-    places: np.ndarray
+    multiples: np.ndarray
 
 
 def find_row(poses: Sequence[FloatArray], tolerance: float) -> CopyRow | None:
-    """The row that poses (4, 4) make, which begin with the identity; None where they turn, stand on no line, or not at
-    multiples of one step."""
-    if len(poses) < FEWEST or (rotation_angle(np.array(poses)) > tolerance).any():
+    """Return the row of poses (4, 4), which begin with the identity.
+
+    None where copies turn, do not lie on a line, or not at multiples of one step.
+    """
+    if len(poses) < MIN_COPIES_PER_ROW or (rotation_angle(np.array(poses)) > tolerance).any():
         return None
     shifts = np.array([pose[:3, 3] for pose in poses])
-    way = shifts[np.linalg.norm(shifts, axis=1).argmax()]
-    way = way / np.linalg.norm(way)
-    along = shifts @ way
+    direction = shifts[np.linalg.norm(shifts, axis=1).argmax()]
+    direction = direction / np.linalg.norm(direction)
+    along = shifts @ direction
     step = float(np.diff(np.sort(along)).min())
-    if step <= tolerance or np.linalg.norm(shifts - along[:, None] * way, axis=1).max() > tolerance:
+    if step <= tolerance or np.linalg.norm(shifts - along[:, None] * direction, axis=1).max() > tolerance:
         return None
-    places = np.round(along / step)
-    if np.abs(along - places * step).max() > tolerance:
+    multiples = np.round(along / step)
+    if np.abs(along - multiples * step).max() > tolerance:
         return None
-    return CopyRow(way, step, places.astype(np.int64))
+    return CopyRow(direction, step, multiples.astype(np.int64))
 
 
 def chunks_along(copy: Soup, row: CopyRow, rest: Soup, grid: SurfaceGrid) -> tuple[list[Soup], Soup]:
-    """What of `rest` runs along a row, cut across it: a soup for each copy, where that copy stands, and what is left.
+    """Cut what runs along a row across it; return the chunk of each copy, where that copy is, and the remaining soup.
 
-    `copy` is the one at place 0. Connected triangles count that are longer than some steps of the row and, seen along
-    it, lie no farther than the radius from the box of its copies; what lies in the box of such, torn off by the cuts
-    between copies, goes with it.
+    copy: triangles of the copy at multiple 0
+    rest: triangles among which is what runs along the row
+
+    Connected triangles count if they are longer than MIN_STEPS_ALONG steps of the row and, seen along it, lie no
+    farther than the radius from the box of its copies. Fragments inside the box of such triangles go with them.
     """
-    frame = np.linalg.qr(np.column_stack([row.way, np.eye(3)]))[0]
-    frame[:, 0] = row.way
+    frame = np.linalg.qr(np.column_stack([row.direction, np.eye(3)]))[0]
+    frame[:, 0] = row.direction
     own, corners = copy.corners @ frame, rest.corners @ frame
     begin = float(own[..., 0].min())
     component = _components(rest, grid.tolerance)
-    low, high = (
-        np.full((component.max(initial=-1) + 1, 3), np.inf),
-        np.full((component.max(initial=-1) + 1, 3), -np.inf),
-    )
+    count = component.max(initial=-1) + 1
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(low, component, corners.min(axis=1))
     np.maximum.at(high, component, corners.max(axis=1))
-    beside = (low[:, 1:] > own[..., 1:].min(axis=(0, 1)) - grid.radius).all(axis=1)
-    beside &= (high[:, 1:] < own[..., 1:].max(axis=(0, 1)) + grid.radius).all(axis=1)
-    along = np.flatnonzero(beside & (high[:, 0] - low[:, 0] > SPANS * row.step))
+    near_row = (low[:, 1:] > own[..., 1:].min(axis=(0, 1)) - grid.radius).all(axis=1)
+    near_row &= (high[:, 1:] < own[..., 1:].max(axis=(0, 1)) + grid.radius).all(axis=1)
+    along = np.flatnonzero(near_row & (high[:, 0] - low[:, 0] > MIN_STEPS_ALONG * row.step))
     held = (low[:, None] > low[along] - grid.tolerance) & (high[:, None] < high[along] + grid.tolerance)
     inside = np.asarray(held.all(axis=2))
     chosen: BoolArray = np.asarray(inside.any(axis=1))[component]
     left, runner = rest.select(~chosen), rest.select(chosen)
     chunks = []
-    for place in row.places.tolist():
-        at = begin + place * row.step
-        before, after = cut_by_plane(runner, row.way, at)
-        chunk, after = cut_by_plane(after, row.way, at + row.step)
+    for multiple in row.multiples.tolist():
+        at = begin + multiple * row.step
+        before, after = cut_by_plane(runner, row.direction, at)
+        chunk, after = cut_by_plane(after, row.direction, at + row.step)
         runner = join_soups(before, after)
         chunks.append(chunk)
     return chunks, join_soups(left, runner)
 
 
 def cut_by_plane(soup: Soup, normal: FloatArray, offset: float) -> tuple[Soup, Soup]:
-    """The triangles cut by the plane of points x with `normal` (3,) times x = `offset`: what lies below, and beyond."""
+    """Cut triangles by the plane `normal` (3,) times x = `offset`; return the parts below and above."""
     height = soup.corners @ normal - offset
     above = height > 0
     crossing: BoolArray = np.asarray(above.any(axis=1) & ~above.all(axis=1))
@@ -112,8 +119,8 @@ def cut_by_plane(soup: Soup, normal: FloatArray, offset: float) -> tuple[Soup, S
 
 
 def _components(soup: Soup, tolerance: float) -> IntArray:
-    """The connected component of each triangle, int32 (t,); corners closer than about `tolerance` are one."""
+    """Return the connected component of each triangle, int32 (t,); corners within about `tolerance` are the same."""
     if not len(soup):
         return np.empty(0, dtype=np.int32)
-    places, vertices = weld(soup.corners, tolerance)
-    return connected_faces(vertices, places, np.zeros(len(soup), dtype=np.int64))
+    indices, vertices = weld(soup.corners, tolerance)
+    return connected_faces(vertices, indices, np.zeros(len(soup), dtype=np.int64))

@@ -1,4 +1,5 @@
-"""What a docking site parts where a motion takes it: rows go on farther than one motion tells (symmetry §3.4.3)."""
+"""What a docking site separates at a transformed position: rows go on farther than one transform shows
+(symmetry §3.4.3)."""
 
 from __future__ import annotations
 
@@ -11,55 +12,57 @@ from stages.symmetry.matching.docking_sites import connected_regions
 from stages.symmetry.matching.r_symmetry import cells_within, matched_items
 from stages.symmetry.surface.grid import SurfaceGrid
 
-BAND = 3.0
-"""Cells around a site that tell its sides apart: all that is r-symmetric around it, but for what rounding takes."""
-REACH = 1.5
-"""Cells are beside a site that was moved if their middles are so near to cells beside it; unit: cells."""
-HELD = 0.05
-"""Least share of what holds the surface of a corner in place, of the direction in which that is most, in any other."""
-CORNERS = 3
-"""Corners that a motion must carry onto the surface, as those by which candidates are found."""
+SIDE_BAND_CELLS = 3.0
+"""Distance from a site, in cells, of the cells that tell its sides: all that is r-symmetric, apart from rounding."""
+REACH_CELLS = 1.5
+"""Cells are next to a moved site if their centres are closer, in cells, to cells next to the site."""
+MIN_HELD_SHARE = 0.05
+"""Smallest share of what fixes a corner in its best direction that must fix it in every other."""
+MIN_CORNERS = 3
+"""Corners that a transform must carry onto the surface, the votes that candidates need."""
 
 
 def corner_cells(grid: SurfaceGrid) -> IntArray:
-    """The cells whose surface no shift takes along itself, int32 ascending: a plane holds it along its normal, a line
-    across itself. What may be missing holds nothing."""
+    """Return the cells whose surface no translation moves along itself, int32, ascending.
+
+    A plane fixes the surface along its normal, a line across itself. Items that may be missing fix nothing.
+    """
     held = grid.directions[:, :, None] * grid.directions[:, None, :]
     held[grid.is_line] = np.eye(3) - held[grid.is_line]
     if grid.weak is not None:
         held[grid.weak] = 0.0
     values = np.linalg.eigvalsh(np.add.reduceat(held, grid.starts[:-1], axis=0))
-    return np.flatnonzero(values[:, 0] > HELD * values[:, 2]).astype(np.int32)
+    return np.flatnonzero(values[:, 0] > MIN_HELD_SHARE * values[:, 2]).astype(np.int32)
 
 
-def maps_enough_corners(grid: SurfaceGrid, corners: IntArray, motion: FloatArray) -> bool:
-    """Whether a rigid motion (4, 4) carries as many of the `corner_cells` onto the surface as a candidate must."""
+def maps_enough_corners(grid: SurfaceGrid, corners: IntArray, transform: FloatArray) -> bool:
+    """Return whether a rigid transform (4, 4) maps at least MIN_CORNERS of the `corner_cells` onto the surface."""
     items = items_in(grid, corners)
-    lost = np.unique(grid.item_cell[items[~matched_items(grid, motion, items)]])
-    return len(corners) - len(lost) >= CORNERS
+    lost = np.unique(grid.item_cell[items[~matched_items(grid, transform, items)]])
+    return len(corners) - len(lost) >= MIN_CORNERS
 
 
-def separated_cells(grid: SurfaceGrid, cells: IntArray, border: IntArray, motion: FloatArray) -> IntArray | None:
-    """The cells that a docking site parts from the rest where a rigid motion (4, 4) takes it, int32 ascending; None
-    where it parts nothing there.
+def separated_cells(grid: SurfaceGrid, cells: IntArray, border: IntArray, transform: FloatArray) -> IntArray | None:
+    """Return the cells that a docking site separates at a transformed position, int32, ascending, or None.
 
-    cells, border: of a docker and around it, int32 ascending; around the border the surface must be r-symmetric under
-    the motion. The two sides of the site are moved; what hangs together with the side of the docker is the new one.
+    cells, border: int32, of a docked piece and around it, ascending
+    transform: float64 (4, 4), rigid; the surface around the border must be r-symmetric under it
+
+    The two sides of the site are transformed. What is connected with the side of the piece is the new piece.
     """
     from scipy.spatial import KDTree
 
-    band = cells_within(grid, border, BAND)
+    band = cells_within(grid, border, SIDE_BAND_CELLS)
     inside = is_among(cells, band)
-    middles = grid.origin + (grid.cells + 0.5) * grid.cell_size
-    back = (transform_points(invert(motion), middles) - grid.origin) / grid.cell_size - 0.5
-    _, nearest = KDTree(grid.cells[band]).query(back, distance_upper_bound=REACH)
+    back = (transform_points(invert(transform), grid.centres()) - grid.origin) / grid.cell_size - 0.5
+    _, nearest = KDTree(grid.cells[band]).query(back, distance_upper_bound=REACH_CELLS)
     within, beyond = np.r_[inside, False][nearest], np.r_[~inside, False][nearest]
-    docker = within.copy()
+    separated = within.copy()
     for region in connected_regions(grid, ~(within | beyond)):
         around = grid.neighbours[region]
         around = around[around >= 0]
         if within[around].any():
             if beyond[around].any():
                 return None
-            docker[region] = True
-    return np.flatnonzero(docker).astype(np.int32)
+            separated[region] = True
+    return np.flatnonzero(separated).astype(np.int32)

@@ -1,4 +1,5 @@
-"""Docking sites of all motions with their dockers; sites of one shape identified across the model (symmetry §3.4.2)."""
+"""Docking sites of all rigid transforms with their pieces; equal sites are identified across the model
+(symmetry §3.4.2)."""
 
 from __future__ import annotations
 
@@ -15,6 +16,7 @@ from stages.grammars.extraction.seams import cells_within_steps, surface_recurs
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, rotation_angle, transform_points
 from stages.symmetry.matching.docking_sites import (
+    FREE_SLIPS,
     DockingSite,
     OperationKind,
     count_slippable_motions,
@@ -29,33 +31,35 @@ from stages.symmetry.matching.r_symmetry import (
 )
 from stages.symmetry.surface.grid import CELLS_PER_RADIUS, SurfaceGrid
 
-SLIPPERY = 3
-"""A site that slips in so many ways lies on a plane or a sphere, where a docker could stand anywhere."""
-BEYOND = 1.0
-"""Sites are looked for so many cells farther inside symmetric surface than the radius: under another motion the borders
-of cells fall elsewhere, and a site at the very edge of one would be none of the other."""
-LEAST = 2e-3
-"""A docker of less than this share of the surface is not worth a cut."""
-APART = 2.5
-"""Sites are equal under a motion if their cells are at most so far apart once moved; unit: cells."""
-WITHIN = 0.9
-"""Share of the docker's cells along a site that must be in the other docker."""
-STEP = 1e-2
-"""Radians that a motion more weighs: of ways that turn as little the shorter is taken."""
-MOST = 400
-"""So many dockers are looked at, those of the most fruitful motions first."""
-UNDOES: dict[OperationKind, OperationKind] = {"insert": "delete", "delete": "insert"}
-"""What takes back an operation."""
+EXTRA_EROSION_CELLS = 1.0
+"""Sites are searched this much farther, in cells, inside symmetric surface than the radius.
+
+Under another transform the borders of cells fall elsewhere, and a site at the very edge would be none there.
+"""
+MIN_PIECE_SHARE = 2e-3
+"""A docked piece of less than this share of the surface is not worth a cut."""
+MAX_SITE_DISTANCE_CELLS = 2.5
+"""Sites are equal under a transform if their transformed cells are no farther from each other, in cells."""
+MIN_SHARED_RIM = 0.9
+"""Share of a piece's cells along a site that must be in the other piece."""
+STEP_COST_RADIANS = 1e-2
+"""Cost of one transform more: of ways that turn equally the one with fewer transforms is taken."""
+MAX_PIECES = 400
+"""Docked pieces that are looked at, those of the most fruitful transforms first."""
+INVERSE_KIND: dict[OperationKind, OperationKind] = {"insert": "delete", "delete": "insert"}
+"""The operation that undoes another one."""
 
 
 @dataclass(frozen=True)
 class DockedPiece:
-    """A piece of the surface that a docking site parts from the rest.
+    """A piece of the surface that a docking site separates from the rest (symmetry §3.2).
 
-    cells: int32, ascending; border: int32, the cells around it, all r-symmetric under the motion that it was found by.
-    site: which sites are equal, by number; frame: float64 (4, 4), takes the first docker of the site's class to where
-    this one docks. area: share of the whole surface. ways: the dockers to whose sites motions take this one's, by their
-    places, each with the motion.
+    cells: int32, ascending
+    border: int32, cells around it, all r-symmetric under the transform by which it was found
+    area: share of the whole surface
+    site: class of its site; equal sites have one class
+    frame: float64 (4, 4), from where the first piece of the class docks to where this one docks
+    ways: indices of the pieces to whose sites transforms take this one's, each with the transform (4, 4)
     """
 
     cells: IntArray
@@ -66,124 +70,131 @@ class DockedPiece:
     ways: tuple[tuple[int, FloatArray], ...] = ()
 
 
-def find_docked_pieces(grid: SurfaceGrid, motions: FloatArray) -> list[DockedPiece]:
-    """The dockers of the elementary docking sites of rigid motions (m, 4, 4) and their inverses, each once, those of a
-    class of sites together and the smallest first.
+def find_docked_pieces(grid: SurfaceGrid, transforms: FloatArray) -> list[DockedPiece]:
+    """Find the pieces at elementary docking sites of rigid transforms (m, 4, 4) and their inverses.
 
-    A row goes on as far as its motion takes its sites. Made several times the motion may be none of those that are
-    looked at: there are only so many, and turns and diagonals may carry more of the surface. But made so many times it
-    must carry corners, as each candidate does. Sites that slip on the surface in three ways, where a docker could
-    stand anywhere, are left out. Two sites are equal under a motion if the whole site is r-symmetric under it and comes
-    to lie on the other, with the docker on one side.
+    Each piece is listed once, by class of its site and then by size. A row goes on as far as its transform takes its
+    sites. A power of the transform need not be one of the candidates, which are few, because turns and diagonals may
+    carry more of the surface. But it must carry corners, as each candidate does. Sites that slip on the surface in
+    three ways, where a piece could dock anywhere, are left out. Two sites are equal under a transform if the whole site
+    is r-symmetric under it and comes to lie on the other, with the piece on the same side.
     """
     kept: list[BoolArray] = []
-    found = _Sites(grid)
+    known = _Sites(grid)
     ends: list[tuple[int, int, OperationKind]] = []
-    both = np.stack([each for one in motions for each in (one, invert(one))])
-    for number, motion in enumerate(motions):
-        forth, back = (erode_cells_twice(grid, each, BEYOND) for each in symmetric_cells(grid, motion))
+    both = np.stack([way for transform in transforms for way in (transform, invert(transform))])
+    for number, transform in enumerate(transforms):
+        symmetric = symmetric_cells(grid, transform)
+        forth, back = (erode_cells_twice(grid, cells, EXTRA_EROSION_CELLS) for cells in symmetric)
         kept += [forth[0], back[0]]
-        for site, primary, secondary in _of_motion(
-            grid, motion, *mutually_symmetric_cells(grid, motion, forth[1], back[1])
-        ):
-            first, last = found.place_of(primary), found.place_of(secondary)
-            if first is None or last is None or site.kind == "replace":
+        mutual = mutually_symmetric_cells(grid, transform, forth[1], back[1])
+        for site, primary, secondary in _sites_of_transform(grid, transform, *mutual):
+            first, last = known.index_of(primary), known.index_of(secondary)
+            if site.kind == "replace":
                 continue
-            ends += [(last, 2 * number, site.kind), (first, 2 * number + 1, UNDOES[site.kind])]
+            if first is None or last is None:
+                continue
+            ends += [(last, 2 * number, site.kind), (first, 2 * number + 1, INVERSE_KIND[site.kind])]
     corners = corner_cells(grid)
     for end, way, kind in ends:
         at: int | None = end
-        whole = both[way]  # from the other docker of the site, and on to the next
+        whole = both[way]  # from the other piece of the site, and on to the next
         while at is not None and maps_enough_corners(grid, corners, whole := both[way] @ whole):
-            docker = _next_in_row(grid, found.sites[at], both[way], kept[way], kind)
-            at = None if docker is None else found.place_of(docker)
-    return _identified(grid, found.sites, both, kept)
+            piece = _next_in_row(grid, known.sites[at], both[way], kept[way], kind)
+            at = None if piece is None else known.index_of(piece)
+    return _identified(grid, known.sites, both, kept)
 
 
 def surrounding_cells(grid: SurfaceGrid, cells: np.ndarray) -> IntArray:
-    """The cells around `cells`, int32, ascending."""
+    """Return the neighbours of `cells` that are not among them, int32, ascending."""
     around = cells_within_steps(grid, cells, 1)
     around[cells] = False
     return np.flatnonzero(around).astype(np.int32)
 
 
-def _of_motion(
-    grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_back: BoolArray
+def _sites_of_transform(
+    grid: SurfaceGrid, transform: FloatArray, kept: BoolArray, kept_back: BoolArray
 ) -> Iterator[tuple[DockingSite, DockedPiece, DockedPiece]]:
-    """The elementary docking sites of a motion, each with its primary and its secondary docker."""
-    for site in find_docking_sites(grid, motion, kept, kept_back):
-        if site.slips >= SLIPPERY:
+    """Yield the elementary docking sites of a transform, each with its primary and its secondary piece."""
+    for site in find_docking_sites(grid, transform, kept, kept_back):
+        if site.slips >= FREE_SLIPS:
             continue
-        pair = _docker(grid, site.primary), _docker(grid, site.secondary)
-        # a site whose dockers are the same piece on both sides changes nothing; one without a border parts nothing
-        if min(each.area for each in pair) < LEAST or not all(len(each.border) for each in pair):
+        pair = _docked_piece(grid, site.primary), _docked_piece(grid, site.secondary)
+        # a site whose pieces are the same on both sides changes nothing; one without a border separates nothing
+        if min(piece.area for piece in pair) < MIN_PIECE_SHARE or not all(len(piece.border) for piece in pair):
             continue
-        if all(count_slippable_motions(grid, each.border) < SLIPPERY for each in pair):
+        if all(count_slippable_motions(grid, piece.border) < FREE_SLIPS for piece in pair):
             yield site, *pair
 
 
-def _docker(grid: SurfaceGrid, cells: IntArray) -> DockedPiece:
+def _docked_piece(grid: SurfaceGrid, cells: IntArray) -> DockedPiece:
     return DockedPiece(cells, surrounding_cells(grid, cells), float(grid.area[cells].sum() / grid.area.sum()))
 
 
 def _next_in_row(
-    grid: SurfaceGrid, site: _Site, motion: FloatArray, symmetric: BoolArray, kind: OperationKind
+    grid: SurfaceGrid, site: _Site, transform: FloatArray, symmetric: BoolArray, kind: OperationKind
 ) -> DockedPiece | None:
-    """What a site parts where a motion (4, 4) takes it, if all around it is r-symmetric under that and it takes the
-    place of the docker as `kind` says: in a row always with a cell more, or always with one less."""
-    docker = site.docker
-    if symmetric[docker.border].mean() < grid.agreement:
+    """Return the piece that a site separates at its transformed position, or None.
+
+    kind: how the new piece relates to the old one; in a row each has one cell more, or each one less
+
+    All around the site must be r-symmetric.
+    """
+    piece = site.piece
+    if symmetric[piece.border].mean() < grid.agreement:
         return None
-    cells = separated_cells(grid, docker.cells, docker.border, motion)
-    if cells is None or operation_kind(docker.cells, cells, grid.slack) != kind:
+    cells = separated_cells(grid, piece.cells, piece.border, transform)
+    if cells is None or operation_kind(piece.cells, cells, grid.slack) != kind:
         return None
-    after = _docker(grid, cells)
-    if min(after.area, abs(after.area - docker.area)) < LEAST or not len(after.border):
+    after = _docked_piece(grid, cells)
+    if min(after.area, abs(after.area - piece.area)) < MIN_PIECE_SHARE or not len(after.border):
         return None
-    return after if site.lies_on(_Site(grid, after), motion) else None
+    return after if site.lies_on(_Site(grid, after), transform) else None
 
 
 class _Sites:
-    """Sites that are found, each once and at most MOST."""
+    """Known sites, each once, at most MAX_PIECES."""
 
     def __init__(self, grid: SurfaceGrid) -> None:
         self.sites: list[_Site] = []
         self._grid = grid
 
-    def place_of(self, docker: DockedPiece) -> int | None:
-        """Where the site of a docker is among them, put there if it is new; None where there is no room."""
-        site = _Site(self._grid, docker)
-        for place, each in enumerate(self.sites):
-            if site.lies_on(each, np.eye(4)):
-                return place
-        if len(self.sites) == MOST:
+    def index_of(self, piece: DockedPiece) -> int | None:
+        """Return the index of a piece's site, added if it is new; None where there is no room."""
+        site = _Site(self._grid, piece)
+        for index, known in enumerate(self.sites):
+            if site.lies_on(known, np.eye(4)):
+                return index
+        if len(self.sites) == MAX_PIECES:
             return None
         self.sites.append(site)
         return len(self.sites) - 1
 
 
 class _Site:
-    """The cells of a site, and those of its docker along it, as points to compare."""
+    """The cells of a site, and those of its piece along it, as points to compare."""
 
-    def __init__(self, grid: SurfaceGrid, docker: DockedPiece) -> None:
-        self.docker = docker
+    def __init__(self, grid: SurfaceGrid, piece: DockedPiece) -> None:
+        self.piece = piece
         self._grid = grid
-        self.around = _centres(grid, docker.border)
+        self.around = grid.centres(piece.border)
         self.middle: FloatArray = self.around.mean(axis=0)
 
     @cached_property
     def tree(self) -> Any:
-        """The site's cells."""
+        """The centres of the site's cells."""
         from scipy.spatial import KDTree
 
         return KDTree(self.around)
 
     @cached_property
     def rim(self) -> FloatArray:
-        """Middles of the docker's cells within the radius of the site, float64 (m, 3): those right beside it would lie
-        near those on its other side."""
-        near = cells_within_steps(self._grid, self.docker.border, CELLS_PER_RADIUS)[self.docker.cells]
-        return _centres(self._grid, self.docker.cells[near])
+        """Centres of the piece's cells within the radius of the site, float64 (m, 3).
+
+        Cells right next to the site alone would lie near those on its other side.
+        """
+        near = cells_within_steps(self._grid, self.piece.border, CELLS_PER_RADIUS)[self.piece.cells]
+        return self._grid.centres(self.piece.cells[near])
 
     @cached_property
     def rim_tree(self) -> Any:
@@ -192,70 +203,73 @@ class _Site:
 
         return KDTree(self.rim)
 
-    def lies_on(self, other: _Site, motion: FloatArray) -> bool:
-        """Whether a motion takes this site to another one, with the docker on the same side."""
+    def lies_on(self, other: _Site, transform: FloatArray) -> bool:
+        """Return whether a transform takes this site to another one, with the piece on the same side."""
         from scipy.spatial import KDTree
 
-        most = APART * self._grid.cell_size
-        here = transform_points(motion, self.around)
-        for end, there in ((here.min(axis=0), other.around.min(axis=0)), (here.max(axis=0), other.around.max(axis=0))):
-            if (np.abs(end - there) > most).any():
+        limit = MAX_SITE_DISTANCE_CELLS * self._grid.cell_size
+        moved = transform_points(transform, self.around)
+        for own, target in (
+            (moved.min(axis=0), other.around.min(axis=0)),
+            (moved.max(axis=0), other.around.max(axis=0)),
+        ):
+            if (np.abs(own - target) > limit).any():
                 return False
-        if np.isfinite(other.tree.query(here, distance_upper_bound=most)[0]).mean() < self._grid.agreement:
+        if np.isfinite(other.tree.query(moved, distance_upper_bound=limit)[0]).mean() < self._grid.agreement:
             return False
-        if np.isfinite(KDTree(here).query(other.around, distance_upper_bound=most)[0]).mean() < self._grid.agreement:
+        if np.isfinite(KDTree(moved).query(other.around, distance_upper_bound=limit)[0]).mean() < self._grid.agreement:
             return False
-        moved = transform_points(motion, self.rim)
-        within = WITHIN * self._grid.agreement
-        return bool(np.isfinite(other.rim_tree.query(moved, distance_upper_bound=most)[0]).mean() > within)
+        rim = transform_points(transform, self.rim)
+        shared = np.isfinite(other.rim_tree.query(rim, distance_upper_bound=limit)[0]).mean()
+        return bool(shared > MIN_SHARED_RIM * self._grid.agreement)
 
 
-def _centres(grid: SurfaceGrid, cells: IntArray) -> FloatArray:
-    found: FloatArray = grid.origin + (grid.cells[cells] + 0.5) * grid.cell_size
-    return found
+def _identified(
+    grid: SurfaceGrid, sites: list[_Site], transforms: FloatArray, kept: list[BoolArray]
+) -> list[DockedPiece]:
+    """Return the pieces with the classes of their sites.
 
-
-def _identified(grid: SurfaceGrid, sites: list[_Site], motions: FloatArray, kept: list[BoolArray]) -> list[DockedPiece]:
-    """The dockers with their classes of sites, each class from its first docker on by motions that take one to the
-    next."""
-    found = [each.docker for each in sites]
-    ways: list[list[tuple[int, FloatArray]]] = [[] for _ in found]
-    middles = np.array([each.middle for each in sites]).reshape(-1, 3)
-    for motion, symmetric in zip(motions, kept, strict=True):
-        for one, docker in enumerate(found):
-            if symmetric[docker.border].mean() < grid.agreement:
+    Each class begins with its first piece and grows by the transforms that take one site to the next.
+    """
+    pieces = [site.piece for site in sites]
+    ways: list[list[tuple[int, FloatArray]]] = [[] for _ in pieces]
+    middles = np.array([site.middle for site in sites]).reshape(-1, 3)
+    for transform, symmetric in zip(transforms, kept, strict=True):
+        for one, piece in enumerate(pieces):
+            if symmetric[piece.border].mean() < grid.agreement:
                 continue
-            away = np.linalg.norm(middles - transform_points(motion, middles[one]), axis=1)
-            for other in np.flatnonzero(away <= 2 * APART * grid.cell_size).tolist():
-                if other != one and sites[one].lies_on(sites[other], motion):
-                    ways[one].append((other, motion))
-                    ways[other].append((one, invert(motion)))
+            distance = np.linalg.norm(middles - transform_points(transform, middles[one]), axis=1)
+            for other in np.flatnonzero(distance <= 2 * MAX_SITE_DISTANCE_CELLS * grid.cell_size).tolist():
+                if other != one and sites[one].lies_on(sites[other], transform):
+                    ways[one].append((other, transform))
+                    ways[other].append((one, invert(transform)))
     frames: dict[int, tuple[int, FloatArray]] = {}
-    site = 0
-    for first in range(len(found)):
+    site_class = 0
+    for first in range(len(pieces)):
         if first in frames:
             continue
-        # a site that is symmetric in itself is reached in several ways: by those that turn least
-        around = cells_within(grid, found[first].border, grid.radius / grid.cell_size)
+        # a site that is symmetric in itself is reached in several ways: the one that turns least is taken
+        around = cells_within(grid, pieces[first].border, grid.radius / grid.cell_size)
         waiting: list[tuple[float, int, int, FloatArray]] = [(0.0, 0, first, np.eye(4))]
         while waiting:
-            turned, _, place, frame = heapq.heappop(waiting)
-            if place in frames or (place != first and not surface_recurs(grid, around, frame)):
+            turned, _, index, frame = heapq.heappop(waiting)
+            if index in frames or (index != first and not surface_recurs(grid, around, frame)):
                 continue
-            frames[place] = (site, frame)
-            for other, motion in ways[place]:
+            frames[index] = (site_class, frame)
+            for other, transform in ways[index]:
                 if other not in frames:
-                    turn = turned + STEP + round(float(rotation_angle(motion)), 3)
-                    heapq.heappush(waiting, (turn, len(frames) * len(found) + len(waiting), other, motion @ frame))
-        site += 1
-    order = sorted(range(len(found)), key=lambda place: (frames[place][0], found[place].area))
+                    turn = turned + STEP_COST_RADIANS + round(float(rotation_angle(transform)), 3)
+                    tie = len(frames) * len(pieces) + len(waiting)
+                    heapq.heappush(waiting, (turn, tie, other, transform @ frame))
+        site_class += 1
+    order = sorted(range(len(pieces)), key=lambda index: (frames[index][0], pieces[index].area))
     number = {old: new for new, old in enumerate(order)}
     return [
         replace(
-            found[old],
+            pieces[old],
             site=frames[old][0],
             frame=frames[old][1],
-            ways=tuple((number[other], motion) for other, motion in ways[old]),
+            ways=tuple((number[other], transform) for other, transform in ways[old]),
         )
         for old in order
     ]

@@ -1,4 +1,5 @@
-"""From a mesh or a cloud to its grammar: motions, docking sites, dockers, productions and grids (symmetry §3, §4)."""
+"""From a mesh or a cloud to its grammar: transforms, docking sites, docked pieces, productions and grids
+(symmetry §3, §4)."""
 
 from __future__ import annotations
 
@@ -27,12 +28,11 @@ from stages.symmetry.surface.corner_frames import CornerFrames, corner_frames
 from stages.symmetry.surface.grid import SurfaceGrid, has_area, surface_grid
 from stages.symmetry.surface.welding import weld
 
-MOTIONS = 24
-"""So many motions are looked at, of a grid of many cells fewer."""
-WORK = 8_000_000
-"""Cells that are looked at in all, each once for a motion."""
-WELDED = 1e-6
-"""Corners of pieces are one vertex where they are closer than this share of a cell."""
+MAX_TRANSFORMS = 24
+MAX_CELL_TESTS = 8_000_000
+"""Cells tested in all, once per transform: large grids are searched with fewer transforms."""
+WELD_CELLS = 1e-6
+"""Corners of pieces that are closer, in cells, are one vertex."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,15 +45,19 @@ class SurfaceMesh:
 
     @property
     def corners(self) -> FloatArray:
-        """Of each triangle, float64 (f, 3, 3)."""
-        found: FloatArray = self.vertices[self.faces]
-        return found
+        """Corners of each triangle, float64 (f, 3, 3)."""
+        corners: FloatArray = self.vertices[self.faces]
+        return corners
 
 
 @dataclass(frozen=True, eq=False)
 class ExtractedGrammar:
-    """A grammar, and what it was made of, in the cells of a grid. motions: how many; seconds: CPU seconds of surface,
-    motions, dockers, grids and productions, by name."""
+    """A grammar, and what it was made from, in the cells of a grid.
+
+    transforms: number of rigid transforms that were found
+    seams: by class of sites
+    seconds: CPU seconds of the steps, by name
+    """
 
     grammar: ShapeGrammar
     grid: SurfaceGrid
@@ -63,16 +67,21 @@ class ExtractedGrammar:
     rows: Sequence[GridRow]
     seconds: dict[str, float]
 
+    @property
+    def site_classes(self) -> int:
+        """Number of classes of docking sites."""
+        return len({piece.site for piece in self.docked_pieces})
+
 
 def model_surface(model: Model) -> SurfaceMesh:
-    """All parts of a model where they stand, as one mesh."""
-    vertices = [transform_points(each.pose, each.vertices) for each in model.parts]
-    shifts = np.cumsum([0, *(len(each) for each in vertices[:-1])])
-    faces = [each.faces + shift for each, shift in zip(model.parts, shifts, strict=True)]
+    """Return all parts of a model at their poses as one mesh."""
+    vertices = [transform_points(part.pose, part.vertices) for part in model.parts]
+    shifts = np.cumsum([0, *map(len, vertices[:-1])])
+    faces = [part.faces + shift for part, shift in zip(model.parts, shifts, strict=True)]
     return SurfaceMesh(
         np.concatenate(vertices),
         np.concatenate(faces).astype(np.int32),
-        np.concatenate([each.face_colors for each in model.parts]),
+        np.concatenate([part.face_colors for part in model.parts]),
     )
 
 
@@ -84,55 +93,58 @@ def extract_grammar(
     rng: np.random.Generator,
     upright: bool = True,
 ) -> ExtractedGrammar:
-    """The grammar of a surface for a radius of similarity, as a share of the longest side of its box. That of a cloud
-    is made of splats, a triangle for each point, which are never cut.
+    """Extract the grammar of a surface; that of a cloud consists of splats, one per point, which are never cut.
 
-    upright: whether only motions are looked for that keep what points up: a front that is like itself upside down
-    would get its door under the roof. Triangles without area are left out. Raises ConfigError for a mesh without any
-    other, and for a cloud of which no grid can be made.
+    radius: of similarity, as a share of the longest side of the box
+    upright: whether only transforms count that keep the up axis; otherwise a front that equals itself upside down
+        would get its door under the roof
+
+    Triangles without area are left out. Raises ConfigError for a mesh of such triangles alone, and for a cloud that
+    makes no grid.
     """
     seconds: dict[str, float] = {}
     clock = time.process_time()
 
-    def passed(what: str) -> None:
+    def finish(step: str) -> None:
         nonlocal clock
-        seconds[what], clock = time.process_time() - clock, time.process_time()
+        seconds[step], clock = time.process_time() - clock, time.process_time()
 
-    grid, frames = _gridded(surface, name, radius)
-    passed("surface")
+    grid, frames = _grid_and_frames(surface, name, radius)
+    finish("surface")
     axis = np.eye(3)[{"y": 1, "z": 2}[up]] if upright else None
-    motions = candidate_transforms(grid, min(MOTIONS, max(1, WORK // len(grid))), axis, frames)
-    passed("motions")
-    dockers = find_docked_pieces(grid, motions)
-    seams = seams_by_site(grid, dockers)
-    passed("dockers")
-    rows = find_rows(grid, dockers, seams)
-    grids = [
-        cut_grid(grid, dockers, [rows[each] for each in chosen], seams) for chosen in crossing_rows(grid, dockers, rows)
+    transforms = candidate_transforms(grid, min(MAX_TRANSFORMS, max(1, MAX_CELL_TESTS // len(grid))), axis, frames)
+    finish("transforms")
+    pieces = find_docked_pieces(grid, transforms)
+    seams = seams_by_site(grid, pieces)
+    finish("docked pieces")
+    rows = find_rows(grid, pieces, seams)
+    extracted_grids = [
+        cut_grid(grid, pieces, [rows[index] for index in chosen], seams) for chosen in crossing_rows(grid, pieces, rows)
     ]
-    passed("grids")
-    found, pieces = extract_productions(grid, dockers, seams, rng)
-    passed("extract_productions")
+    finish("grids")
+    extracted, triangle_pieces = extract_productions(grid, pieces, seams, rng)
+    finish("productions")
     terminals: list[tuple[str, Terminal]] = []
 
-    def kept(name: str, terminal: Terminal) -> int:
+    def add_terminal(name: str, terminal: Terminal) -> int:
         terminals.append((name, terminal))
         return len(terminals) - 1
 
-    rules, counted = [], dict.fromkeys([each.site for each in found], 0)
-    for each in found:
-        called = f"{site_name(each.site)}{counted[each.site]}"
-        counted[each.site] += 1
-        rules.append(Production(called, each.site, each.frame, kept(called, each.terminal), each.non_terminals))
-    grid_rules = []
-    for number, one in enumerate(grids):
-        cut = [
-            (kept(f"G{number}-{'-'.join(map(str, where))}", unshared_terminal(soup)), where)
-            for where, soup in one.pieces
+    productions, counts = [], dict.fromkeys([production.site for production in extracted], 0)
+    for production in extracted:
+        called = f"{site_name(production.site)}{counts[production.site]}"
+        counts[production.site] += 1
+        terminal = add_terminal(called, production.terminal)
+        productions.append(Production(called, production.site, production.frame, terminal, production.non_terminals))
+    grids = []
+    for number, cut in enumerate(extracted_grids):
+        parts = [
+            (add_terminal(f"G{number}-{'-'.join(map(str, along))}", unshared_terminal(soup)), along)
+            for along, soup in cut.pieces
         ]
-        grid_rules.append(Grid(f"G{number}", one.transforms, one.counts, one.sites, one.frames, tuple(cut)))
+        grids.append(Grid(f"G{number}", cut.transforms, cut.counts, cut.sites, cut.frames, tuple(parts)))
     colors = surface.colors[grid.faces]
-    meshes = TerminalMeshes(grid.corners, pieces, colors, terminals, WELDED * grid.cell_size)
+    meshes = TerminalMeshes(grid.corners, triangle_pieces, colors, terminals, WELD_CELLS * grid.cell_size)
     faces, vertices = weld(grid.corners, 0.0)
     grammar = ShapeGrammar(
         name=name,
@@ -140,17 +152,17 @@ def extract_grammar(
         radius=grid.radius,
         meshes=meshes,
         middles=meshes.middles,
-        productions=tuple(rules),
-        grids=tuple(grid_rules),
-        seams={site: grid.origin + (grid.cells[each.band] + 0.5) * grid.cell_size for site, each in seams.items()},
+        productions=tuple(productions),
+        grids=tuple(grids),
+        seams={site: grid.centres(seam.band) for site, seam in seams.items()},
         exemplar=centred_part(np.zeros(3), "exemplar", faces, vertices, colors),
         splats=grid.splats,
     )
-    return ExtractedGrammar(grammar, grid, len(motions), dockers, seams, rows, seconds)
+    return ExtractedGrammar(grammar, grid, len(transforms), pieces, seams, rows, seconds)
 
 
-def _gridded(surface: SurfaceMesh | ScannedCloud, name: str, radius: float) -> tuple[SurfaceGrid, CornerFrames]:
-    """The grid of a surface, and the frames in its corners."""
+def _grid_and_frames(surface: SurfaceMesh | ScannedCloud, name: str, radius: float) -> tuple[SurfaceGrid, CornerFrames]:
+    """Return the grid of a surface, and the frames in its corners."""
     if isinstance(surface, ScannedCloud):
         try:
             scan = scanned_grid(surface, radius)

@@ -16,21 +16,22 @@ from stages.symmetry.matching.cell_lookup import is_among
 from stages.symmetry.surface.grid import SurfaceGrid
 from stages.symmetry.surface.soup import Soup
 
-ROOM = 2
-"""Cells by which a docker of a row must lie inside the next."""
-LEAST = 2e-3
-"""Share of the surface that a cell of a row has at least."""
-SAME = 0.9
-"""Share of the surface of two rows from which on they are the same row."""
-TILED = 0.99
-"""Share of the cells of a row that must come to lie in the same places of the other row, borders aside."""
+CLEARANCE_STEPS = 2
+"""Cells by which a piece of a row must lie inside the next."""
+MIN_CELL_SHARE = 2e-3
+"""Smallest share of the surface in a cell of a row."""
+SAME_ROW_SHARE = 0.9
+"""Rows that share more of their surface are the same row."""
+MIN_TILED_SHARE = 0.99
+"""Share of the cells of a row that must come to lie in the same cells of the other row, borders excepted."""
 
 
 @dataclass(frozen=True)
 class GridRow:
-    """A 1-grid: dockers of one class, each in the one before it, that one motion takes each to the next.
+    """A 1-grid: docked pieces of one class, each in the one before it, that one transform takes to the next.
 
-    dockers: places among the dockers of the exemplar, the largest first; motion: rigid (4, 4).
+    docked_pieces: indices among the pieces of the exemplar, the largest first
+    transform: float64 (4, 4), rigid
     """
 
     docked_pieces: tuple[int, ...]
@@ -44,11 +45,14 @@ class GridRow:
 
 @dataclass(frozen=True)
 class ExtractedGrid:
-    """Rows that cross, and the pieces that they cut the exemplar into, up to 3^k of them.
+    """Rows that cross, and the pieces into which they cut the exemplar, up to 3^k of them.
 
-    motions: float64 (k, 4, 4), which commute; counts: of the exemplar; sites: of each row the class of its sites, and
-    frames float64 (k, 4, 4) where the first of them stands. pieces: for each row 0, 1 or 2 as in ENDS, and pieces of
-    the surface's triangles, as the exemplar has them first along all rows.
+    transforms: float64 (k, 4, 4), from cell to cell of each row; they commute
+    counts: cells of each row in the exemplar
+    sites: class of each row's sites
+    frames: float64 (k, 4, 4), of the first site of each row
+    pieces: for each row 0, 1 or 2 as in GRID_PARTS, and the triangles of the piece, as in the exemplar, first in all
+        rows
     """
 
     transforms: FloatArray
@@ -58,169 +62,183 @@ class ExtractedGrid:
     pieces: tuple[tuple[tuple[int, ...], Soup], ...]
 
 
-def find_rows(grid: SurfaceGrid, dockers: Sequence[DockedPiece], seams: dict[int, Seam]) -> list[GridRow]:
-    """The 1-grids among dockers, those of most cells first: chains of insertions that undo deletions.
+def find_rows(grid: SurfaceGrid, pieces: Sequence[DockedPiece], seams: dict[int, Seam]) -> list[GridRow]:
+    """Find the 1-grids among docked pieces, those of most cells first: chains of insertions that undo deletions.
 
-    A docker holds another of its class, and the motion from site to site goes on. What is the same row from its other
-    end, or the row at a multiple of its motion, is left out.
+    A piece contains another one of its class, and the transform from site to site goes on. A row that equals another
+    one from its other end, or at a multiple of its transform, is left out.
     """
-    middles = [grid.origin + (grid.cells[each.border].mean(axis=0) + 0.5) * grid.cell_size for each in dockers]
+    middles = [grid.origin + (grid.cells[piece.border].mean(axis=0) + 0.5) * grid.cell_size for piece in pieces]
     steps: dict[int, list[tuple[int, FloatArray]]] = {}
-    for one, docker in enumerate(dockers):
+    for one, piece in enumerate(pieces):
         within = np.zeros(len(grid), dtype=bool)
-        within[docker.cells] = True
-        for other, motion in docker.ways:
-            held = dockers[other]
-            if held.area < docker.area - LEAST and not (cells_within_steps(grid, held.cells, ROOM) & ~within).any():
-                steps.setdefault(one, []).append((other, motion))
-    found: list[GridRow] = []
+        within[piece.cells] = True
+        for other, transform in piece.ways:
+            held = pieces[other]
+            if held.area < piece.area - MIN_CELL_SHARE:
+                around = cells_within_steps(grid, held.cells, CLEARANCE_STEPS)
+                if not (around & ~within).any():
+                    steps.setdefault(one, []).append((other, transform))
+    rows: list[GridRow] = []
     for one, ways in steps.items():
-        for other, motion in ways:
-            chain, place = [one, other], other
-            while (after := _next(steps.get(place, []), motion, middles[place], grid.cell_size)) is not None:
+        for other, transform in ways:
+            chain, end = [one, other], other
+            while (after := _next(steps.get(end, []), transform, middles[end], grid.cell_size)) is not None:
                 chain.append(after)
-                place = after
-            first = _frames(dockers[one].frame, motion, len(chain))
-            if all(surface_recurs(grid, seams[dockers[one].site].band, frame) for frame in first[1:]):
-                found.append(GridRow(tuple(chain), motion))
-    cells = [_cells(dockers, each) for each in found]
-    areas = [float(grid.area[each].sum()) for each in cells]
+                end = after
+            frames = _frames(pieces[one].frame, transform, len(chain))
+            if all(surface_recurs(grid, seams[pieces[one].site].band, frame) for frame in frames[1:]):
+                rows.append(GridRow(tuple(chain), transform))
+    return _distinct_rows(grid, pieces, rows)
+
+
+def _distinct_rows(grid: SurfaceGrid, pieces: Sequence[DockedPiece], rows: Sequence[GridRow]) -> list[GridRow]:
+    """Return the rows of most cells, without those that are the same row as an earlier one."""
+    cells = [_cells(pieces, row) for row in rows]
+    areas = [float(grid.area[own].sum()) for own in cells]
     order = sorted(
-        range(len(found)),
+        range(len(rows)),
         key=lambda n: (
-            -found[n].count,
-            round(float(rotation_angle(found[n].transform)), 3),
+            -rows[n].count,
+            round(float(rotation_angle(rows[n].transform)), 3),
             -areas[n],
-            found[n].docked_pieces,
+            rows[n].docked_pieces,
         ),
     )
     kept: list[int] = []
     for new in order:
         if all(
-            grid.area[cells[new][is_among(cells[old], cells[new])]].sum() < SAME * min(areas[new], areas[old])
+            grid.area[cells[new][is_among(cells[old], cells[new])]].sum() < SAME_ROW_SHARE * min(areas[new], areas[old])
             for old in kept
         ):
             kept.append(new)
-    return [found[each] for each in kept]
+    return [rows[index] for index in kept]
 
 
-def crossing_rows(grid: SurfaceGrid, dockers: Sequence[DockedPiece], rows: Sequence[GridRow]) -> list[tuple[int, ...]]:
-    """The sets of rows that make grids of as many degrees of freedom as there can be, each as places among `rows`: rows
-    that cross nothing alone."""
+def crossing_rows(grid: SurfaceGrid, pieces: Sequence[DockedPiece], rows: Sequence[GridRow]) -> list[tuple[int, ...]]:
+    """Return the maximal sets of rows that cross each other, as indices among `rows`; a row that crosses none is one.
+
+    Each set makes a grid with as many degrees of freedom as possible.
+    """
     fits = np.zeros((len(rows), len(rows)), dtype=bool)
-    labels = [_labels(grid, dockers, each) for each in rows]
+    labels = [_labels(grid, pieces, row) for row in rows]
     for one, other in combinations(range(len(rows)), 2):
-        fits[one, other] = fits[other, one] = _tile(grid, dockers, rows, labels, one, other)
-    found: list[tuple[int, ...]] = []
+        fits[one, other] = fits[other, one] = _tile(grid, pieces, rows, labels, one, other)
+    sets: list[tuple[int, ...]] = []
     for size in range(len(rows), 0, -1):
         for chosen in combinations(range(len(rows)), size):
             if all(fits[pair] for pair in combinations(chosen, 2)) and not any(
-                set(chosen) < set(each) for each in found
+                set(chosen) < set(known) for known in sets
             ):
-                found.append(chosen)
-    return found
+                sets.append(chosen)
+    return sets
 
 
 def cut_grid(
-    grid: SurfaceGrid, dockers: Sequence[DockedPiece], rows: Sequence[GridRow], seams: dict[int, Seam]
+    grid: SurfaceGrid, pieces: Sequence[DockedPiece], rows: Sequence[GridRow], seams: dict[int, Seam]
 ) -> ExtractedGrid:
-    """The pieces of a grid of rows that cross: what all of them cut the exemplar into, a cell of each row once."""
-    pieces: list[tuple[tuple[int, ...], Soup]] = [
-        ((), Soup(grid.corners, np.arange(len(grid.corners), dtype=np.int32)))
-    ]
+    """Cut the exemplar along rows that cross, and keep one cell of each row."""
+    parts: list[tuple[tuple[int, ...], Soup]] = [((), Soup(grid.corners, np.arange(len(grid.corners), dtype=np.int32)))]
     for row in rows:
-        held = [dockers[row.docked_pieces[place]].cells for place in (0, 1, -1)]
-        frames = _frames(dockers[row.docked_pieces[0]].frame, row.transform, len(row.docked_pieces))
-        seam = seams[dockers[row.docked_pieces[0]].site]
+        held = [pieces[row.docked_pieces[index]].cells for index in (0, 1, -1)]
+        first = pieces[row.docked_pieces[0]]
+        frames = _frames(first.frame, row.transform, len(row.docked_pieces))
+        seam = seams[first.site]
         cut = []
-        for where, soup in pieces:
+        for along, soup in parts:
             inside, rest = cut_out(soup, grid, held[0], frames[0], seam)
             _, cell = cut_out(inside, grid, held[1], frames[1], seam)
             end, _ = cut_out(inside, grid, held[2], frames[-1], seam)
-            cut += [((*where, place), each) for place, each in enumerate((rest, cell, end)) if len(each)]
-        pieces = cut
-    first = [dockers[each.docked_pieces[0]] for each in rows]
+            cut += [((*along, part), piece) for part, piece in enumerate((rest, cell, end)) if len(piece)]
+        parts = cut
+    firsts = [pieces[row.docked_pieces[0]] for row in rows]
     return ExtractedGrid(
-        transforms=np.array([each.transform for each in rows]),
-        counts=tuple(each.count for each in rows),
-        sites=tuple(each.site for each in first),
-        frames=np.array([each.frame for each in first]),
-        pieces=tuple(pieces),
+        transforms=np.array([row.transform for row in rows]),
+        counts=tuple(row.count for row in rows),
+        sites=tuple(piece.site for piece in firsts),
+        frames=np.array([piece.frame for piece in firsts]),
+        pieces=tuple(parts),
     )
 
 
-def _frames(first: FloatArray, motion: FloatArray, count: int) -> list[FloatArray]:
-    """Where the dockers of a row dock, float64 (4, 4) each, by the motion of the row: that to a site which is symmetric
-    in itself may have turned another way."""
-    return [np.linalg.matrix_power(motion, place) @ first for place in range(count)]
+def _frames(first: FloatArray, transform: FloatArray, count: int) -> list[FloatArray]:
+    """Return where the pieces of a row dock, float64 (4, 4) each, by the transform of the row.
+
+    The transform found for a site that is symmetric in itself may have turned another way.
+    """
+    return [np.linalg.matrix_power(transform, power) @ first for power in range(count)]
 
 
-def _next(ways: Sequence[tuple[int, FloatArray]], motion: FloatArray, middle: FloatArray, size: float) -> int | None:
-    """The docker to which the same motion goes on, if there is one."""
+def _next(ways: Sequence[tuple[int, FloatArray]], transform: FloatArray, middle: FloatArray, size: float) -> int | None:
+    """Return the piece to which the same transform goes on, or None."""
     for other, way in ways:
         if (
-            np.abs(way[:3, :3] - motion[:3, :3]).max() < 1e-3
-            and np.abs(transform_points(way, middle) - transform_points(motion, middle)).max() < size
+            np.abs(way[:3, :3] - transform[:3, :3]).max() < 1e-3
+            and np.abs(transform_points(way, middle) - transform_points(transform, middle)).max() < size
         ):
             return other
     return None
 
 
-def _cells(dockers: Sequence[DockedPiece], row: GridRow) -> IntArray:
-    """The cells between the first docker of a row and its last."""
-    held = dockers[row.docked_pieces[0]].cells
-    found: IntArray = held[~is_among(dockers[row.docked_pieces[-1]].cells, held)]
-    return found
+def _cells(pieces: Sequence[DockedPiece], row: GridRow) -> IntArray:
+    """Return the cells between the first piece of a row and its last."""
+    held = pieces[row.docked_pieces[0]].cells
+    between: IntArray = held[~is_among(pieces[row.docked_pieces[-1]].cells, held)]
+    return between
 
 
-def _labels(grid: SurfaceGrid, dockers: Sequence[DockedPiece], row: GridRow) -> IntArray:
-    """How many dockers of a row each cell is in, int32 (n,)."""
+def _labels(grid: SurfaceGrid, pieces: Sequence[DockedPiece], row: GridRow) -> IntArray:
+    """Return how many pieces of a row each cell is in, int32 (n,)."""
     labels = np.zeros(len(grid), dtype=np.int32)
-    for each in row.docked_pieces:
-        labels[dockers[each].cells] += 1
+    for index in row.docked_pieces:
+        labels[pieces[index].cells] += 1
     return labels
 
 
 def _tile(
     grid: SurfaceGrid,
-    dockers: Sequence[DockedPiece],
+    pieces: Sequence[DockedPiece],
     rows: Sequence[GridRow],
     labels: Sequence[IntArray],
     one: int,
     other: int,
 ) -> bool:
-    """Whether two rows make a 2-grid: their cells overlap, their motions commute, and each motion takes what the other
-    row parts to what it parts in the same way, borders of cells too."""
-    shared = _cells(dockers, rows[one])
-    shared = shared[is_among(_cells(dockers, rows[other]), shared)]
+    """Return whether two rows make a 2-grid.
+
+    Their cells must overlap and their transforms commute. Each transform must take what the other row separates to what
+    it separates in the same way, including the borders of cells.
+    """
+    shared = _cells(pieces, rows[one])
+    shared = shared[is_among(_cells(pieces, rows[other]), shared)]
     if not len(shared):
         return False
-    points = grid.origin + (grid.cells[shared] + 0.5) * grid.cell_size
+    points = grid.centres(shared)
     forth = transform_points(rows[one].transform @ rows[other].transform, points)
     if np.abs(forth - transform_points(rows[other].transform @ rows[one].transform, points)).max() > grid.cell_size:
         return False
-    return _keeps(grid, dockers, rows[one], labels[one], labels[other]) and _keeps(
-        grid, dockers, rows[other], labels[other], labels[one]
+    return _keeps_labels(grid, pieces, rows[one], labels[one], labels[other]) and _keeps_labels(
+        grid, pieces, rows[other], labels[other], labels[one]
     )
 
 
-def _keeps(grid: SurfaceGrid, dockers: Sequence[DockedPiece], row: GridRow, own: IntArray, other: IntArray) -> bool:
-    """Whether the motion of a row takes each cell of it, and the borders of these, to the next, in the same places of
-    another row."""
+def _keeps_labels(
+    grid: SurfaceGrid, pieces: Sequence[DockedPiece], row: GridRow, own: IntArray, other: IntArray
+) -> bool:
+    """Return whether the transform of a row takes its cells and their borders to the same places of another row."""
     inner = (other[grid.neighbours] == other[:, None]) | (grid.neighbours < 0)
     clear = inner.all(axis=1)
-    asked = np.zeros(len(grid), dtype=bool)
-    asked[(own >= 1) & (own < row.count)] = True
-    for docker in row.docked_pieces[:-1]:
-        asked[dockers[docker].border] = True
-    points = grid.origin + (grid.cells[asked & clear] + 0.5) * grid.cell_size
-    there = _nearest_labels(grid, transform_points(row.transform, points), other)
-    return bool((there == other[asked & clear]).mean() >= TILED - grid.slack)
+    tested = np.zeros(len(grid), dtype=bool)
+    tested[(own >= 1) & (own < row.count)] = True
+    for index in row.docked_pieces[:-1]:
+        tested[pieces[index].border] = True
+    points = grid.centres(tested & clear)
+    reached = _nearest_labels(grid, transform_points(row.transform, points), other)
+    return bool((reached == other[tested & clear]).mean() >= MIN_TILED_SHARE - grid.slack)
 
 
 def _nearest_labels(grid: SurfaceGrid, points: FloatArray, labels: IntArray) -> IntArray:
-    """The labels of the occupied cells that are nearest to points (n, 3)."""
+    """Return the labels of the occupied cells that are nearest to points (n, 3)."""
     from scipy.spatial import KDTree
 
-    found: IntArray = labels[KDTree(grid.cells).query((points - grid.origin) / grid.cell_size - 0.5)[1]]
-    return found
+    nearest: IntArray = labels[KDTree(grid.cells).query((points - grid.origin) / grid.cell_size - 0.5)[1]]
+    return nearest

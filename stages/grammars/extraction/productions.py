@@ -7,37 +7,38 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stages.grammars.derivation import START, Derivation, NonTerminal
+from stages.grammars.derivation import START_SITE, Derivation, NonTerminal
 from stages.grammars.extraction.docked_pieces import DockedPiece, surrounding_cells
 from stages.grammars.extraction.seams import Seam, cells_within_steps, make_seam
 from stages.grammars.extraction.terminals import Terminal, TerminalCutter
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.pose import invert, transform_points
-from stages.symmetry.matching.cell_lookup import ChosenSet, items_in
+from stages.symmetry.matching.cell_lookup import PackedSubset, items_in
 from stages.symmetry.matching.r_symmetry import matched_items
 from stages.symmetry.surface.grid import SurfaceGrid
 from stages.symmetry.surface.soup import Soup
 
-SETS = 10
-"""Independent sets of sites that are sampled for a docker (symmetry §3.4.2)."""
-ROOM = 2
-"""Cells by which a docker must lie inside another, or apart from it."""
-LEAST = 2e-3
-"""Share of the surface by which a docker is larger than one in it."""
-ALIKE = 0.99
-"""Share of the items of a piece that must have their equals in another for the two to be one terminal."""
-SAME_AREA = 1e-3
-"""Share of their surface by which terminals that are equal may differ."""
-BORDERS = 1.5
-"""A piece that is cut out may differ from its cells by so much of what lies around them: a seam follows others."""
+MAX_INDEPENDENT_SETS = 10
+"""Independent sets of sites that are sampled per docked piece (symmetry §3.4.2)."""
+CLEARANCE_STEPS = 2
+"""Cells by which a piece must lie inside another one, or away from it."""
+MIN_SIZE_DIFFERENCE = 2e-3
+"""Share of the surface by which a piece is larger than one in it."""
+MIN_MATCHED_SHARE = 0.99
+"""Share of the items of a piece that must match those of another for the two to be one terminal."""
+MAX_AREA_DIFFERENCE = 1e-3
+"""Share of their surface by which equal terminals may differ."""
+MAX_BORDER_RATIO = 1.5
+"""A piece may differ from its cells by this multiple of the surface around them: its seam follows other cells."""
 
 
 @dataclass(frozen=True)
 class ExtractedProduction:
-    """What may stand at a site: a terminal, and places for others.
+    """What may replace a non-terminal: a terminal with non-terminals of its own.
 
-    site: its class, or START; frame: float64 (4, 4), of the site where the exemplar has this docker; terminal: its
-    triangles as the exemplar has them; places: the non-terminals in it.
+    site: class of its site, or START_SITE
+    frame: float64 (4, 4), of the site where the exemplar has this piece
+    terminal: triangles as in the exemplar
     """
 
     site: int
@@ -46,155 +47,171 @@ class ExtractedProduction:
     non_terminals: tuple[NonTerminal, ...]
 
 
-def seams_by_site(grid: SurfaceGrid, dockers: Sequence[DockedPiece]) -> dict[int, Seam]:
-    """The seam of each class of sites."""
-    firsts = [each for each in dockers if np.array_equal(each.frame, np.eye(4))]
-    return {each.site: make_seam(grid, each.border, each.cells) for each in reversed(firsts)}
+def seams_by_site(grid: SurfaceGrid, pieces: Sequence[DockedPiece]) -> dict[int, Seam]:
+    """Return the seam of each class of sites."""
+    firsts = [piece for piece in pieces if np.array_equal(piece.frame, np.eye(4))]
+    return {piece.site: make_seam(grid, piece.border, piece.cells) for piece in reversed(firsts)}
 
 
 def extract_productions(
-    grid: SurfaceGrid, dockers: Sequence[DockedPiece], seams: dict[int, Seam], rng: np.random.Generator
+    grid: SurfaceGrid, pieces: Sequence[DockedPiece], seams: dict[int, Seam], rng: np.random.Generator
 ) -> tuple[list[ExtractedProduction], Soup]:
-    """The productions of an exemplar, those of START first, and all pieces that their terminals may have.
+    """Return the productions of an exemplar, those of START_SITE first, and all triangle pieces of their terminals.
 
-    Dockers that lie in a docker are its children; of those that overlap some are chosen, in at most SETS ways, each a
-    production of its own. Of a child that overlaps what is chosen its own children are tried, one level. Productions
-    that are equal, terminal and places, are one.
+    Pieces in a docked piece are its children. Of children that overlap some are chosen, in at most
+    MAX_INDEPENDENT_SETS ways, each a production of its own. A child that overlaps chosen ones is replaced by one of its
+    own children, one level deep. Productions with equal terminals and non-terminals are one.
     """
-    whole = DockedPiece(np.arange(len(grid), dtype=np.int32), np.empty(0, np.int32), 1.0, START, np.eye(4))
-    every = [*dockers, whole]
-    inside, apart = _relations(grid, every)
-    cuts = TerminalCutter(grid, every, seams)
-    found: list[tuple[ExtractedProduction, ChosenSet]] = []
+    whole = DockedPiece(np.arange(len(grid), dtype=np.int32), np.empty(0, np.int32), 1.0, START_SITE, np.eye(4))
+    every = [*pieces, whole]
+    inside, disjoint = _relations(grid, every)
+    cutter = TerminalCutter(grid, every, seams)
+    known: list[tuple[ExtractedProduction, PackedSubset]] = []
     original: dict[int, Derivation] = {}
-    # smallest first: what gives a docker back is made of what gives those in it back
-    for node in np.argsort([each.area for each in every], kind="stable").tolist():
-        for chosen in _independent(node, inside, apart, rng):
-            if not all(each in original for each in chosen):
+    # smallest first: the derivation of a piece consists of those of the pieces in it
+    for node in np.argsort([piece.area for piece in every], kind="stable").tolist():
+        for chosen in _independent_sets(node, inside, disjoint, rng):
+            if not all(index in original for index in chosen):
                 continue
             left = _rest(grid, every, node, chosen)
-            terminal = cuts.between(node, chosen)
-            if not len(terminal) or not _faithful(grid, terminal, np.flatnonzero(left)):
+            terminal = cutter.between(node, chosen)
+            if not len(terminal) or not _fits_cells(grid, terminal, np.flatnonzero(left)):
                 continue
-            places = tuple(NonTerminal(every[each].site, every[each].frame, original[each]) for each in chosen)
-            made = ExtractedProduction(every[node].site, every[node].frame, terminal, places), ChosenSet.of(left)
-            known, order = len(found), tuple(range(len(places)))
-            for number, each in enumerate(found):
-                same = _equal(grid, each, made, seams)
+            non_terminals = tuple(
+                NonTerminal(every[index].site, every[index].frame, original[index]) for index in chosen
+            )
+            new = (
+                ExtractedProduction(every[node].site, every[node].frame, terminal, non_terminals),
+                PackedSubset.of(left),
+            )
+            number, order = len(known), tuple(range(len(non_terminals)))
+            for index, candidate in enumerate(known):
+                same = _matching_order(grid, candidate, new, seams)
                 if same is not None:
-                    known, order = number, same
+                    number, order = index, same
                     break
             else:
-                found.append(made)
-            # places of one production lie elsewhere in the exemplar, with other things in them
-            original.setdefault(node, Derivation(known, tuple(places[each].original for each in order)))
-    return _by_site([each for each, _ in found]), cuts.pieces()
+                known.append(new)
+            # non-terminals of one production lie elsewhere in the exemplar, with other content
+            original.setdefault(node, Derivation(number, tuple(non_terminals[index].original for index in order)))
+    return _by_site([production for production, _ in known]), cutter.pieces()
 
 
 def _relations(grid: SurfaceGrid, every: Sequence[DockedPiece]) -> tuple[BoolArray, BoolArray]:
-    """Of each two dockers whether the second lies in the first, and whether they lie apart, bool (n, n) each."""
+    """Return for each two pieces whether the second lies in the first, and whether they are disjoint, bool (n, n)."""
     count = len(every)
-    wide = [cells_within_steps(grid, each.cells, ROOM) for each in every]
-    inside, apart = np.zeros((count, count), dtype=bool), np.zeros((count, count), dtype=bool)
-    for one, docker in enumerate(every):
+    wide = [cells_within_steps(grid, piece.cells, CLEARANCE_STEPS) for piece in every]
+    inside, disjoint = np.zeros((count, count), dtype=bool), np.zeros((count, count), dtype=bool)
+    for one, piece in enumerate(every):
         within = np.zeros(len(grid), dtype=bool)
-        within[docker.cells] = True
+        within[piece.cells] = True
         for other in range(count):
             if other != one:
-                inside[one, other] = every[other].area < docker.area - LEAST and not (wide[other] & ~within).any()
-                apart[one, other] = not (wide[other] & within).any()
-    return inside, apart & apart.T
+                smaller = every[other].area < piece.area - MIN_SIZE_DIFFERENCE
+                inside[one, other] = smaller and not (wide[other] & ~within).any()
+                disjoint[one, other] = not (wide[other] & within).any()
+    return inside, disjoint & disjoint.T
 
 
-def _independent(node: int, inside: BoolArray, apart: BoolArray, rng: np.random.Generator) -> list[tuple[int, ...]]:
-    """Sets of dockers in docker `node` that lie apart from each other, different ones, at most SETS."""
-    children = _direct(node, inside)
+def _independent_sets(
+    node: int, inside: BoolArray, disjoint: BoolArray, rng: np.random.Generator
+) -> list[tuple[int, ...]]:
+    """Return at most MAX_INDEPENDENT_SETS different sets of disjoint pieces in docked piece `node`."""
+    children = _children(node, inside)
     if not len(children):
         return [()]
-    found: dict[tuple[int, ...], None] = {}
-    for first in rng.permutation(children)[:SETS].tolist():
+    sets: dict[tuple[int, ...], None] = {}
+    for first in rng.permutation(children)[:MAX_INDEPENDENT_SETS].tolist():
         chosen = [first]
-        others = [each for each in rng.permutation(children).tolist() if each != first]
+        others = [child for child in rng.permutation(children).tolist() if child != first]
         left: list[int] = []
-        for each in others:
-            (chosen if apart[each, chosen].all() else left).append(each)
-        for each in left:
-            chosen += [one for one in _direct(each, inside).tolist() if apart[one, chosen].all()][:1]
-        found[tuple(sorted(chosen))] = None
-    return list(found)
+        for child in others:
+            (chosen if disjoint[child, chosen].all() else left).append(child)
+        for child in left:
+            chosen += [inner for inner in _children(child, inside).tolist() if disjoint[inner, chosen].all()][:1]
+        sets[tuple(sorted(chosen))] = None
+    return list(sets)
 
 
-def _direct(node: int, inside: BoolArray) -> np.ndarray:
-    """The dockers in a docker that lie in no other one in it."""
+def _children(node: int, inside: BoolArray) -> np.ndarray:
+    """Return the pieces in a docked piece that lie in no other piece in it."""
     within = np.flatnonzero(inside[node])
-    found: np.ndarray = within[~inside[np.ix_(within, within)].any(axis=0)]
-    return found
+    children: np.ndarray = within[~inside[np.ix_(within, within)].any(axis=0)]
+    return children
 
 
 def _rest(grid: SurfaceGrid, every: Sequence[DockedPiece], node: int, chosen: tuple[int, ...]) -> BoolArray:
-    """Which cells are of a docker and in none of those chosen in it, bool (n,)."""
+    """Return which cells of a docked piece are in none of the chosen pieces, bool (n,)."""
     left = np.zeros(len(grid), dtype=bool)
     left[every[node].cells] = True
-    for each in chosen:
-        left[every[each].cells] = False
+    for index in chosen:
+        left[every[index].cells] = False
     return left
 
 
-def _faithful(grid: SurfaceGrid, terminal: Terminal, cells: np.ndarray) -> bool:
-    """Whether triangles that were cut out are those of some cells, but for the border: a seam that moved here may part
-    something else where sheets lie in one cell."""
+def _fits_cells(grid: SurfaceGrid, terminal: Terminal, cells: np.ndarray) -> bool:
+    """Return whether a terminal has the area of its cells, apart from the border.
+
+    A seam that was moved here may separate something else where two sheets lie in one cell.
+    """
     wanted = float(grid.area[cells].sum())
     border = float(grid.area[surrounding_cells(grid, cells)].sum())
-    return abs(terminal.area - wanted) <= BORDERS * border + (SAME_AREA + grid.slack) * wanted
+    return abs(terminal.area - wanted) <= MAX_BORDER_RATIO * border + (MAX_AREA_DIFFERENCE + grid.slack) * wanted
 
 
-def _equal(
+def _matching_order(
     grid: SurfaceGrid,
-    one: tuple[ExtractedProduction, ChosenSet],
-    other: tuple[ExtractedProduction, ChosenSet],
+    one: tuple[ExtractedProduction, PackedSubset],
+    other: tuple[ExtractedProduction, PackedSubset],
     seams: dict[int, Seam],
 ) -> tuple[int, ...] | None:
-    """Whether two productions, each with its cells, are equal in their sites, their places, and what is left: for each
-    place of the first which of the second it is, None where they are not."""
+    """Return for each non-terminal of the first production its equal in the second; None if they differ.
+
+    Each production comes with its cells. Equal productions agree in site, non-terminals and terminal.
+    """
     (first, cells), (second, others) = one, other
     if first.site != second.site or len(first.non_terminals) != len(second.non_terminals):
         return None
-    if abs(first.terminal.area - second.terminal.area) > (SAME_AREA + grid.slack) * first.terminal.area:
+    max_difference = (MAX_AREA_DIFFERENCE + grid.slack) * first.terminal.area
+    if abs(first.terminal.area - second.terminal.area) > max_difference:
         return None
-    motion = second.frame @ invert(first.frame)
+    transform = second.frame @ invert(first.frame)
     order: list[int] = []
-    for place in first.non_terminals:
-        probe = grid.points[items_in(grid, seams[place.site].inner)]
-        want = transform_points(motion @ place.frame, probe)
+    for non_terminal in first.non_terminals:
+        probe = grid.points[items_in(grid, seams[non_terminal.site].inner)]
+        expected = transform_points(transform @ non_terminal.frame, probe)
         same = [
             number
-            for number, each in enumerate(second.non_terminals)
+            for number, candidate in enumerate(second.non_terminals)
             if number not in order
-            and each.site == place.site
-            and np.abs(transform_points(each.frame, probe) - want).max() < grid.cell_size
+            and candidate.site == non_terminal.site
+            and np.abs(transform_points(candidate.frame, probe) - expected).max() < grid.cell_size
         ]
         if not same:
             return None
         order.append(same[0])
-    alike = all(
-        bool(matched_items(grid, way, items_in(grid, held)).mean() > ALIKE * grid.agreement)
-        for way, held in ((motion, cells.indices), (invert(motion), others.indices))
+    matches = all(
+        bool(matched_items(grid, way, items_in(grid, held)).mean() > MIN_MATCHED_SHARE * grid.agreement)
+        for way, held in ((transform, cells.indices), (invert(transform), others.indices))
     )
-    return tuple(order) if alike else None
+    return tuple(order) if matches else None
 
 
-def _by_site(found: Sequence[ExtractedProduction]) -> list[ExtractedProduction]:
-    """The productions in the order of their sites."""
-    order = sorted(range(len(found)), key=lambda place: (found[place].site, place))
+def _by_site(productions: Sequence[ExtractedProduction]) -> list[ExtractedProduction]:
+    """Return the productions in the order of their sites."""
+    order = sorted(range(len(productions)), key=lambda index: (productions[index].site, index))
     number = {old: new for new, old in enumerate(order)}
 
-    def renumbered(each: Derivation) -> Derivation:
-        return Derivation(number[each.production], tuple(map(renumbered, each.parts)))
+    def renumbered(derivation: Derivation) -> Derivation:
+        return Derivation(number[derivation.production], tuple(map(renumbered, derivation.parts)))
 
     return [
         replace(
-            found[old],
-            non_terminals=tuple(replace(each, original=renumbered(each.original)) for each in found[old].non_terminals),
+            productions[old],
+            non_terminals=tuple(
+                replace(non_terminal, original=renumbered(non_terminal.original))
+                for non_terminal in productions[old].non_terminals
+            ),
         )
         for old in order
     ]

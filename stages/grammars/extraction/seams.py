@@ -1,4 +1,4 @@
-"""Dockers cut out of the original triangles, so that all that dock at equal sites have one seam (symmetry §4)."""
+"""Pieces cut out of the original triangles, so that all pieces that dock at equal sites have one seam (symmetry §4)."""
 
 from __future__ import annotations
 
@@ -12,40 +12,46 @@ from stages.shape.geometry.pose import invert
 from stages.symmetry.matching.cell_lookup import is_among, items_in, items_moved_into
 from stages.symmetry.matching.r_symmetry import cells_within, matched_items
 from stages.symmetry.surface.grid import SurfaceGrid
-from stages.symmetry.surface.soup import Soup, carve, join_soups, middles_in
+from stages.symmetry.surface.soup import Soup, carve, centres_in, join_soups
 
-BAND = 3.0
-"""Cells around a site that are cut as the first of its class is: the others lie up to 2.5 cells from it once moved."""
-STANDS = 0.999
-"""Share of planes and lines that must lie where a motion takes them, both ways: all but what rounding makes."""
+SEAM_BAND_CELLS = 3.0
+"""Distance from a site, in cells, within which its seam is that of the class's first site.
+
+Transformed sites of the class lie up to 2.5 cells from it.
+"""
+MIN_MATCHED_SHARE = 0.999
+"""Share of planes and lines that must match, both ways, where a surface recurs; the others are rounding errors."""
 
 
 @dataclass(frozen=True)
 class Seam:
-    """Where a class of sites is cut: `band`, the cells within the radius of its first site, int32 ascending, and
-    `inner`, those of them in the docker."""
+    """Where a class of sites is cut.
+
+    band: int32, cells within SEAM_BAND_CELLS of its first site, ascending
+    inner: int32, those of them in the docked piece
+    """
 
     band: IntArray
     inner: IntArray
 
 
 def make_seam(grid: SurfaceGrid, border: IntArray, cells: IntArray) -> Seam:
-    """The seam between a docker's cells and the cells around it."""
-    band = cells_within(grid, border, BAND)
+    """Return the seam between the cells of a docked piece and the `border` around it."""
+    band = cells_within(grid, border, SEAM_BAND_CELLS)
     return Seam(band, band[is_among(cells, band)])
 
 
 def cells_within_steps(grid: SurfaceGrid, cells: np.ndarray, steps: int) -> BoolArray:
-    """Which cells of the grid are at most so many steps from `cells`, bool (n,)."""
+    """Return which cells of the grid are at most `steps` neighbours from `cells`, bool (n,)."""
     chosen = np.zeros(len(grid), dtype=bool)
     chosen[cells] = True
-    _widen(chosen, np.asarray(cells, dtype=np.int64), grid.neighbours, steps)
+    _grow(chosen, np.asarray(cells, dtype=np.int64), grid.neighbours, steps)
     return chosen
 
 
 @numba.njit(cache=True)
-def _widen(chosen, cells, neighbours, steps):
-    """Set the cells at most so many steps from `cells`."""
+def _grow(chosen, cells, neighbours, steps):
+    """Set `chosen`, bool (n,), for the cells at most `steps` neighbours from `cells`."""
     queue = np.empty(len(chosen), dtype=np.int64)
     queue[: len(cells)] = cells
     begin, end = 0, len(cells)
@@ -62,22 +68,23 @@ def _widen(chosen, cells, neighbours, steps):
 
 
 def surface_recurs(grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> bool:
-    """Whether the surface has at a pose (4, 4) what lies in ascending cells, and nothing beside."""
-    least = STANDS * grid.agreement
+    """Return whether the surface at a pose (4, 4) is exactly that in ascending `cells`."""
+    least = MIN_MATCHED_SHARE * grid.agreement
     if matched_items(grid, pose, items_in(grid, cells)).mean() < least:
         return False
-    there = items_moved_into(grid, cells, pose)
-    return bool(matched_items(grid, invert(pose), there).mean() >= least)
+    present = items_moved_into(grid, cells, pose)
+    return bool(matched_items(grid, invert(pose), present).mean() >= least)
 
 
 def cut_out(soup: Soup, grid: SurfaceGrid, cells: IntArray, frame: FloatArray, seam: Seam) -> tuple[Soup, Soup]:
-    """What of a soup of the exemplar's triangles is of a docker with these cells, and what is not.
+    """Split a soup of the exemplar's triangles into a docked piece with these cells and the rest.
 
-    Borders of cells do not move with a docker, and another would not fit where they meet. So along the site triangles
-    are cut where the cells of the class's first site, moved here by `frame` (4, 4), part them; away from it nothing
-    needs to be cut.
+    frame: float64 (4, 4), from the first site of the class to the site of the piece
+
+    Borders of cells do not move with a piece, and two pieces would not fit along them. So triangles near the site are
+    cut along the transformed cells of the class's first site. Farther away nothing needs to be cut.
     """
     along, away = carve(soup, grid, seam.band, frame)
     inside, outside = carve(along, grid, seam.inner, frame)
-    within = middles_in(away, grid, cells, np.eye(4))
+    within = centres_in(away, grid, cells, np.eye(4))
     return join_soups(inside, away.select(within)), join_soups(outside, away.select(~within))

@@ -1,4 +1,4 @@
-"""Planar patches of a point cloud: what stands for the faces of a mesh (symmetry §4)."""
+"""Planar patches of a point cloud, which stand for the faces of a mesh (symmetry §4)."""
 
 from __future__ import annotations
 
@@ -11,75 +11,76 @@ from stages.grammars.scans.outward_normals import outward_signs
 from stages.grammars.scans.point_neighbourhoods import PointNeighbourhoods, patch_contacts
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-TILT = 0.4
-"""Radians that normals of neighbourhoods may differ from that of a patch: they are those of few points, with noise."""
-SPREAD = 3.0
+MAX_TILT_RADIANS = 0.4
+"""Largest angle between a patch and the plane of a neighbourhood, which rests on few, noisy points."""
+PLANE_NOISE = 3.0
 """Standard deviations of the noise up to which a point lies on a plane."""
-FEWEST = 12
-"""Points of a patch."""
-NARROW = 0.5
-"""A patch whose points are spread less across it, as a share of how far neighbourhoods reach, is noise at a crease."""
-EXPLAINED = 0.8
-"""So is one of which this share lies in the planes of larger ones that it meets."""
-FLAT = 0.1
-"""Radians between patches that meet and are one."""
-ROUNDS = 3
-"""So often points beside another patch go to where they fit best."""
+MIN_PATCH_POINTS = 12
+MIN_WIDTH_SHARE = 0.5
+"""A patch that is narrower, as a share of the reach of neighbourhoods, is noise at a crease."""
+EXPLAINED_SHARE = 0.8
+"""A patch is also noise if more of it lies in the planes of larger patches that it meets."""
+SAME_PLANE_RADIANS = 0.1
+"""Patches that meet at a smaller angle are merged."""
+REFINEMENT_ROUNDS = 3
 
 
 @dataclass(frozen=True)
 class PlanarPatches:
-    """Planar patches of n points: `of`, int32 (n,), the patch of each, -1 for none; middles and outward normals of
-    their planes, float64 (m, 3) each."""
+    """Planar patches of n points.
+
+    of: int32 (n,), the patch of each point, -1 for none
+    middles: float64 (m, 3)
+    normals: float64 (m, 3), outward
+    """
 
     of: IntArray
     middles: FloatArray
     normals: FloatArray
 
     def projected(self, points: FloatArray) -> FloatArray:
-        """Points (n, 3) on the planes of their patches; those of none where they are."""
-        found = points.copy()
+        """Project points (n, 3) onto the planes of their patches; points of no patch stay."""
+        projected = points.copy()
         held = self.of >= 0
         normals = self.normals[self.of[held]]
         off = ((points[held] - self.middles[self.of[held]]) * normals).sum(axis=1)
-        found[held] -= off[:, None] * normals
-        return found
+        projected[held] -= off[:, None] * normals
+        return projected
 
 
 def planar_patches(
-    points: FloatArray, around: PointNeighbourhoods, least: float, given: FloatArray | None
+    points: FloatArray, around: PointNeighbourhoods, min_distance: float, given: FloatArray | None
 ) -> PlanarPatches:
-    """The planar patches of points (n, 3), grown from where they are flattest (Rabbani and others 2006).
+    """Grow planar patches of points (n, 3) from where they are flattest (Rabbani and others 2006).
 
-    least: how far from a plane points may be at least, however little noise there is. given: outward normals of the
-    points, float64 (n, 3); without, normals are outward as patches that meet agree, and as most of the surface faces
-    away from its middle.
+    min_distance: distance up to which points lie on a plane, however little noise there is
+    given: float64 (n, 3), outward normals of the points; without them patches that meet agree, and most of the surface
+        faces away from its middle
     """
-    most = max(least, SPREAD * around.noise)
-    order = np.argsort(around.rough, kind="stable")
-    of = _grown(points, around.normals, around.near, order[~around.lonely[order]], np.cos(TILT), most)
-    narrow = NARROW * float(np.median(around.reach))
-    of = _numbered(of)
-    for _ in range(ROUNDS):
+    distance = max(min_distance, PLANE_NOISE * around.noise)
+    order = np.argsort(around.roughness, kind="stable")
+    seeds = order[~around.outlier[order]]
+    of = _numbered(_grown(points, around.normals, around.near, seeds, np.cos(MAX_TILT_RADIANS), distance))
+    min_width = MIN_WIDTH_SHARE * float(np.median(around.reach))
+    for _ in range(REFINEMENT_ROUNDS):
         middles, normals, _ = _fitted(points, of)
-        of = _numbered(_merged(points, around.near, of, middles, normals, most))
+        of = _numbered(_merged(points, around.near, of, middles, normals, distance))
         middles, normals, widths = _fitted(points, of)
-        noise = (widths < narrow) | _explained(points, around.near, of, middles, normals, most)
+        noise = (widths < min_width) | _explained(points, around.near, of, middles, normals, distance)
         of[noise[of]] = -1
-        of = _numbered(_settled(points, around.near, of, middles, normals, most, around.lonely))
+        of = _numbered(_reassigned(points, around.near, of, middles, normals, distance, around.outlier))
     middles, normals, _ = _fitted(points, of)
-    return PlanarPatches(
-        of, middles, normals * outward_signs(points, around.near, of, middles, normals, given)[:, None]
-    )
+    signs = outward_signs(points, around.near, of, middles, normals, given)
+    return PlanarPatches(of, middles, normals * signs[:, None])
 
 
 @numba.njit(cache=True)
-def _grown(points, normals, near, order, level, most):
-    """The patch of each point, int32 (n,): from each seed in `order` on, what lies on one plane; -1 for none."""
+def _grown(points, normals, near, seeds, min_cosine, distance):
+    """Return the patch of each point, int32 (n,), -1 for none: from each seed on, what lies on one plane."""
     patch = np.full(len(points), -1, dtype=np.int32)
     queue = np.empty(len(points), dtype=np.int64)
     count = 0
-    for seed in order:
+    for seed in seeds:
         if patch[seed] >= 0:
             continue
         normal, middle = normals[seed].copy(), np.zeros(3)
@@ -97,7 +98,7 @@ def _grown(points, normals, near, order, level, most):
                 for d in range(3):
                     cosine += normals[other, d] * normal[d]
                     off += (points[other, d] - middle[d]) * normal[d]
-                if abs(cosine) < level or abs(off) > most:
+                if abs(cosine) < min_cosine or abs(off) > distance:
                     continue
                 patch[other] = count
                 queue[tail] = other
@@ -111,7 +112,7 @@ def _grown(points, normals, near, order, level, most):
 
 @numba.njit(cache=True)
 def _plane(points, chosen):
-    """The middle of chosen points and the normal of the plane through them."""
+    """Return the middle of chosen points and the normal of the plane through them."""
     middle, spread = np.zeros(3), np.zeros((3, 3))
     for n in chosen:
         middle += points[n]
@@ -124,45 +125,48 @@ def _plane(points, chosen):
 
 
 def _numbered(of: IntArray) -> IntArray:
-    """Patches of at least FEWEST points, numbered from 0 on, the largest first; the others are none."""
+    """Number patches by size, the largest first; drop those of fewer than MIN_PATCH_POINTS points."""
     count = np.bincount(of[of >= 0])
     order = np.argsort(-count, kind="stable")
     number = np.full(len(count) + 1, -1, dtype=np.int32)
-    number[order] = np.where(count[order] >= FEWEST, np.arange(len(order)), -1)
+    number[order] = np.where(count[order] >= MIN_PATCH_POINTS, np.arange(len(order)), -1)
     return number[of]
 
 
 def _fitted(points: FloatArray, of: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The middles (m, 3) and normals (m, 3), of either sign, of the planes through the points of each patch, and the
-    standard deviation of its points across it, float64 (m,)."""
+    """Fit planes to patches.
+
+    Returns middles (m, 3), normals (m, 3) of either sign, and the width of each patch, float64 (m,): the standard
+    deviation of its points in the second direction.
+    """
     held = np.flatnonzero(of >= 0)
     patch, total = of[held], int(of.max(initial=-1)) + 1
     count = np.bincount(patch, minlength=total)[:, None]
     middles = np.column_stack([np.bincount(patch, points[held, d], total) for d in range(3)]) / count
-    apart = points[held] - middles[patch]
+    offsets = points[held] - middles[patch]
     spread = np.empty((total, 3, 3))
     for i in range(3):
         for j in range(3):
-            spread[:, i, j] = np.bincount(patch, apart[:, i] * apart[:, j], total)
-    values, ways = np.linalg.eigh(spread / count[:, :, None])
-    return middles, ways[:, :, 0], np.sqrt(np.maximum(values[:, 1], 0))
+            spread[:, i, j] = np.bincount(patch, offsets[:, i] * offsets[:, j], total)
+    values, axes = np.linalg.eigh(spread / count[:, :, None])
+    return middles, axes[:, :, 0], np.sqrt(np.maximum(values[:, 1], 0))
 
 
 def _merged(
-    points: FloatArray, near: IntArray, of: IntArray, middles: FloatArray, normals: FloatArray, most: float
+    points: FloatArray, near: IntArray, of: IntArray, middles: FloatArray, normals: FloatArray, distance: float
 ) -> IntArray:
-    """The patches, those that meet in one plane as one."""
+    """Merge patches that meet in one plane."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     one, other = patch_contacts(near, of)
-    pairs, place = np.unique(np.column_stack([of[one], of[other]]), axis=0, return_inverse=True)
+    pairs, pair = np.unique(np.column_stack([of[one], of[other]]), axis=0, return_inverse=True)
     first, second = pairs.T
     off = np.abs(((points[one] - middles[of[other]]) * normals[of[other]]).sum(axis=1))
-    mean = np.bincount(place.reshape(-1), off, len(pairs)) / np.bincount(place.reshape(-1), minlength=len(pairs))
-    level = np.abs((normals[first] * normals[second]).sum(axis=1)) > np.cos(FLAT)
-    whole = np.abs(((middles[first] - middles[second]) * normals[second]).sum(axis=1)) < most
-    same = level & whole & (mean < most / 2)
+    mean = np.bincount(pair.reshape(-1), off, len(pairs)) / np.bincount(pair.reshape(-1), minlength=len(pairs))
+    level = np.abs((normals[first] * normals[second]).sum(axis=1)) > np.cos(SAME_PLANE_RADIANS)
+    whole = np.abs(((middles[first] - middles[second]) * normals[second]).sum(axis=1)) < distance
+    same = level & whole & (mean < distance / 2)
     total = len(middles)
     graph = coo_array((same[same], (first[same], second[same])), shape=(total, total))
     _, label = connected_components(graph, directed=True, connection="strong")
@@ -170,40 +174,40 @@ def _merged(
 
 
 def _explained(
-    points: FloatArray, near: IntArray, of: IntArray, middles: FloatArray, normals: FloatArray, most: float
+    points: FloatArray, near: IntArray, of: IntArray, middles: FloatArray, normals: FloatArray, distance: float
 ) -> BoolArray:
-    """Which patches lie in the planes of larger ones that they meet, bool (m,): such as noise makes along creases."""
+    """Return which patches lie in the planes of larger ones that they meet, bool (m,): noise along creases."""
     one, other = patch_contacts(near, of)
     pairs = np.unique(np.column_stack([of[one], of[other]]), axis=0)
     order = np.argsort(of, kind="stable")
     members = np.split(order, np.searchsorted(of[order], np.arange(len(middles) + 1)))[1:-1]
-    found = np.zeros(len(middles), dtype=bool)
+    explained = np.zeros(len(middles), dtype=bool)
     larger = pairs[pairs[:, 1] < pairs[:, 0]]
     for patch in np.unique(larger[:, 0]).tolist():
-        beside = larger[larger[:, 0] == patch, 1]
-        apart = points[members[patch], None] - middles[beside]
-        off = np.abs((apart * normals[beside]).sum(axis=2)).min(axis=1)
-        found[patch] = (off < most).mean() > EXPLAINED
-    return found
+        met = larger[larger[:, 0] == patch, 1]
+        offsets = points[members[patch], None] - middles[met]
+        off = np.abs((offsets * normals[met]).sum(axis=2)).min(axis=1)
+        explained[patch] = (off < distance).mean() > EXPLAINED_SHARE
+    return explained
 
 
 @numba.njit(cache=True)
-def _settled(points, near, of, middles, normals, most, lonely):
-    """The patch of each point: of those of its neighbours the one in whose plane it lies best, -1 for none."""
-    found = of.copy()
+def _reassigned(points, near, of, middles, normals, distance, outlier):
+    """Return the best patch of each point among those of its neighbours, by distance from the plane; -1 for none."""
+    assigned = of.copy()
     for n in range(len(points)):
-        if lonely[n]:
-            found[n] = -1
+        if outlier[n]:
+            assigned[n] = -1
             continue
-        best, patch = most, -1
+        best, patch = distance, -1
         for other in near[n]:
-            each = of[other]
-            if each < 0 or each == patch:
+            candidate = of[other]
+            if candidate < 0 or candidate == patch:
                 continue
             off = 0.0
             for d in range(3):
-                off += (points[n, d] - middles[each, d]) * normals[each, d]
+                off += (points[n, d] - middles[candidate, d]) * normals[candidate, d]
             if abs(off) < best:
-                best, patch = abs(off), each
-        found[n] = patch
-    return found
+                best, patch = abs(off), candidate
+        assigned[n] = patch
+    return assigned

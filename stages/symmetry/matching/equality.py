@@ -1,4 +1,4 @@
-"""Whether a motion moves one piece of a surface onto another."""
+"""Whether a rigid transform maps one piece of a surface onto another."""
 
 from __future__ import annotations
 
@@ -8,25 +8,32 @@ from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert
 from stages.symmetry.surface.soup import Soup
 
-DUST = 1e-3
-"""Share of their surface by which pieces that are equal may differ: slivers where borders of cells meet old seams."""
-INSIDE = 0.8
-"""Points that are compared lie so far from the middle of a triangle to its corners."""
+MAX_AREA_DIFFERENCE = 1e-3
+"""Share of their area by which equal pieces may differ: slivers where borders of cells meet old seams."""
+PROBE_SHARE = 0.8
+"""Position of the probe points on the way from the centre of a triangle to its corners."""
 
 
-def soups_match(one: Soup, other: Soup, pose: FloatArray, tolerance: float, share: float = DUST) -> bool:
-    """Whether `pose` (4, 4) moves one surface onto another: by their areas, which may differ by `share`, and by points
-    of all triangles but the smallest, dust of about this share of the surface, within twice the tolerance."""
+def soups_match(
+    one: Soup, other: Soup, pose: FloatArray, tolerance: float, max_difference: float = MAX_AREA_DIFFERENCE
+) -> bool:
+    """Return whether `pose` (4, 4) maps one surface onto the other.
+
+    max_difference: share of the area by which the two may differ
+
+    The areas must agree. Probe points on all triangles but the smallest, which make up that share of the surface, must
+    lie within twice the tolerance of the other surface.
+    """
     from stages.shape.geometry.mesh_pairs import build_tree, points_on_surface
 
-    if abs(one.area - other.area) > share * one.area:
+    if abs(one.area - other.area) > max_difference * one.area:
         return False
-    for source, target, way in ((one, other, pose), (other, one, invert(pose))):
+    for source, target, transform in ((one, other, pose), (other, one, invert(pose))):
         order = np.argsort(source.areas, kind="stable")
-        large = source.corners[order[np.cumsum(source.areas[order]) > share * source.area]]
-        middles = large.mean(axis=1, keepdims=True)
-        probes = np.concatenate([middles, middles + INSIDE * (large - middles)], axis=1).reshape(-1, 3)
+        large = source.corners[order[np.cumsum(source.areas[order]) > max_difference * source.area]]
+        centres = large.mean(axis=1, keepdims=True)
+        probes = np.concatenate([centres, centres + PROBE_SHARE * (large - centres)], axis=1).reshape(-1, 3)
         tree = build_tree(target.corners.reshape(-1, 3), np.arange(3 * len(target)).reshape(-1, 3).astype(np.int32))
-        if not points_on_surface(*tree, probes @ way[:3, :3].T + way[:3, 3], 2 * tolerance):
+        if not points_on_surface(*tree, probes @ transform[:3, :3].T + transform[:3, 3], 2 * tolerance):
             return False
     return True

@@ -1,4 +1,5 @@
-"""Sections of a surface by planes, and how alike two of them are: where a plane is a docking site (symmetry §3.2)."""
+"""Sections of a surface by planes, and how much of two sections is equal: where a plane is a docking site
+(symmetry §3.2)."""
 
 from __future__ import annotations
 
@@ -10,18 +11,19 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.grid_hash import OWN_CELL, cell_hash
 
-TURNED = 0.3
-"""Normals that are farther apart than this are of different sides."""
-ROUNDING = 1e-9
-"""By so much, as a share, a sum of lengths may be off."""
+MAX_NORMAL_DISTANCE = 0.3
+"""Unit normals that are farther apart belong to different sides."""
+ROUNDING_SHARE = 1e-9
+"""Relative error of a sum of lengths."""
 
 
 @dataclass(frozen=True)
-class CrossSection:
+class PlaneSection:
     """The lines in which a plane cuts a surface, as points along them.
 
-    points: float64 (n, 3); normals: float64 (n, 3), of the surface there; lengths: float64 (n,), the line that each
-    point stands for.
+    points: float64 (n, 3)
+    normals: float64 (n, 3), of the surface at the points
+    lengths: float64 (n,), of the piece of line around each point
     """
 
     points: FloatArray
@@ -34,9 +36,14 @@ class CrossSection:
         return float(self.lengths.sum())
 
 
-def cross_section(corners: FloatArray, normals: FloatArray, heights: FloatArray, step: float) -> CrossSection:
-    """The section of triangles (f, 3, 3) with unit `normals` (f, 3) by a plane that each of them crosses, over which
-    their corners lie at `heights` (f, 3), with a point for each `step` of a line."""
+def plane_section(corners: FloatArray, normals: FloatArray, heights: FloatArray, step: float) -> PlaneSection:
+    """Cut triangles by a plane that crosses each of them.
+
+    corners: float64 (f, 3, 3)
+    normals: float64 (f, 3), unit length
+    heights: float64 (f, 3), of the corners above the plane
+    step: largest distance between points along a line
+    """
     above = heights > 0
     alone = np.where(above.sum(axis=1) == 2, above.argmin(axis=1), above.argmax(axis=1))
     turn = (alone[:, None] + np.arange(3)) % 3
@@ -46,25 +53,27 @@ def cross_section(corners: FloatArray, normals: FloatArray, heights: FloatArray,
     ends = tips[:, :1] + share * (tips[:, 1:] - tips[:, :1])
     line = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     count = np.maximum(1, np.ceil(line / step)).astype(np.int64)
-    of = np.repeat(np.arange(len(line)), count)
-    place = (np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[of]
-    points = ends[of, 0] + place[:, None] * (ends[of, 1] - ends[of, 0])
-    return CrossSection(points, normals[of], (line / count)[of])
+    owner = np.repeat(np.arange(len(line)), count)
+    along = (np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[owner]
+    points = ends[owner, 0] + along[:, None] * (ends[owner, 1] - ends[owner, 0])
+    return PlaneSection(points, normals[owner], (line / count)[owner])
 
 
-def shared_share(one: CrossSection, other: CrossSection, shift: FloatArray, tolerance: float, least: float) -> float:
-    """The share of two sections that they have in common once `one` is moved by `shift` (3,): of the one that has less
-    in common; 0 if that is less than `least`. Points count that have one of the other within `tolerance`, on a side
-    that looks the same way."""
+def shared_share(one: PlaneSection, other: PlaneSection, shift: FloatArray, tolerance: float, least: float) -> float:
+    """Return the share of two sections that is equal once `one` is moved by `shift` (3,), the smaller of both shares.
+
+    tolerance: distance between equal points; their normals must agree too
+    least: smaller shares count as 0
+    """
     if not len(one.points) or not len(other.points):
         return 0.0
-    weight = tolerance / TURNED
+    weight = tolerance / MAX_NORMAL_DISTANCE
     moved = np.column_stack([one.points + shift, weight * one.normals])
     others = np.column_stack([other.points, weight * other.normals])
     shares = []
     for points, lengths, onto in ((moved, one.lengths, others), (others, other.lengths, moved)):
-        most = (1 - least) * (1 + ROUNDING) * float(lengths.sum())
-        covered, enough = _covered(points, lengths, onto, tolerance, most)
+        allowed = (1 - least) * (1 + ROUNDING_SHARE) * float(lengths.sum())
+        covered, enough = _covered(points, lengths, onto, tolerance, allowed)
         if not enough:
             return 0.0
         shares.append(float(lengths[covered].sum() / lengths.sum()))
@@ -72,9 +81,12 @@ def shared_share(one: CrossSection, other: CrossSection, shift: FloatArray, tole
 
 
 @numba.njit(cache=True)
-def _covered(points, lengths, others, tolerance, most):
-    """Which of `points` (n, 6) have one of `others` (k, 6) within `tolerance`, bool (n,), and whether the `lengths` of
-    those that have none come to `most` at most; as soon as they do not, it looks no further."""
+def _covered(points, lengths, others, tolerance, allowed):
+    """Return which of `points` (n, 6) have one of `others` (k, 6) within `tolerance`, bool (n,).
+
+    Also returns whether the `lengths` of uncovered points add up to at most `allowed`. The search stops as soon as
+    they do not.
+    """
     size = 1
     while size < 2 * len(others):
         size *= 2
@@ -84,10 +96,10 @@ def _covered(points, lengths, others, tolerance, most):
         following[place] = heads[cell]
         heads[cell] = place
     covered = np.zeros(len(points), dtype=np.bool_)
-    bare = 0.0
+    uncovered = 0.0
     for number in range(len(points)):
         for turn in range(27):
-            cell = cell_hash(points[number], (turn + OWN_CELL) % 27, tolerance) & (size - 1)  # its own first
+            cell = cell_hash(points[number], (turn + OWN_CELL) % 27, tolerance) & (size - 1)  # its own cell first
             place = heads[cell]
             while place >= 0 and not covered[number]:
                 total = 0.0
@@ -98,7 +110,7 @@ def _covered(points, lengths, others, tolerance, most):
             if covered[number]:
                 break
         if not covered[number]:
-            bare += lengths[number]
-            if bare > most:
+            uncovered += lengths[number]
+            if uncovered > allowed:
                 return covered, False
     return covered, True

@@ -1,6 +1,8 @@
-"""Boundary lines of a surface: sides of triangles beyond which their planes do not go on (symmetry §4)."""
+"""Boundary lines of a surface: sides of triangles where the surface ends or turns (symmetry §4)."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -9,25 +11,49 @@ from stages.shape.arrays import BoolArray, FloatArray
 from stages.symmetry.surface.lattice import cell_index, cell_of, doubled
 from stages.symmetry.surface.welding import sides_by_edge, weld
 
-SAME_ANGLE = 5e-3
-"""Radians up to which directions are one."""
-ACROSS = 2e-3
-"""So far beyond a side of a triangle, as a share of a cell, its plane must go on for the side to be no boundary."""
-BROAD = 10 * ACROSS
-"""A triangle is no sliver if it is higher than this share of a cell."""
-GAP = 0.05
-"""Pieces of a side that are bare for less, as a share of a cell, are none: in a sharp corner its line lies beyond the
-other side too."""
+SAME_ANGLE_RADIANS = 5e-3
+"""Directions that differ by less are the same."""
+PROBE_CELLS = 2e-3
+"""Distance from a side, in cells, at which its plane must go on for the side to be no boundary."""
+MIN_HEIGHT_CELLS = 10 * PROBE_CELLS
+"""A triangle of less height, in cells, is a sliver."""
+MIN_BARE_CELLS = 0.05
+"""Shorter uncovered pieces of a side, in cells, are ignored: in a sharp corner its line lies beyond the other side."""
+
+
+class GridTriangles(NamedTuple):
+    """Triangles and the cells that they lie in.
+
+    corners: float64 (f, 3, 3)
+    normals: float64 (f, 3), unit length
+    origin: float64 (3,), low corner of cell (0, 0, 0)
+    size: width of a cell
+    keys: int64 (n,), packed keys of the occupied cells, ascending
+    starts: int64 (n + 1,), where the triangles of each cell begin in `owner`
+    owner: int64 (m,), triangles by cell
+    tolerance: distance up to which points are the same
+    """
+
+    corners: np.ndarray
+    normals: np.ndarray
+    origin: np.ndarray
+    size: float
+    keys: np.ndarray
+    starts: np.ndarray
+    owner: np.ndarray
+    tolerance: float
 
 
 @numba.njit(cache=True)
-def boundary_lines(corners, normals, origin, size, keys, starts, owner, tolerance, goes_on):
-    """Cell, point, direction and length of each piece of a boundary, cut by the cells, lines that are one once.
+def boundary_lines(surface, goes_on):
+    """Return cell, point, direction and length of each boundary line of each cell; equal lines of a cell once.
 
-    goes_on: bool (f, 3), sides beyond which the surface is known to go on (`sides_that_go_on`); they are not looked at.
-    Where a side is covered is found out to the point: what is covered in part must be a boundary of one length in
-    whatever way cells cut it.
+    surface: `GridTriangles`
+    goes_on: bool (f, 3), sides beyond which the surface is known to go on (`sides_that_go_on`)
+
+    The uncovered part of a side is found exactly, so that its length does not depend on the lattice.
     """
+    corners, size, tolerance = surface.corners, surface.size, surface.tolerance
     room = 4 * len(corners) + 16
     cell, points, directions, lengths = (
         np.empty(room, dtype=np.int64),
@@ -37,7 +63,7 @@ def boundary_lines(corners, normals, origin, size, keys, starts, owner, toleranc
     )
     total = 0
     here, times, bare = np.empty(3, dtype=np.int64), np.empty(64), np.empty((64, 2))
-    spans, inward = np.empty((np.diff(starts).max(), 2)), _inward(corners, normals)
+    spans, inward = np.empty((np.diff(surface.starts).max(), 2)), _inward(corners, surface.normals)
     for face in range(len(corners)):
         for k in range(3):
             if goes_on[face, k]:
@@ -46,33 +72,30 @@ def boundary_lines(corners, normals, origin, size, keys, starts, owner, toleranc
             length = np.sqrt((way * way).sum())
             if length <= tolerance:
                 continue
-            times, crossed = _crossings(start, way, origin, size, times)
-            beyond = start + ACROSS * size * np.cross(way / length, normals[face])
+            times, crossed = _crossings(start, way, surface.origin, size, times)
+            beyond = start + PROBE_CELLS * size * np.cross(way / length, surface.normals[face])
             filled = 0
             for piece in range(crossed - 1):
                 near, far = times[piece], times[piece + 1]
                 if far <= near:
                     continue
-                cell_of(beyond + (near + far) / 2 * way, origin, size, here)
-                n = cell_index(keys, here[0], here[1], here[2])
+                cell_of(beyond + (near + far) / 2 * way, surface.origin, size, here)
+                n = cell_index(surface.keys, here[0], here[1], here[2])
                 count = 0
                 if n >= 0:
-                    count = _covered(
-                        beyond, way, near, far, normals[face], n, corners, normals, inward, starts, owner,
-                        ACROSS / 10 * size, tolerance, spans,
-                    )  # fmt: skip
-                bare, filled = _bare(near, far, spans, count, bare, filled)
-            for each in range(filled):
-                low, high = bare[each]
-                if (high - low) * length <= GAP * size and high - low < 1:
+                    count = _covered_spans(beyond, way, near, far, surface.normals[face], n, surface, inward, spans)
+                bare, filled = _append_uncovered(near, far, spans, count, bare, filled)
+            for span in range(filled):
+                low, high = bare[span]
+                if (high - low) * length <= MIN_BARE_CELLS * size and high - low < 1:
                     continue
                 for piece in range(crossed - 1):
                     near, far = max(low, times[piece]), min(high, times[piece + 1])
                     if (far - near) * length <= tolerance:
                         continue
                     middle = start + (near + far) / 2 * way
-                    cell_of(middle, origin, size, here)
-                    n = cell_index(keys, here[0], here[1], here[2])
+                    cell_of(middle, surface.origin, size, here)
+                    n = cell_index(surface.keys, here[0], here[1], here[2])
                     if n < 0:
                         continue
                     if total == len(cell):
@@ -82,52 +105,58 @@ def boundary_lines(corners, normals, origin, size, keys, starts, owner, toleranc
                     lengths[total] = (far - near) * length
                     total += 1
     order = np.argsort(cell[:total], kind="mergesort")
-    return _merged(cell[order], points[order], directions[order], lengths[order], tolerance)
+    return _merge_lines(cell[order], points[order], directions[order], lengths[order], tolerance)
 
 
 def sides_that_go_on(corners: FloatArray, normals: FloatArray, size: float) -> BoolArray:
-    """Which sides of triangles (f, 3, 3) with these normals they share with one other triangle, which lies in their
-    plane and is no sliver, bool (f, 3): the inner sides of a flat face that is subdivided."""
-    places, _ = weld(corners, 0.0)
-    sides = sides_by_edge(places)
+    """Find the inner sides of flat, subdivided faces, bool (f, 3).
+
+    Such a side is shared with exactly one other triangle, which lies in the same plane and is no sliver.
+    """
+    vertices, _ = weld(corners, 0.0)
+    sides = sides_by_edge(vertices)
     pair = sides.first[sides.count == 2]
     one, other = sides.side[pair], sides.side[pair + 1]
-    # a side that both triangles go the same way lies between two that fold back, or lie one upon the other
-    fits = places.reshape(-1)[one] != places.reshape(-1)[other]
-    fits &= np.linalg.norm(normals[one // 3] - normals[other // 3], axis=1) < SAME_ANGLE
-    found = np.zeros(places.size, dtype=bool)
+    # a side that both triangles run along in the same direction lies between two that fold back or overlap
+    fits = vertices.reshape(-1)[one] != vertices.reshape(-1)[other]
+    fits &= np.linalg.norm(normals[one // 3] - normals[other // 3], axis=1) < SAME_ANGLE_RADIANS
+    inner = np.zeros(vertices.size, dtype=bool)
     for side, across in ((one[fits], other[fits]), (other[fits], one[fits])):
-        found[side] = _heights(corners, across) > BROAD * size
-    return found.reshape(-1, 3)
+        inner[side] = _heights(corners, across) > MIN_HEIGHT_CELLS * size
+    return inner.reshape(-1, 3)
 
 
 def _heights(corners: FloatArray, sides: np.ndarray) -> FloatArray:
-    """How far from each of `sides`, int64 (s,), the third corner of its triangle is, float64 (s,)."""
+    """Return the height of each triangle above its side int64 (s,), float64 (s,)."""
     face, k = sides // 3, sides % 3
     start, end, top = (corners[face, (k + turn) % 3] for turn in range(3))
-    found: FloatArray = np.linalg.norm(np.cross(end - start, top - start), axis=1) / np.linalg.norm(end - start, axis=1)
-    return found
+    cross = np.linalg.norm(np.cross(end - start, top - start), axis=1)
+    heights: FloatArray = cross / np.linalg.norm(end - start, axis=1)
+    return heights
 
 
 @numba.njit(cache=True)
-def _covered(start, way, near, far, normal, n, corners, normals, inward, starts, owner, slack, tolerance, spans):
-    """Where, between shares `near` and `far` of a line through cell `n`, triangles of this normal lie at the line, into
-    `spans` (m, 2); their number."""
+def _covered_spans(start, way, near, far, normal, n, surface, inward, spans):
+    """Write the spans of a line that triangles with this normal cover into `spans` (m, 2); return their number.
+
+    The line runs from shares `near` to `far` of `way` through cell `n`.
+    """
     count = 0
     middle = (near + far) / 2
-    for place in range(starts[n], starts[n + 1]):
-        face = owner[place]
-        apart, off = 0.0, 0.0
+    slack = PROBE_CELLS / 10 * surface.size
+    for place in range(surface.starts[n], surface.starts[n + 1]):
+        face = surface.owner[place]
+        squared, off = 0.0, 0.0
         for d in range(3):
-            apart += (normal[d] - normals[face, d]) ** 2
-            off += normals[face, d] * (start[d] + middle * way[d] - corners[face, 0, d])
-        if apart > SAME_ANGLE**2 or abs(off) > tolerance:
+            squared += (normal[d] - surface.normals[face, d]) ** 2
+            off += surface.normals[face, d] * (start[d] + middle * way[d] - surface.corners[face, 0, d])
+        if squared > SAME_ANGLE_RADIANS**2 or abs(off) > surface.tolerance:
             continue
         low, high = near, far
         for k in range(3):
             at, rise = slack * inward[face, k, 3], 0.0
             for d in range(3):
-                at += inward[face, k, d] * (start[d] - corners[face, k, d])
+                at += inward[face, k, d] * (start[d] - surface.corners[face, k, d])
                 rise += inward[face, k, d] * way[d]
             if rise == 0.0:
                 if at < 0:
@@ -144,20 +173,22 @@ def _covered(start, way, near, far, normal, n, corners, normals, inward, starts,
 
 @numba.njit(cache=True)
 def _inward(corners, normals):
-    """For each side of each triangle the vector into the triangle that is as long as the side, and its length."""
-    found = np.empty((len(corners), 3, 4))
+    """Return, for each side of each triangle, the inward vector of the side's length, and that length."""
+    vectors = np.empty((len(corners), 3, 4))
     for face in range(len(corners)):
         for k in range(3):
             edge = corners[face, (k + 1) % 3] - corners[face, k]
-            found[face, k, :3] = np.cross(normals[face], edge)
-            found[face, k, 3] = np.sqrt((edge * edge).sum())
-    return found
+            vectors[face, k, :3] = np.cross(normals[face], edge)
+            vectors[face, k, 3] = np.sqrt((edge * edge).sum())
+    return vectors
 
 
 @numba.njit(cache=True)
 def _crossings(start, way, origin, size, times):
-    """Shares of `way` at which a line leaves a cell, from 0.0 to 1.0 and ascending, into `times`, which grows; their
-    number."""
+    """Write the shares of `way` at which a line leaves a cell, from 0.0 to 1.0 ascending, into `times`.
+
+    Returns `times`, which may grow, and how many shares there are.
+    """
     filled = 2
     for axis in range(3):
         one, two = (start[axis] - origin[axis]) / size, (start[axis] + way[axis] - origin[axis]) / size
@@ -177,8 +208,8 @@ def _crossings(start, way, origin, size, times):
 
 
 @numba.njit(cache=True)
-def _bare(near, far, spans, count, bare, filled):
-    """What of `near` to `far` no span covers, added to `bare` after `filled`, joined to what ends where it begins."""
+def _append_uncovered(near, far, spans, count, bare, filled):
+    """Append what no span covers between `near` and `far` to `bare`; join it to a piece that ends where it begins."""
     order = np.argsort(spans[:count, 0])
     at = near
     for place in range(count + 1):
@@ -197,8 +228,8 @@ def _bare(near, far, spans, count, bare, filled):
 
 
 @numba.njit(cache=True)
-def _merged(cell, points, directions, lengths, tolerance):
-    """Lines of one cell that are one, once, each at the point of its longest piece."""
+def _merge_lines(cell, points, directions, lengths, tolerance):
+    """Merge equal lines of one cell; a merged line has the point of its longest piece."""
     total, begin = 0, 0
     for place in range(len(cell)):
         if total == 0 or cell[place] != cell[total - 1]:
@@ -207,9 +238,9 @@ def _merged(cell, points, directions, lengths, tolerance):
         known = -1
         for item in range(begin, total):
             off = np.cross(along, directions[item])
-            if (off * off).sum() < SAME_ANGLE**2:
-                apart = np.cross(point - points[item], directions[item])
-                if (apart * apart).sum() < tolerance**2:
+            if (off * off).sum() < SAME_ANGLE_RADIANS**2:
+                across = np.cross(point - points[item], directions[item])
+                if (across * across).sum() < tolerance**2:
                     known = item
                     break
         if known < 0:

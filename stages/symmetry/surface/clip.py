@@ -2,24 +2,58 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.symmetry.surface.lattice import doubled
 
-MOST_CORNERS = 12
-"""A triangle cut by six planes has at most nine corners."""
-SPECK = 1e-9
-"""Fragments below this share of a cell's face are rounding."""
-EVERYWHERE = np.array([[-(2**62)] * 3, [2**62] * 3])
-"""A box that holds all cells."""
+MAX_CORNERS = 12
+"""Room for the corners of a clipped triangle; a triangle cut by six planes has at most nine."""
+MIN_FRAGMENT_SHARE = 1e-9
+"""Fragments below this share of a cell's face are rounding errors."""
+ALL_CELLS = np.array([[-(2**62)] * 3, [2**62] * 3])
+"""A box that contains every cell."""
+
+SIDE_OUT, SIDE_IN, BOTH_SIDES, NO_FRAGMENT = 0, 1, 2, -1
+"""Where the fragments of a layer of cells lie."""
+
+
+class _Fragments(NamedTuple):
+    """What `_all_cuts` knows of the fragments of some triangles.
+
+    origin: float64 (3,), low corner of cell (0, 0, 0)
+    size: width of a cell
+    cells: int64 (m, 3), cell of each fragment
+    inside: bool (m,), side of each fragment
+    starts: int64 (f + 1,), where the fragments of each triangle begin
+    box: int64 (2, 3), lowest and highest cell with fragments
+    """
+
+    origin: np.ndarray
+    size: float
+    cells: np.ndarray
+    inside: np.ndarray
+    starts: np.ndarray
+    box: np.ndarray
+
+
+class _Triangles(NamedTuple):
+    """Growing arrays of output triangles: corners float64 (t, 3, 3), sides int64 (t,), source faces int64 (t,)."""
+
+    corners: np.ndarray
+    sides: np.ndarray
+    faces: np.ndarray
 
 
 @numba.njit(cache=True)
-def _half(polygon, count, axis, bound, sign, out):
-    """The part of a polygon beyond a plane across an axis, or before it where `sign` is -1.0, into `out`; its number of
-    corners."""
+def _clip_half(polygon, count, axis, bound, sign, out):
+    """Write the part of a polygon above a plane across an axis (below it if `sign` is -1.0) into `out`.
+
+    Returns the number of corners.
+    """
     kept = 0
     for k in range(count):
         here, after = polygon[k], polygon[(k + 1) % count]
@@ -37,9 +71,9 @@ def _half(polygon, count, axis, bound, sign, out):
 
 
 @numba.njit(cache=True)
-def _slab(polygon, count, axis, low, high, spare, out):
-    """The part of a polygon between two planes across an axis, into `out`; its number of corners."""
-    return _half(spare, _half(polygon, count, axis, low, 1.0, spare), axis, high, -1.0, out)
+def _clip_slab(polygon, count, axis, low, high, spare, out):
+    """Write the part of a polygon between two planes across an axis into `out`; return its number of corners."""
+    return _clip_half(spare, _clip_half(polygon, count, axis, low, 1.0, spare), axis, high, -1.0, out)
 
 
 @numba.njit(cache=True)
@@ -57,8 +91,8 @@ def _area(polygon, count):
 
 
 @numba.njit(cache=True)
-def _reach(polygon, count, axis, origin, size):
-    """First and last cell of a polygon along an axis."""
+def _cell_range(polygon, count, axis, origin, size):
+    """Return the first and the last cell of a polygon along an axis."""
     low, high = polygon[0, axis], polygon[0, axis]
     for k in range(1, count):
         low, high = min(low, polygon[k, axis]), max(high, polygon[k, axis])
@@ -71,30 +105,30 @@ def _all_fragments(corners, origin, size, low_cell, high_cell):
     faces = np.empty(4 * len(corners) + 16, dtype=np.int64)
     middles = np.empty((4 * len(corners) + 16, 4))
     total = np.int64(0)
-    # not plain numbers: constants have types of their own, for which all that is called would be compiled once more
+    # typed integers: a literal has a type of its own, and every function called with it would be compiled again
     x, y, z, three = np.int64(0), np.int64(1), np.int64(2), np.int64(3)
-    spare, whole = np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 3))
-    of_x, of_y, of_z = np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 3))
+    spare, whole = np.empty((MAX_CORNERS, 3)), np.empty((MAX_CORNERS, 3))
+    of_x, of_y, of_z = np.empty((MAX_CORNERS, 3)), np.empty((MAX_CORNERS, 3)), np.empty((MAX_CORNERS, 3))
     for face in range(len(corners)):
         whole[:3] = corners[face]
-        first_i, last_i = _reach(whole, three, x, origin, size)
+        first_i, last_i = _cell_range(whole, three, x, origin, size)
         for i in range(max(first_i, low_cell[0]), min(last_i, high_cell[0]) + 1):
             low = origin[0] + i * size
-            in_x = _slab(whole, three, x, low, low + size, spare, of_x)
+            in_x = _clip_slab(whole, three, x, low, low + size, spare, of_x)
             if in_x < 3:
                 continue
-            first_j, last_j = _reach(of_x, in_x, y, origin, size)
+            first_j, last_j = _cell_range(of_x, in_x, y, origin, size)
             for j in range(max(first_j, low_cell[1]), min(last_j, high_cell[1]) + 1):
                 low = origin[1] + j * size
-                in_y = _slab(of_x, in_x, y, low, low + size, spare, of_y)
+                in_y = _clip_slab(of_x, in_x, y, low, low + size, spare, of_y)
                 if in_y < 3:
                     continue
-                first_k, last_k = _reach(of_y, in_y, z, origin, size)
+                first_k, last_k = _cell_range(of_y, in_y, z, origin, size)
                 for k in range(max(first_k, low_cell[2]), min(last_k, high_cell[2]) + 1):
                     low = origin[2] + k * size
-                    in_z = _slab(of_y, in_y, z, low, low + size, spare, of_z)
+                    in_z = _clip_slab(of_y, in_y, z, low, low + size, spare, of_z)
                     area = _area(of_z, in_z) if in_z > 2 else 0.0
-                    if area <= SPECK * size * size:
+                    if area <= MIN_FRAGMENT_SHARE * size * size:
                         continue
                     if total == len(faces):
                         cells, faces, middles = doubled(cells), doubled(faces), doubled(middles)
@@ -108,140 +142,138 @@ def _all_fragments(corners, origin, size, low_cell, high_cell):
 
 
 def fragments(
-    corners: FloatArray, origin: FloatArray, size: float, box: np.ndarray = EVERYWHERE
+    corners: FloatArray, origin: FloatArray, size: float, box: np.ndarray = ALL_CELLS
 ) -> tuple[np.ndarray, np.ndarray, FloatArray]:
-    """The pieces into which cells cut triangles `corners` (f, 3, 3), in the triangles' order; of cells from `box[0]` to
-    `box[1]`, int64 (2, 3), alone.
+    """Cut triangles along the cells of a lattice.
 
-    Cell of each piece, int64 (m, 3); its triangle, int64 (m,); a point inside it and its area, float64 (m, 4). Cell
-    (i, j, k) lies between `origin + size * (i, j, k)` and the same of (i + 1, j + 1, k + 1).
+    corners: float64 (f, 3, 3)
+    origin: float64 (3,); cell (i, j, k) begins at `origin + size * (i, j, k)`
+    box: int64 (2, 3), lowest and highest cell to return
+
+    Returns, in the order of the triangles, the cell of each fragment, int64 (m, 3); its triangle, int64 (m,); a point
+    inside it and its area, float64 (m, 4).
     """
-    found: tuple[np.ndarray, np.ndarray, FloatArray] = _all_fragments(
+    cut: tuple[np.ndarray, np.ndarray, FloatArray] = _all_fragments(
         np.ascontiguousarray(corners), origin, size, box[0], box[1]
     )
-    return found
+    return cut
 
 
 @numba.njit(cache=True)
-def _emit(polygon, count, size, side, face, triangles, sides, faces, total):
-    """Add a polygon as a fan of triangles."""
-    if count < 3 or _area(polygon, count) <= SPECK * size * size:
-        return triangles, sides, faces, total
+def _emit(polygon, count, size, side, face, output, total):
+    """Append a polygon to the output as a fan of triangles; return the output and its length."""
+    if count < 3 or _area(polygon, count) <= MIN_FRAGMENT_SHARE * size * size:
+        return output, total
     for k in range(1, count - 1):
-        if total == len(faces):
-            triangles, sides, faces = doubled(triangles), doubled(sides), doubled(faces)
-        triangles[total, 0], triangles[total, 1], triangles[total, 2] = polygon[0], polygon[k], polygon[k + 1]
-        sides[total], faces[total] = side, face
+        if total == len(output.faces):
+            output = _Triangles(doubled(output.corners), doubled(output.sides), doubled(output.faces))
+        triangle = output.corners[total]
+        triangle[0], triangle[1], triangle[2] = polygon[0], polygon[k], polygon[k + 1]
+        output.sides[total], output.faces[total] = side, face
         total += 1
-    return triangles, sides, faces, total
+    return output, total
 
 
 @numba.njit(cache=True)
-def _sides_along(
-    cells, inside, begin, end, axis, i, j, first, last, found, polygon, count, origin, size, box, spare, out
-):
-    """For each cell layer of a polygon along an axis whether its fragments lie outside (0), inside (1), on both sides
-    (2) or are none (-1); with `i` and `j` of fragments in that layer (and row) alone. Beyond the box there is no
-    fragment, and all is outside."""
-    found[: last - first + 1] = -1
-    for place in range(begin, end):
-        if (axis > 0 and cells[place, 0] != i) or (axis > 1 and cells[place, 1] != j):
+def _layer_sides(known, face, axis, i, j, first, last, polygon, count, spare, out):
+    """Return the side of each layer of cells from `first` to `last` along an axis, int64 (last - first + 1,).
+
+    A layer is SIDE_OUT, SIDE_IN, on BOTH_SIDES, or has NO_FRAGMENT. Across the second axis only fragments with first
+    index `i` count, across the third also only those with second index `j`. Cells beyond the box are SIDE_OUT.
+    """
+    sides = np.full(last - first + 1, NO_FRAGMENT, dtype=np.int64)
+    for fragment in range(known.starts[face], known.starts[face + 1]):
+        if (axis > 0 and known.cells[fragment, 0] != i) or (axis > 1 and known.cells[fragment, 1] != j):
             continue
-        layer = cells[place, axis] - first
+        layer = known.cells[fragment, axis] - first
         if layer < 0 or layer > last - first:
             continue
-        side = 1 if inside[place] else 0
-        found[layer] = side if found[layer] in (-1, side) else 2
+        side = SIDE_IN if known.inside[fragment] else SIDE_OUT
+        sides[layer] = side if sides[layer] in (NO_FRAGMENT, side) else BOTH_SIDES
     for layer in range(last - first + 1):
-        if not box[0, axis] <= first + layer <= box[1, axis]:
-            found[layer] = 0
+        if not known.box[0, axis] <= first + layer <= known.box[1, axis]:
+            sides[layer] = SIDE_OUT
     for other in range(axis + 1, 3):
-        low, high = _reach(polygon, count, other, origin, size)
-        if low >= box[0, other] and high <= box[1, other]:
+        low, high = _cell_range(polygon, count, other, known.origin, known.size)
+        if low >= known.box[0, other] and high <= known.box[1, other]:
             continue
         for layer in range(last - first + 1):
-            if found[layer] == 1:
-                start = origin[axis] + (first + layer) * size
-                held = _slab(polygon, count, axis, start, start + size, spare, out)
-                if held > 2:
-                    low, high = _reach(out, held, other, origin, size)
-                    if low < box[0, other] or high > box[1, other]:
-                        found[layer] = 2
+            if sides[layer] == SIDE_IN:
+                start = known.origin[axis] + (first + layer) * known.size
+                corners = _clip_slab(polygon, count, axis, start, start + known.size, spare, out)
+                if corners > 2:
+                    low, high = _cell_range(out, corners, other, known.origin, known.size)
+                    if low < known.box[0, other] or high > known.box[1, other]:
+                        sides[layer] = BOTH_SIDES
+    return sides
 
 
 @numba.njit(cache=True)
-def _run(found, start, count):
-    """Where the run of layers of one side ends that begins at `start`, and its side; layers on both sides stand alone,
-    layers without fragments go with what is before them."""
-    side = found[start]
+def _run(sides, start):
+    """Return where the run of layers of one side that begins at `start` ends, and its side.
+
+    A layer on both sides is a run of its own. Layers without fragments join the run before them.
+    """
+    side = sides[start]
     after = start + 1
-    while side != 2 and after < count and (found[after] in (-1, side) or side == -1):
-        side = max(side, found[after])
-        if side == 2:
-            return after, -1
+    while side != BOTH_SIDES and after < len(sides) and (sides[after] in (NO_FRAGMENT, side) or side == NO_FRAGMENT):
+        side = max(side, sides[after])
+        if side == BOTH_SIDES:
+            return after, NO_FRAGMENT
         after += 1
     return after, side
 
 
 @numba.njit(cache=True)
-def _all_cuts(corners, origin, size, cells, owner_starts, inside, box):
-    triangles = np.empty((4 * len(corners) + 16, 3, 3))
-    sides, faces = np.empty(len(triangles), dtype=np.int64), np.empty(len(triangles), dtype=np.int64)
+def _all_cuts(corners, known):
+    """Cut each triangle along x into runs of layers of one side, mixed layers along y, and mixed rows along z."""
+    room = 4 * len(corners) + 16
+    output = _Triangles(np.empty((room, 3, 3)), np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64))
+    origin, size = known.origin, known.size
     total = np.int64(0)
     x, y, z, three = np.int64(0), np.int64(1), np.int64(2), np.int64(3)  # as in _all_fragments
-    spare, whole = np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 3))
-    of_x, of_y, of_z = np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 3))
+    spare, whole = np.empty((MAX_CORNERS, 3)), np.empty((MAX_CORNERS, 3))
+    of_x, of_y, of_z = np.empty((MAX_CORNERS, 3)), np.empty((MAX_CORNERS, 3)), np.empty((MAX_CORNERS, 3))
     for face in range(len(corners)):
         whole[:3] = corners[face]
-        begin, end = owner_starts[face], owner_starts[face + 1]
-        first_i, last_i = _reach(whole, three, x, origin, size)
-        along_x = np.empty(last_i - first_i + 1, dtype=np.int64)
-        _sides_along(
-            cells, inside, begin, end, x, x, x, first_i, last_i, along_x, whole, three, origin, size, box, spare, of_x
-        )
+        first_i, last_i = _cell_range(whole, three, x, origin, size)
+        along_x = _layer_sides(known, face, x, x, x, first_i, last_i, whole, three, spare, of_x)
         start_x = np.int64(0)
         while start_x < len(along_x):
-            end_x, side = _run(along_x, start_x, len(along_x))
+            end_x, side = _run(along_x, start_x)
             low = origin[0] + (first_i + start_x) * size
-            in_x = _slab(whole, three, x, low, origin[0] + (first_i + end_x) * size, spare, of_x)
+            in_x = _clip_slab(whole, three, x, low, origin[0] + (first_i + end_x) * size, spare, of_x)
             i = first_i + start_x
             start_x = end_x
-            if side != 2:
-                triangles, sides, faces, total = _emit(of_x, in_x, size, side, face, triangles, sides, faces, total)
+            if side != BOTH_SIDES:
+                output, total = _emit(of_x, in_x, size, side, face, output, total)
                 continue
             if in_x < 3:
                 continue
-            first_j, last_j = _reach(of_x, in_x, y, origin, size)
-            along_y = np.empty(last_j - first_j + 1, dtype=np.int64)
-            _sides_along(
-                cells, inside, begin, end, y, i, x, first_j, last_j, along_y, of_x, in_x, origin, size, box, spare, of_y
-            )
+            first_j, last_j = _cell_range(of_x, in_x, y, origin, size)
+            along_y = _layer_sides(known, face, y, i, x, first_j, last_j, of_x, in_x, spare, of_y)
             start_y = np.int64(0)
             while start_y < len(along_y):
-                end_y, side = _run(along_y, start_y, len(along_y))
+                end_y, side = _run(along_y, start_y)
                 low = origin[1] + (first_j + start_y) * size
-                in_y = _slab(of_x, in_x, y, low, origin[1] + (first_j + end_y) * size, spare, of_y)
+                in_y = _clip_slab(of_x, in_x, y, low, origin[1] + (first_j + end_y) * size, spare, of_y)
                 j = first_j + start_y
                 start_y = end_y
-                if side != 2:
-                    triangles, sides, faces, total = _emit(of_y, in_y, size, side, face, triangles, sides, faces, total)
+                if side != BOTH_SIDES:
+                    output, total = _emit(of_y, in_y, size, side, face, output, total)
                     continue
                 if in_y < 3:
                     continue
-                first_k, last_k = _reach(of_y, in_y, z, origin, size)
-                along_z = np.empty(last_k - first_k + 1, dtype=np.int64)
-                _sides_along(
-                    cells, inside, begin, end, z, i, j, first_k, last_k, along_z,
-                    of_y, in_y, origin, size, box, spare, of_z,
-                )  # fmt: skip
+                first_k, last_k = _cell_range(of_y, in_y, z, origin, size)
+                along_z = _layer_sides(known, face, z, i, j, first_k, last_k, of_y, in_y, spare, of_z)
                 start_z = np.int64(0)
                 while start_z < len(along_z):
-                    end_z, side = _run(along_z, start_z, len(along_z))
+                    end_z, side = _run(along_z, start_z)
                     low = origin[2] + (first_k + start_z) * size
-                    in_z = _slab(of_y, in_y, z, low, origin[2] + (first_k + end_z) * size, spare, of_z)
+                    in_z = _clip_slab(of_y, in_y, z, low, origin[2] + (first_k + end_z) * size, spare, of_z)
                     start_z = end_z
-                    triangles, sides, faces, total = _emit(of_z, in_z, size, side, face, triangles, sides, faces, total)
-    return triangles[:total], sides[:total], faces[:total]
+                    output, total = _emit(of_z, in_z, size, side, face, output, total)
+    return output.corners[:total], output.sides[:total], output.faces[:total]
 
 
 def cut_triangles(
@@ -253,12 +285,16 @@ def cut_triangles(
     inside: BoolArray,
     box: np.ndarray,
 ) -> tuple[FloatArray, BoolArray, IntArray]:
-    """Triangles cut where cells that are inside meet cells that are not, and nowhere else.
+    """Cut triangles where inside cells meet other cells, and nowhere else.
 
-    corners: float64 (f, 3, 3), each with something on both sides; cells int64 (m, 3) and faces int64 (m,) of their
-    `fragments` in `box` int64 (2, 3), of which bool (m,) `inside` says the side; beyond the box all is outside. Returns
-    triangles float64 (t, 3, 3), their side and the triangle that each is of, int32 (t,).
+    corners: float64 (f, 3, 3), each with a part on both sides
+    cells, faces: int64 (m, 3) and int64 (m,), of the triangles' `fragments` in `box`
+    inside: bool (m,), side of each fragment
+    box: int64 (2, 3), lowest and highest cell; everything beyond is outside
+
+    Returns triangles float64 (t, 3, 3), whether each is inside, and the triangle that it is part of, int32 (t,).
     """
     starts = np.searchsorted(faces, np.arange(len(corners) + 1))
-    triangles, sides, owners = _all_cuts(np.ascontiguousarray(corners), origin, size, cells, starts, inside, box)
-    return triangles, sides == 1, owners.astype(np.int32)
+    known = _Fragments(origin, size, cells, inside, starts, box)
+    triangles, sides, owners = _all_cuts(np.ascontiguousarray(corners), known)
+    return triangles, sides == SIDE_IN, owners.astype(np.int32)

@@ -1,4 +1,4 @@
-"""Corners of feature lines with coordinate frames: what candidates for symmetries are aligned by (symmetry §4.1)."""
+"""Corners of feature lines with coordinate frames, by which symmetry candidates are aligned (symmetry §4.1)."""
 
 from __future__ import annotations
 
@@ -10,21 +10,26 @@ from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.triangles import unit_normals
 from stages.symmetry.surface.welding import sides_by_edge, weld
 
-CREASE = 0.4
-"""Radians between the normals at an edge from which on it is a feature line."""
-STRAIGHT = 0.2
-"""Sine of the angle of two feature lines from which on they make a corner."""
-MOST_LINES = 8
-"""Corners of more feature lines are no corners but tips of cones."""
+MIN_CREASE_RADIANS = 0.4
+"""Smallest angle between the normals at an edge that makes it a feature line."""
+MIN_CORNER_SINE = 0.2
+"""Two feature lines make a corner if the sine of their angle is larger."""
+MAX_LINES_PER_CORNER = 8
+"""Where more feature lines meet there is no corner but the tip of a cone."""
+KIND_DECIMALS = 2
+"""Decimals to which kinds of frames on meshes are compared."""
 
 
 @dataclass(frozen=True)
 class CornerFrames:
-    """Right-handed frames in corners of feature lines, float64 (m, 4, 4): the first axis runs along a line, the second
-    lies in the plane of it and another.
+    """Right-handed frames in corners of feature lines.
 
-    kinds: float64 (m, 4): of a frame the angle of its lines, the turn of the surface at each, and the bend of the
-    corner; frames that a symmetry can align agree in them. lengths: float64 (m, 2), of the two edges.
+    The first axis runs along a line, the second lies in the plane of it and another line.
+
+    frames: float64 (m, 4, 4)
+    kinds: float64 (m, 4), cosine of the angle of the two lines, turn of the surface at each, and bend of the corner;
+        frames that a symmetry can align agree in them
+    lengths: float64 (m, 2), of the two lines
     """
 
     frames: FloatArray
@@ -33,47 +38,66 @@ class CornerFrames:
 
 
 def corner_frames(corners: FloatArray, tolerance: float) -> CornerFrames:
-    """The frames of triangles `corners` (f, 3, 3); points closer than about `tolerance` are one.
+    """Find the corner frames of triangles (f, 3, 3); points closer than about `tolerance` are the same.
 
-    Of each corner those frames are taken whose kind is the first in order, all of them where several are equal.
+    Each corner has the frames of the kind that sorts first, all of them if several are equal.
     """
-    places, vertices = weld(corners, tolerance)
+    indices, vertices = weld(corners, tolerance)
     normals = unit_normals(corners)
-    edges, turns, outwards = creases(places, normals)
+    edges, turns, outwards = creases(indices, normals)
     ends = np.concatenate([edges, edges[:, ::-1]])
     turns, outwards = np.concatenate([turns, turns]), np.concatenate([outwards, outwards])
     ways = vertices[ends[:, 1]] - vertices[ends[:, 0]]
     lengths = np.linalg.norm(ways, axis=1)
     real = lengths > tolerance
     ends, turns, outwards, ways, lengths = ends[real], turns[real], outwards[real], ways[real], lengths[real]
-    ways = ways / lengths[:, None]
-    order = np.lexsort((ends[:, 1], ends[:, 0]))
-    return frames_of_lines(
-        ends[order, 0], vertices[ends[order, 0]], ways[order], lengths[order], turns[order], outwards[order], 2
-    )
+    lines = FeatureLines(ends[:, 0], vertices[ends[:, 0]], ways / lengths[:, None], lengths, turns, outwards)
+    return frames_of_lines(lines.select(np.lexsort((ends[:, 1], ends[:, 0]))), KIND_DECIMALS)
 
 
-def frames_of_lines(
-    corner: np.ndarray,
-    at: FloatArray,
-    ways: FloatArray,
-    lengths: FloatArray,
-    turns: FloatArray,
-    outwards: FloatArray,
-    decimals: int,
-) -> CornerFrames:
-    """The frames of feature lines that begin in corners. Of each line: the number of its corner, int (m,), ascending;
-    where that is, and the way that the line goes, float64 (m, 3) each; its length and the turn of the surface there,
-    float64 (m,) each; and the sum of the normals beside it, float64 (m, 3). Kinds are compared to so many decimals."""
-    first, second = _pairs(corner)
+@dataclass(frozen=True)
+class FeatureLines:
+    """Feature lines that begin in corners.
+
+    corner: int64 (m,), number of the corner
+    at: float64 (m, 3), position of the corner
+    ways: float64 (m, 3), unit directions
+    lengths: float64 (m,)
+    turns: float64 (m,), turn of the surface at the line, in radians
+    outwards: float64 (m, 3), sum of the two normals at the line
+    """
+
+    corner: np.ndarray
+    at: FloatArray
+    ways: FloatArray
+    lengths: FloatArray
+    turns: FloatArray
+    outwards: FloatArray
+
+    def select(self, order: np.ndarray) -> FeatureLines:
+        """Return the lines with indices int64 (k,)."""
+        return FeatureLines(
+            self.corner[order],
+            self.at[order],
+            self.ways[order],
+            self.lengths[order],
+            self.turns[order],
+            self.outwards[order],
+        )
+
+
+def frames_of_lines(lines: FeatureLines, decimals: int) -> CornerFrames:
+    """Make the frames of feature lines, which are in the order of their corners; compare kinds to so few decimals."""
+    ways, turns = lines.ways, lines.turns
+    first, second = _pairs(lines.corner)
     across = ways[second] - (ways[first] * ways[second]).sum(axis=1)[:, None] * ways[first]
     sine = np.linalg.norm(across, axis=1)
-    bent = sine > STRAIGHT
+    bent = sine > MIN_CORNER_SINE
     first, second, across = first[bent], second[bent], across[bent] / sine[bent, None]
     frames = np.zeros((len(first), 4, 4))
     frames[:, :3, 0], frames[:, :3, 1], frames[:, :3, 2] = ways[first], across, np.cross(ways[first], across)
-    frames[:, :3, 3], frames[:, 3, 3] = at[first], 1.0
-    outward = outwards[first] + outwards[second]
+    frames[:, :3, 3], frames[:, 3, 3] = lines.at[first], 1.0
+    outward = lines.outwards[first] + lines.outwards[second]
     kinds = np.column_stack(
         [
             (ways[first] * ways[second]).sum(axis=1),
@@ -83,29 +107,35 @@ def frames_of_lines(
         ]
     )
     kinds = np.round(kinds, decimals) + 0.0
-    chosen = _first_of_corner(corner[first], kinds)
-    return CornerFrames(frames[chosen], kinds[chosen], np.column_stack([lengths[first], lengths[second]])[chosen])
+    chosen = _first_of_corner(lines.corner[first], kinds)
+    lengths = np.column_stack([lines.lengths[first], lines.lengths[second]])
+    return CornerFrames(frames[chosen], kinds[chosen], lengths[chosen])
 
 
-def creases(places: IntArray, normals: FloatArray) -> tuple[np.ndarray, FloatArray, FloatArray]:
-    """Edges at which the surface turns or ends, int64 (e, 2), how far it turns, in radians, -1 where it ends or more
-    than two triangles meet, and the sum of the normals there, float64 (e, 3)."""
-    sides = sides_by_edge(places)
+def creases(indices: IntArray, normals: FloatArray) -> tuple[np.ndarray, FloatArray, FloatArray]:
+    """Find the edges of welded triangles (f, 3) at which the surface turns or ends.
+
+    Returns the edges, int64 (e, 2); their turns in radians, float64 (e,), -1 where the surface ends or more than two
+    triangles meet; and the sums of the normals there, float64 (e, 3).
+    """
+    sides = sides_by_edge(indices)
     first, count = sides.first, sides.count
     one, two = sides.side[first] // 3, sides.side[first + count - 1] // 3
     turn = np.arccos(np.clip((normals[one] * normals[two]).sum(axis=1), -1.0, 1.0))
     turn[count != 2] = -1.0
-    crease = (turn > CREASE) | (count != 2)
+    crease = (turn > MIN_CREASE_RADIANS) | (count != 2)
     edges = np.column_stack([sides.low[first], sides.high[first]])
     return edges[crease], turn[crease], (normals[one] + normals[two])[crease]
 
 
 def _pairs(corner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All ordered pairs of different places with one value in the sorted int64 (n,) `corner`, of values that occur at
-    most MOST_LINES times."""
+    """Return all ordered pairs of different lines of one corner, as indices into the sorted int64 (n,) `corner`.
+
+    Corners of more than MAX_LINES_PER_CORNER lines are left out.
+    """
     first = np.flatnonzero(np.r_[True, corner[1:] != corner[:-1]][: len(corner)])
     count = np.diff(np.r_[first, len(corner)])
-    count[count > MOST_LINES] = 0
+    count[count > MAX_LINES_PER_CORNER] = 0
     start = np.repeat(first, count**2)
     width = np.repeat(count, count**2)
     number = np.arange(len(start)) - np.repeat(np.cumsum(count**2) - count**2, count**2)
@@ -114,7 +144,7 @@ def _pairs(corner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _first_of_corner(corner: np.ndarray, kinds: FloatArray) -> np.ndarray:
-    """The places of the frames of each corner with its first kind, ascending by corner."""
+    """Return the indices of the frames of each corner that have its first kind, ascending by corner."""
     order = np.lexsort((*kinds.T[::-1], corner))
     ordered = corner[order]
     starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]][: len(ordered)])

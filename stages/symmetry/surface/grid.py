@@ -1,4 +1,4 @@
-"""A surface on a sparse voxel grid: in each cell the planes and the boundary lines of its triangles (symmetry §4)."""
+"""A surface on a sparse voxel grid: the planes and the boundary lines of its triangles in each cell (symmetry §4)."""
 
 from __future__ import annotations
 
@@ -9,33 +9,48 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.triangles import triangle_areas, unit_normals
-from stages.symmetry.surface.boundary_lines import SAME_ANGLE, boundary_lines, sides_that_go_on
+from stages.symmetry.surface.boundary_lines import (
+    SAME_ANGLE_RADIANS,
+    GridTriangles,
+    boundary_lines,
+    sides_that_go_on,
+)
 from stages.symmetry.surface.clip import fragments
 from stages.symmetry.surface.lattice import neighbours_of, pack, unpack
 
 CELLS_PER_RADIUS = 4
-"""Cells have a quarter of the radius of similarity (symmetry §4)."""
-SAME_PLACE = 1e-2
-"""Planes and lines closer than this share of a cell are one."""
-THIN = 1e-7
-"""A triangle whose height is below this share of its longest side has no area."""
-SHIFT = (0.3819660113, 0.2360679775, 0.1458980338)
-"""Where in its cell the lowest corner lies: planes of models stand at round numbers, borders of cells should not."""
+"""The radius of similarity, in cells (symmetry §4)."""
+SAME_POSITION_CELLS = 1e-2
+"""Planes and lines that are closer, in cells, are the same."""
+MIN_HEIGHT_SHARE = 1e-7
+"""A triangle of less height, as a share of its longest side, has no area."""
+LATTICE_OFFSET_CELLS = (0.3819660113, 0.2360679775, 0.1458980338)
+"""Position of the lowest corner in its cell: planes of models lie at round numbers, borders of cells should not."""
 
 
 @dataclass(frozen=True)
 class SurfaceGrid:
-    """Occupied cells of a cubic lattice in ascending order of `keys`, with what lies in them.
+    """Occupied cells of a cubic lattice, and the items in them: planes and boundary lines.
 
-    corners: float64 (f, 3, 3), triangles with area; faces: int32 (f,), their place in the mesh.
-    keys: int64 (n,), packed cells; cells: int64 (n, 3); neighbours: int32 (n, 26), -1 where a neighbour is empty;
-    area: float64 (n,). Items are planes (`is_line` False, `directions` outward normals) and boundary lines
-    (`directions` along them, either way): item_cell int32 (i,) ascending, points float64 (i, 3) on the surface,
-    directions float64 (i, 3), is_line bool (i,); starts int64 (n + 1,) of each cell's items.
-    radius: of similarity; size: of a cell. tolerance, same_angle: distance and radians up to which planes and lines are
-    one; agreement: share of items that must agree where a surface is the same, 1 for exact ones. weak: bool (i,),
-    items that may be missing where a surface is the same, if there are any. splats: whether
-    triangles stand for points, one each, so that none is ever cut.
+    corners: float64 (f, 3, 3), triangles with area
+    faces: int32 (f,), their indices in the mesh
+    origin: float64 (3,), low corner of cell (0, 0, 0)
+    cell_size: width of a cell
+    radius: of similarity
+    keys: int64 (n,), packed cells, ascending
+    cells: int64 (n, 3)
+    neighbours: int32 (n, 26), -1 for empty neighbours
+    area: float64 (n,), of the surface in each cell
+    item_cell: int32 (i,), cell of each item, ascending
+    points: float64 (i, 3), a point of each item on the surface
+    directions: float64 (i, 3), outward normals of planes; directions of lines, of either sign
+    is_line: bool (i,)
+    starts: int64 (n + 1,), where the items of each cell begin
+    tolerance: distance up to which items are the same
+    same_angle: radians up to which items are the same
+    agreement: share of items that must agree where the surface is the same; 1 for exact surfaces
+    weak: bool (i,), items that may be missing where the surface is the same; None for none
+    splats: whether triangles stand for points, one each; splats are never cut
     """
 
     corners: FloatArray
@@ -53,7 +68,7 @@ class SurfaceGrid:
     is_line: np.ndarray
     starts: np.ndarray
     tolerance: float
-    same_angle: float = SAME_ANGLE
+    same_angle: float = SAME_ANGLE_RADIANS
     agreement: float = 1.0
     weak: BoolArray | None = None
     splats: bool = False
@@ -63,23 +78,27 @@ class SurfaceGrid:
 
     @property
     def slack(self) -> float:
-        """By so much shares of surfaces may differ that are the same: 0 for exact ones."""
+        """Allowed difference of shares on equal surfaces: 0 for exact ones."""
         return (1 - self.agreement) / 5
+
+    def centres(self, cells: np.ndarray | slice = slice(None)) -> FloatArray:
+        """Return the centres of cells, by their indices, float64 (m, 3)."""
+        centres: FloatArray = self.origin + (self.cells[cells] + 0.5) * self.cell_size
+        return centres
 
 
 def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
-    """The grid of triangles `corners` (f, 3, 3) for a radius of `share` of their box's longest side.
+    """Build the grid of triangles (f, 3, 3) for a radius of `share` of the longest side of their box.
 
-    Triangles without area are left out, of however many sides of a sliver that is the height. A side of a triangle is a
-    boundary where the triangle's plane does not go on beyond it, whatever the mesh's connectivity: so T-junctions and
-    doublets make none.
+    Triangles without area are left out. A side of a triangle is a boundary where the triangle's plane ends, whatever
+    the connectivity of the mesh, so that T-junctions and duplicate triangles make no boundary.
     """
     faces = np.flatnonzero(has_area(corners))
     corners = np.ascontiguousarray(corners[faces])
     low = corners.min(axis=(0, 1))
     radius = share * float((corners.max(axis=(0, 1)) - low).max())
     size = radius / CELLS_PER_RADIUS
-    origin = low - size * (np.array(SHIFT) + 2)
+    origin = low - size * (np.array(LATTICE_OFFSET_CELLS) + 2)
     where, owner, middles = fragments(corners, origin, size)
     packed = pack(where)
     order = np.argsort(packed, kind="stable")
@@ -88,11 +107,11 @@ def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
     cells = unpack(keys)
     normals = unit_normals(corners)
     starts = np.append(first, len(packed))
-    tolerance = SAME_PLACE * size
+    tolerance = SAME_POSITION_CELLS * size
     planes = _planes(starts, owner, middles, normals, tolerance)
-    goes_on = sides_that_go_on(corners, normals, size)
-    lines = boundary_lines(corners, normals, origin, size, keys, starts, owner, tolerance, goes_on)
-    item_cell, points, directions, is_line = _joined(planes, lines)
+    triangles = GridTriangles(corners, normals, origin, size, keys, starts, owner, tolerance)
+    lines = boundary_lines(triangles, sides_that_go_on(corners, normals, size))
+    item_cell, points, directions, is_line = _in_cell_order(planes, lines)
     return SurfaceGrid(
         corners=corners,
         faces=faces.astype(np.int32),
@@ -113,8 +132,11 @@ def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
 
 
 def estimate_grid_size(corners: FloatArray, radius: float) -> int:
-    """How many triangles (f, 3, 3) have area, and about how many cells they lie in, for a radius as a share of the
-    longest side. A plane at a random slant crosses 3/2 cells of a lattice for each square as wide as a cell."""
+    """Estimate how large a search for symmetries is: the number of triangles (f, 3, 3) with area and of their cells.
+
+    radius: of similarity, as a share of the longest side. A plane at a random slant crosses 3/2 cells of a lattice for
+    each square as wide as a cell.
+    """
     corners = corners[has_area(corners)]
     if not len(corners):
         return 0
@@ -124,15 +146,15 @@ def estimate_grid_size(corners: FloatArray, radius: float) -> int:
 
 
 def has_area(corners: FloatArray) -> BoolArray:
-    """Which of triangles (f, 3, 3) have area, bool (f,)."""
+    """Find the triangles (f, 3, 3) that have area, bool (f,)."""
     sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
-    found: BoolArray = 2 * triangle_areas(corners) > THIN * sides**2
-    return found
+    chosen: BoolArray = 2 * triangle_areas(corners) > MIN_HEIGHT_SHARE * sides**2
+    return chosen
 
 
 @numba.njit(cache=True)
 def _planes(starts, owner, middles, normals, tolerance):
-    """Cell, point and normal of each plane of each cell; of a plane's fragments the largest says the point."""
+    """Return cell, point and normal of each plane of each cell; the point is that of its largest fragment."""
     cell, size = np.empty(len(owner), dtype=np.int64), np.empty(len(owner))
     points, directions = np.empty((len(owner), 3)), np.empty((len(owner), 3))
     total = 0
@@ -142,8 +164,8 @@ def _planes(starts, owner, middles, normals, tolerance):
             normal, middle = normals[owner[place]], middles[place]
             known = -1
             for item in range(begin, total):
-                apart = normal - directions[item]
-                if (apart * apart).sum() < SAME_ANGLE**2 and abs(
+                difference = normal - directions[item]
+                if (difference * difference).sum() < SAME_ANGLE_RADIANS**2 and abs(
                     (normal * (middle[:3] - points[item])).sum()
                 ) < tolerance:
                     known = item
@@ -157,10 +179,10 @@ def _planes(starts, owner, middles, normals, tolerance):
     return cell[:total], points[:total], directions[:total]
 
 
-def _joined(
+def _in_cell_order(
     planes: tuple[np.ndarray, ...], lines: tuple[np.ndarray, ...]
 ) -> tuple[IntArray, FloatArray, FloatArray, np.ndarray]:
-    """Planes and lines as items in the order of their cells."""
+    """Join planes and lines to items in the order of their cells."""
     cell = np.concatenate([planes[0], lines[0]])
     order = np.argsort(cell, kind="stable")
     is_line = np.arange(len(cell)) >= len(planes[0])

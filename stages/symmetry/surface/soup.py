@@ -1,4 +1,4 @@
-"""The original triangles, cut along the borders of cells (symmetry §4)."""
+"""Triangle soups of the original surface, cut along the borders of cells (symmetry §4)."""
 
 from __future__ import annotations
 
@@ -17,15 +17,21 @@ from stages.symmetry.surface.clip import cut_triangles, fragments
 from stages.symmetry.surface.grid import SurfaceGrid
 from stages.symmetry.surface.lattice import cell_index, cell_keys, cell_of
 
-BLOCK = 4
-"""Triangles are looked at that come near blocks of so many cells along each axis in which there is something to cut."""
-NEAR = 1e-3
-"""How near to a block, as a share of its width."""
+BLOCK_CELLS = 4
+"""Width of the blocks, in cells, by which triangles near the cut are found."""
+BLOCK_MARGIN = 1e-3
+"""Triangles count as near a block within this share of its width, so that rounding decides nothing."""
+NEIGHBOUR_CELLS = 1.8
+"""Cells are neighbours if their indices differ by less: sqrt(3) is the diagonal of a cell."""
 
 
 @dataclass(frozen=True)
 class Soup:
-    """Triangles of a mesh or pieces of them: corners float64 (t, 3, 3), and of which face each is, int32 (t,)."""
+    """Triangles of a mesh, or pieces of them.
+
+    corners: float64 (t, 3, 3)
+    faces: int32 (t,), the face of the mesh that each is part of
+    """
 
     corners: FloatArray
     faces: IntArray
@@ -34,7 +40,7 @@ class Soup:
         return len(self.faces)
 
     def select(self, chosen: np.ndarray) -> Soup:
-        """The triangles that are `chosen`, bool (t,) or indices."""
+        """Return the triangles that are `chosen`, bool (t,) or indices."""
         return Soup(self.corners[chosen], self.faces[chosen])
 
     @cached_property
@@ -49,77 +55,79 @@ class Soup:
 
 
 def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> tuple[Soup, Soup]:
-    """What of `soup` lies in the cells of `grid` with places `cells`, moved by `pose` (4, 4), and what does not.
+    """Split a soup into what lies in cells of a grid moved by `pose` (4, 4), and the rest.
 
-    Triangles are cut where they leave the cells, and nowhere else, so that both sides of a seam have one border; splats
-    are not cut, and are where their middles are.
+    cells: int32, indices of the cells, ascending. Triangles are cut where they leave the cells and nowhere else, so
+    that both sides of a seam have the same border. Splats are not cut; they lie where their centres are.
     """
     if grid.splats:
-        inside = middles_in(soup, grid, cells, pose)
+        inside = centres_in(soup, grid, cells, pose)
         return soup.select(inside), soup.select(~inside)
     chosen = grid.cells[cells]
     box = np.array([chosen.min(axis=0), chosen.max(axis=0)])
     bounds = grid.origin + grid.cell_size * np.array([box[0], box[1] + 1])
-    blocks = np.zeros((box[1] - box[0]) // BLOCK + 1, dtype=bool)
-    blocks[tuple(((chosen - box[0]) // BLOCK).T)] = True
+    blocks = np.zeros((box[1] - box[0]) // BLOCK_CELLS + 1, dtype=bool)
+    blocks[tuple(((chosen - box[0]) // BLOCK_CELLS).T)] = True
     back = invert(pose)
-    asked = _reaching(soup.corners, back, bounds[0], BLOCK * grid.cell_size, blocks)
-    if not len(asked):
-        return soup.select(asked), soup
-    local = transform_points(back, soup.corners[asked].reshape(-1, 3)).reshape(-1, 3, 3)
+    near = _near_blocks(soup.corners, back, bounds[0], BLOCK_CELLS * grid.cell_size, blocks)
+    if not len(near):
+        return soup.select(near), soup
+    local = transform_points(back, soup.corners[near].reshape(-1, 3)).reshape(-1, 3, 3)
     where, owner, _ = fragments(local, grid.origin, grid.cell_size, box)
     inside = is_among(grid.keys[cells], cell_keys(where))
-    held, total = np.bincount(owner[inside], minlength=len(asked)), np.bincount(owner, minlength=len(asked))
+    held, total = np.bincount(owner[inside], minlength=len(near)), np.bincount(owner, minlength=len(near))
     whole = (held == total) & ((local >= bounds[0]) & (local <= bounds[1])).all(axis=(1, 2)) & (held > 0)
     crossing = (held > 0) & ~whole
     within = np.zeros(len(soup), dtype=bool)
-    within[asked[whole]] = True
-    cut = asked[crossing]
-    mine = crossing[owner]
-    corners, side, of = cut_triangles(
+    within[near[whole]] = True
+    cut = near[crossing]
+    of_crossing = crossing[owner]
+    corners, side, source = cut_triangles(
         local[crossing],
         grid.origin,
         grid.cell_size,
-        where[mine],
-        np.searchsorted(np.flatnonzero(crossing), owner[mine]),
-        inside[mine],
+        where[of_crossing],
+        np.searchsorted(np.flatnonzero(crossing), owner[of_crossing]),
+        inside[of_crossing],
         box,
     )
     corners = transform_points(pose, corners.reshape(-1, 3)).reshape(-1, 3, 3)
     untouched = ~within
     untouched[cut] = False
-    pieces = Soup(corners, soup.faces[cut][of])
-    return join_soups(soup.select(within), pieces.select(side)), join_soups(
-        soup.select(untouched), pieces.select(~side)
+    pieces = Soup(corners, soup.faces[cut][source])
+    return (
+        join_soups(soup.select(within), pieces.select(side)),
+        join_soups(soup.select(untouched), pieces.select(~side)),
     )
 
 
 @numba.njit(cache=True)
-def _reaching(corners, pose, low, size, blocks):
-    """The places of triangles (f, 3, 3) whose boxes, moved by `pose` (4, 4), come near one of `blocks`, bool (i, j, k),
-    `size` wide each from `low` (3,) on."""
-    found, total = np.empty(len(corners), dtype=np.int64), 0
+def _near_blocks(corners, pose, low, size, blocks):
+    """Return the indices of triangles (f, 3, 3) whose boxes, moved by `pose` (4, 4), come near a chosen block.
+
+    low, size: corner (3,) and width of the first block; blocks: bool (i, j, k), the chosen ones.
+    """
+    near, total = np.empty(len(corners), dtype=np.int64), 0
     first, last = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
     for face in range(len(corners)):
         for d in range(3):
-            least, most = np.inf, -np.inf
+            lowest, highest = np.inf, -np.inf
             for k in range(3):
                 at = pose[d, 3]
                 for e in range(3):
                     at += pose[d, e] * corners[face, k, e]
-                least, most = min(least, at), max(most, at)
-            # blocks that a triangle only touches count too: rounding must not decide
-            first[d] = max(int(np.floor((least - low[d]) / size - NEAR)), 0)
-            last[d] = min(int(np.floor((most - low[d]) / size + NEAR)), blocks.shape[d] - 1)
-        if _any(blocks, first, last):
-            found[total] = face
+                lowest, highest = min(lowest, at), max(highest, at)
+            first[d] = max(int(np.floor((lowest - low[d]) / size - BLOCK_MARGIN)), 0)
+            last[d] = min(int(np.floor((highest - low[d]) / size + BLOCK_MARGIN)), blocks.shape[d] - 1)
+        if _any_block(blocks, first, last):
+            near[total] = face
             total += 1
-    return found[:total].copy()
+    return near[:total].copy()
 
 
 @numba.njit(cache=True)
-def _any(blocks, first, last):
-    """Whether there is one of `blocks`, bool (i, j, k), from `first` to `last`."""
+def _any_block(blocks, first, last):
+    """Return whether any of `blocks` bool (i, j, k) from `first` to `last` is chosen."""
     for i in range(first[0], last[0] + 1):
         for j in range(first[1], last[1] + 1):
             for k in range(first[2], last[2] + 1):
@@ -128,20 +136,23 @@ def _any(blocks, first, last):
     return False
 
 
-def middles_in(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> BoolArray:
-    """Of which triangles of a soup the middle lies in ascending cells with places `cells`, moved by `pose` (4, 4), bool
-    (t,)."""
+def centres_in(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> BoolArray:
+    """Find the triangles whose centres lie in ascending `cells` moved by `pose` (4, 4), bool (t,)."""
     chosen = grid.cells[cells]
     low, high = (chosen.min(axis=0), chosen.max(axis=0)) if len(chosen) else (np.zeros(3, int), np.full(3, -1))
-    found: BoolArray = _middles_in(soup.corners, invert(pose), grid.origin, grid.cell_size, grid.keys[cells], low, high)
-    return found
+    inside: BoolArray = _centres_in(
+        soup.corners, invert(pose), grid.origin, grid.cell_size, grid.keys[cells], low, high
+    )
+    return inside
 
 
 @numba.njit(cache=True)
-def _middles_in(corners, pose, origin, size, keys, low, high):
-    """Of which triangles (f, 3, 3) the middle, moved by `pose` (4, 4), is in a cell from `low` to `high` (3,) with one
-    of these keys, bool (f,)."""
-    found = np.zeros(len(corners), dtype=np.bool_)
+def _centres_in(corners, pose, origin, size, keys, low, high):
+    """Find the triangles (f, 3, 3) whose centres, moved by `pose` (4, 4), lie in one of some cells, bool (f,).
+
+    keys: int64, packed cells, ascending; low, high: the lowest and the highest of them, int64 (3,).
+    """
+    inside = np.zeros(len(corners), dtype=np.bool_)
     at, cell = np.empty(3), np.empty(3, dtype=np.int64)
     for face in range(len(corners)):
         for d in range(3):
@@ -149,31 +160,33 @@ def _middles_in(corners, pose, origin, size, keys, low, high):
             for e in range(3):
                 at[d] += pose[d, e] * (corners[face, 0, e] + corners[face, 1, e] + corners[face, 2, e]) / 3
         cell_of(at, origin, size, cell)
-        near = True
+        in_box = True
         for d in range(3):
-            near &= low[d] <= cell[d] <= high[d]
-        if near:
-            found[face] = cell_index(keys, cell[0], cell[1], cell[2]) >= 0
-    return found
+            in_box &= low[d] <= cell[d] <= high[d]
+        if in_box:
+            inside[face] = cell_index(keys, cell[0], cell[1], cell[2]) >= 0
+    return inside
 
 
 def connected_soups(soup: Soup, origin: FloatArray, size: float) -> list[Soup]:
-    """The pieces of a soup that occupy no neighbouring cells of the lattice with a corner at `origin` (3,) and cells of
-    `size`, in the order of their first triangles."""
+    """Split a soup into pieces that occupy no neighbouring cells of a lattice, in the order of their first triangles.
+
+    origin, size: a corner (3,) of the lattice and the width of its cells.
+    """
     from scipy.spatial import KDTree
 
     if not len(soup):
         return []
     where, owner, _ = fragments(soup.corners, origin, size)
     cells, place = np.unique(where, axis=0, return_inverse=True)
-    beside = KDTree(cells).query_pairs(1.8, output_type="ndarray")
-    component = connected_components(len(cells), beside)
+    pairs = KDTree(cells).query_pairs(NEIGHBOUR_CELLS, output_type="ndarray")
+    component = connected_components(len(cells), pairs)
     piece = np.full(len(soup), -1)
     piece[owner] = component[place.reshape(-1)]
     order = list(dict.fromkeys(piece[piece >= 0].tolist()))
-    return [soup.select(piece == each) for each in order]
+    return [soup.select(piece == number) for number in order]
 
 
 def join_soups(*soups: Soup) -> Soup:
-    """The triangles of some soups, one after another."""
-    return Soup(np.concatenate([each.corners for each in soups]), np.concatenate([each.faces for each in soups]))
+    """Return the triangles of some soups, one soup after another."""
+    return Soup(np.concatenate([soup.corners for soup in soups]), np.concatenate([soup.faces for soup in soups]))

@@ -1,4 +1,4 @@
-"""Corners of triangles at one place as one vertex, and the edges in which triangles meet there."""
+"""Triangle corners welded by position, and the edges in which welded triangles meet."""
 
 from __future__ import annotations
 
@@ -9,15 +9,17 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 
-MIX = -7046029254386353131
-"""An odd number whose bits are about half ones: what is multiplied by it differs in its high bits (golden ratio)."""
+HASH_MULTIPLIER = -7046029254386353131
+"""An odd number of about half one bits, from the golden ratio: products differ in their high bits."""
 
 
 def weld(corners: FloatArray, tolerance: float) -> tuple[IntArray, FloatArray]:
-    """The vertex of each corner of triangles (f, 3, 3), int32 (f, 3), and the vertices, float64 (v, 3), in
-    lexicographic order. Points closer than about `tolerance` are one; those at equal coordinates alone where it is 0.
+    """Merge the corners of triangles (f, 3, 3) at equal positions.
 
-    By hashing: as long as vertices are few a corner, five times as fast as sorting all of them.
+    tolerance: distance up to which corners are about the same; 0 for equal coordinates alone
+
+    Returns the vertex of each corner, int32 (f, 3), and the vertices, float64 (v, 3), in lexicographic order. Hashing
+    is five times as fast as sorting all corners as long as vertices are few per corner.
     """
     points = corners.reshape(-1, 3)
     rounded = _rounded(points, tolerance)
@@ -29,13 +31,13 @@ def weld(corners: FloatArray, tolerance: float) -> tuple[IntArray, FloatArray]:
 
 
 def _rounded(points: FloatArray, tolerance: float) -> FloatArray:
-    """Points (n, 3) on a lattice of `tolerance`, where they are equal if they are one vertex."""
+    """Round points (n, 3) to a lattice of `tolerance`, where points of one vertex are equal."""
     rounded: FloatArray = np.round(points / tolerance) + 0.0 if tolerance else points + 0.0
     return rounded
 
 
 class WeldedSurface:
-    """Triangles (f, 3, 3) that are welded once, for many meshes of some of them each and of little else."""
+    """Triangles (f, 3, 3) that are welded once and serve many meshes, each of some of them and few others."""
 
     def __init__(self, corners: FloatArray, tolerance: float) -> None:
         self._points = corners.reshape(-1, 3)
@@ -44,30 +46,36 @@ class WeldedSurface:
         self._rows = _rounded(vertices, tolerance)
 
     def around(self, first: IntArray, others: FloatArray, last: IntArray) -> tuple[IntArray, FloatArray]:
-        """What `weld` makes of triangles at places `first` (n,), then `others` (m, 3, 3), then those at `last`."""
+        """Weld the triangles with indices `first` (n,), then `others` (m, 3, 3), then those with indices `last`.
+
+        Returns the same as `weld` does of these triangles.
+        """
         places, vertices = weld(others, self._tolerance)
         rows = _rounded(vertices, self._tolerance)
         faces, source = _merged(self._places, self._rows, first, places, rows, last)
         own = source >= 0
-        found = np.empty((len(source), 3))
-        found[own], found[~own] = self._points[source[own]], vertices[-1 - source[~own]]
-        return faces, found
+        merged = np.empty((len(source), 3))
+        merged[own], merged[~own] = self._points[source[own]], vertices[-1 - source[~own]]
+        return faces, merged
 
     def box(self, first: IntArray, others: FloatArray, last: IntArray) -> FloatArray:
-        """Lowest and highest corner of the box around the same triangles, float64 (2, 3)."""
-        found = np.array([np.full(3, np.inf), np.full(3, -np.inf)])
+        """Return the lowest and the highest corner of the box around the same triangles, float64 (2, 3)."""
+        box = np.array([np.full(3, np.inf), np.full(3, -np.inf)])
         for chosen in (first, last):
-            _stretch(self._points, chosen, found)
-        _stretch(others.reshape(-1, 3), np.arange(len(others), dtype=np.int32), found)
-        return found
+            _stretch(self._points, chosen, box)
+        _stretch(others.reshape(-1, 3), np.arange(len(others), dtype=np.int32), box)
+        return box
 
 
 @dataclass(frozen=True)
 class Sides:
-    """Sides of triangles in the order of the edges that they lie in, int64 (s,) each; of an edge in that of triangles.
+    """Sides of triangles in the order of their edges; sides of one edge in the order of the triangles.
 
-    low, high: the vertices of the edge; side: `3 * triangle + k`, from corner k to the next. first, count: int64 (e,),
-    of each edge where its sides begin, and how many they are. Sides without length are left out.
+    Sides without length are left out.
+
+    low, high: int64 (s,), the vertices of the edge
+    side: int64 (s,), `3 * triangle + k` for the side from corner k to the next
+    first, count: int64 (e,), where the sides of each edge begin, and how many it has
     """
 
     low: np.ndarray
@@ -77,9 +85,9 @@ class Sides:
     count: np.ndarray
 
 
-def sides_by_edge(places: IntArray) -> Sides:
-    """The sides of triangles with vertices `places` (f, 3)."""
-    start, end = places.reshape(-1).astype(np.int64), np.roll(places, -1, axis=1).reshape(-1).astype(np.int64)
+def sides_by_edge(indices: IntArray) -> Sides:
+    """Sort the sides of welded triangles (f, 3) by edge."""
+    start, end = indices.reshape(-1).astype(np.int64), np.roll(indices, -1, axis=1).reshape(-1).astype(np.int64)
     low, high = np.minimum(start, end), np.maximum(start, end)
     order = np.argsort(low << 32 | high, kind="stable")
     order = order[low[order] != high[order]]
@@ -90,17 +98,20 @@ def sides_by_edge(places: IntArray) -> Sides:
 
 @numba.njit(cache=True)
 def _numbered(rows):
-    """For rows int64 (n, 3) the number of each, equal ones alike, int32 (n,), and where each number comes first."""
+    """Number the distinct rows of int64 (n, 3) in the order of their first occurrence.
+
+    Returns the number of each row, int32 (n,), and the first row of each number, int64.
+    """
     room = 16
     while room < 2 * len(rows):
         room *= 2
     table = np.full(room, -1, dtype=np.int32)
-    place, first = np.empty(len(rows), dtype=np.int32), np.empty(len(rows), dtype=np.int64)
+    number, first = np.empty(len(rows), dtype=np.int32), np.empty(len(rows), dtype=np.int64)
     total = 0
     for n in range(len(rows)):
         code = np.int64(0)
         for d in range(3):
-            code = (code ^ rows[n, d]) * MIX
+            code = (code ^ rows[n, d]) * HASH_MULTIPLIER
             code ^= code >> 32 & 0xFFFFFFFF
         slot = code & (room - 1)
         while table[slot] >= 0:
@@ -111,15 +122,21 @@ def _numbered(rows):
         if table[slot] < 0:
             table[slot], first[total] = total, n
             total += 1
-        place[n] = table[slot]
-    return place, first[:total].copy()
+        number[n] = table[slot]
+    return number, first[:total].copy()
 
 
 @numba.njit(cache=True)
 def _merged(places, rows, first, others, other_rows, last):
-    """The vertices of triangles `first` out of `places` (f, 3), of `others` (m, 3), and of `last` out of `places`, in
-    the order of both their ascending rows (v, 3) and (w, 3), equal ones once: int32 (n, 3), and where each vertex comes
-    first: at which corner of the surface or, of the others, -1 less its place there."""
+    """Merge the vertices of triangles `first`, `others` and `last` in lexicographic order.
+
+    places: int32 (f, 3), welded triangles, from which `first` and `last` are indices
+    rows, other_rows: float64 (v, 3) and (w, 3), rounded positions of vertices, ascending
+    others: int32 (m, 3), triangles of the other vertices
+
+    Returns the triangles, int32 (n, 3), and where each vertex comes first, int64: a corner of the surface, or
+    `-1 - index` of another vertex.
+    """
     corner, early = np.full(len(rows), -1, dtype=np.int64), np.zeros(len(rows), dtype=np.bool_)
     for chosen, is_early in ((first, True), (last, False)):
         for triangle in chosen:
@@ -164,7 +181,7 @@ def _merged(places, rows, first, others, other_rows, last):
 
 @numba.njit(cache=True)
 def _stretch(points, chosen, box):
-    """Make a box (2, 3) hold the triangles at some places, three of `points` (3 f, 3) each."""
+    """Stretch a box (2, 3) so that it contains the triangles with indices `chosen`; points (3 f, 3)."""
     for triangle in chosen:
         for corner in range(3 * triangle, 3 * triangle + 3):
             for d in range(3):
@@ -173,7 +190,7 @@ def _stretch(points, chosen, box):
 
 @numba.njit(cache=True)
 def _before(one, other):
-    """Whether a point comes before another in lexicographic order."""
+    """Return whether a point comes before another in lexicographic order."""
     for d in range(3):
         if one[d] != other[d]:
             return one[d] < other[d]

@@ -1,4 +1,4 @@
-"""What all tests of grammars look at: a wall of four windows, cut once."""
+"""Fixtures of all tests of grammars: a wall of four windows, cut once."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.stages.symmetry.planted import mesh, wall
 
 @pytest.fixture(scope="session")
 def found() -> ExtractedGrammar:
-    """A wall of four windows."""
+    """Extract the grammar of a wall of four windows."""
     vertices, faces = mesh(wall(4))
     colors = np.full((len(faces), 3), 160, np.uint8)
     return extract_grammar(SurfaceMesh(vertices, faces, colors), "wall", 0.03, "z", np.random.default_rng(0))

@@ -3,23 +3,23 @@ from __future__ import annotations
 from stages.grammars.bounded_cache import BoundedCache
 
 
-def test_of_what_takes_more_than_is_allowed_that_goes_which_was_not_asked_for_the_longest() -> None:
+def test_least_recently_used_values_are_dropped_beyond_the_limit() -> None:
     made: list[str] = []
 
     def make(key: str) -> str:
         made.append(key)
         return key * 4
 
-    recent: BoundedCache[str, str] = BoundedCache(make, len, 8)
-    assert [recent[each] for each in ("a", "b", "a", "c")] == ["aaaa", "bbbb", "aaaa", "cccc"]
-    assert (made, len(recent)) == (["a", "b", "c"], 2)
-    assert recent["a"] == "aaaa"
-    assert made == ["a", "b", "c"], "a was asked for after b"
-    assert recent["b"] == "bbbb"
+    cache: BoundedCache[str, str] = BoundedCache(make, len, 8)
+    assert [cache[key] for key in ("a", "b", "a", "c")] == ["aaaa", "bbbb", "aaaa", "cccc"]
+    assert (made, len(cache)) == (["a", "b", "c"], 2)
+    assert cache["a"] == "aaaa"
+    assert made == ["a", "b", "c"], "a was used after b"
+    assert cache["b"] == "bbbb"
     assert made == ["a", "b", "c", "b"]
 
 
-def test_what_is_larger_than_all_may_be_is_held_alone() -> None:
-    recent: BoundedCache[str, str] = BoundedCache(lambda key: key * 9, len, 8)
-    assert recent["a"] == recent["a"] == "a" * 9
-    assert (recent["b"], len(recent)) == ("b" * 9, 1)
+def test_value_beyond_the_limit_is_kept_alone() -> None:
+    cache: BoundedCache[str, str] = BoundedCache(lambda key: key * 9, len, 8)
+    assert cache["a"] == cache["a"] == "a" * 9
+    assert (cache["b"], len(cache)) == ("b" * 9, 1)

@@ -20,20 +20,22 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def cut_at(grid: SurfaceGrid, across: float) -> np.ndarray:
-    """The cells whose x is larger."""
+    """Return the cells whose x is larger."""
     return np.flatnonzero(grid.origin[0] + grid.cell_size * (grid.cells[:, 0] + 0.5) > across).astype(np.int32)
 
 
 def scan_grid(triangles: np.ndarray, share: float, points: int) -> SurfaceGrid:
-    """The grid of a scan with noise of a fifth of a cell and eight holes."""
+    """Return the grid of a scan with noise of a fifth of a cell and eight holes."""
     cell = share / CELLS_PER_RADIUS * float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
     at, _ = scanned(triangles, points, 0.2 * cell, 8, 1.5 * cell, np.random.default_rng(0))
     return scanned_grid(ScannedCloud(at, np.full((points, 3), 160, np.uint8)), share).grid
 
 
 def has_ends(areas: list[float], period: float, count: int, ends: int) -> bool:
-    """Whether dockers of these areas are ends with none to `count` - 1 periods, so many of each; all but the cells
-    along the cuts."""
+    """Return whether pieces of these areas are ends with 0 to `count` - 1 periods, `ends` of each length.
+
+    Cells along the cuts may differ.
+    """
     periods = (np.array(areas) - min(areas)) / period
     whole = np.round(periods)
     return bool((np.abs(periods - whole) < 0.15).all()) and Counter(whole.tolist()) == dict.fromkeys(range(count), ends)
@@ -41,25 +43,27 @@ def has_ends(areas: list[float], period: float, count: int, ends: int) -> bool:
 
 class TestRows:
     @pytest.mark.parametrize(("windows", "storeys"), [(2, 1), (6, 1), (2, 2), (6, 2), (4, 3), (5, 3), (2, 5), (6, 5)])
-    def test_a_wall_has_sites_and_grids_of_bays_and_storeys_alone(self, windows: int, storeys: int) -> None:
-        """Ends with none to all but one bay are one class, for the wall is like itself from behind; tops and feet with
-        none to all but one storey one each. Grids are cut from the left or the right, and from above or below."""
+    def test_wall_has_sites_and_grids_of_bays_and_storeys_only(self, windows: int, storeys: int) -> None:
+        """Ends of the wall are one class, because it equals itself from behind; tops and feet are one class each.
+
+        Grids are cut from the left or the right, and from above or below.
+        """
         whole = area(wall(windows, storeys))
         grid = surface_grid(wall(windows, storeys), SHARE)
-        dockers = find_docked_pieces(grid, candidate_transforms(grid, 24, UP))
+        pieces = find_docked_pieces(grid, candidate_transforms(grid, 24, UP))
         bay = (whole - area(wall(windows - 1, storeys))) / whole
         wanted = [(bay, windows, 2)]
         if storeys > 1:
             wanted += [((whole - area(wall(windows, storeys - 1))) / whole, storeys, 1)] * 2
-        classes = [[each.area for each in dockers if each.site == site] for site in {each.site for each in dockers}]
+        classes = [[piece.area for piece in pieces if piece.site == site] for site in {piece.site for piece in pieces}]
         assert len(classes) == len(wanted)
         for period, count, ends in wanted:
-            exact = [has_ends(each, period, count, ends) for each in classes]
+            exact = [has_ends(areas, period, count, ends) for areas in classes]
             assert any(exact)
             classes.pop(exact.index(True))
-        seams = seams_by_site(grid, dockers)
-        rows = find_rows(grid, dockers, seams)
-        grids = [tuple(sorted(rows[each].count for each in chosen)) for chosen in crossing_rows(grid, dockers, rows)]
+        seams = seams_by_site(grid, pieces)
+        rows = find_rows(grid, pieces, seams)
+        grids = [tuple(sorted(rows[index].count for index in chosen)) for chosen in crossing_rows(grid, pieces, rows)]
         counts = (windows - 1,) if storeys == 1 else tuple(sorted((windows - 1, storeys - 1)))
         assert grids == [counts] * 2 * len(counts)
         for row in rows:
@@ -70,23 +74,23 @@ class TestRows:
 
 
 class TestSites:
-    def test_a_site_moved_a_bay_on_parts_a_bay_more(self) -> None:
+    def test_site_moved_by_a_bay_separates_one_bay_more(self) -> None:
         grid = surface_grid(wall(4), SHARE)
         cells = cut_at(grid, 2.6)
         after = separated_cells(grid, cells, surrounding_cells(grid, cells), shift(-1, 0, 0))
         assert after is not None
-        most = len(np.setxor1d(after, cut_at(grid, 1.6)))
-        assert most <= len(surrounding_cells(grid, cells)), "but for the cells along the cut"
+        differing = len(np.setxor1d(after, cut_at(grid, 1.6)))
+        assert differing <= len(surrounding_cells(grid, cells)), "only cells along the cut may differ"
 
-    def test_holes_of_a_scan_beside_the_site_do_not_let_its_sides_run_together(self) -> None:
+    def test_holes_of_a_scan_near_the_site_do_not_join_its_sides(self) -> None:
         grid = scan_grid(wall(3), 0.05, 40_000)
         cells = cut_at(grid, 2.6)
         after = separated_cells(grid, cells, surrounding_cells(grid, cells), shift(-1, 0, 0))
         assert after is not None
         assert len(np.setxor1d(after, cut_at(grid, 1.6))) <= len(surrounding_cells(grid, cells))
 
-    def test_a_site_that_parts_nothing_where_it_is_taken_has_no_docker_there(self) -> None:
-        """A bar cut across, taken to where the bar is a ring: its other way round goes around the cut."""
+    def test_site_that_separates_nothing_at_its_new_position_has_no_piece(self) -> None:
+        """A cut across a bar, moved to where the bar is a ring, which goes around the cut."""
         bar = box((-4.0, 0.0, 0.0), (-1.0, 0.2, 0.2))
         ring = [box((0, 0, 0), (3, 0.2, 0.2)), box((0, 0, 2), (3, 0.2, 2.2))]
         sides = [box((0, 0, 0.2), (0.2, 0.2, 2)), box((2.8, 0, 0.2), (3, 0.2, 2))]
@@ -97,23 +101,23 @@ class TestSites:
         assert separated_cells(grid, cells, border, shift(-0.5, 0, 0)) is not None
         assert separated_cells(grid, cells, border, shift(4, 0, 0)) is None
 
-    def test_corners_are_where_no_shift_takes_the_surface_along_itself(self) -> None:
+    def test_corners_are_where_no_translation_moves_the_surface_along_itself(self) -> None:
         grid = surface_grid(box((0, 0, 0), (1, 1, 1)), 0.2)
         middles = grid.origin + grid.cell_size * (grid.cells[corner_cells(grid)] + 0.5)
         assert len(middles) == 8
         assert (np.abs(middles - np.round(middles)) <= grid.cell_size / 2).all()
 
-    def test_a_sheet_of_no_thickness_has_corners_too(self) -> None:
+    def test_sheet_without_thickness_has_corners(self) -> None:
         sheet = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)[[[0, 1, 2], [0, 2, 3]]]
         assert len(corner_cells(surface_grid(sheet, 0.2))) == 4
 
-    def test_a_shift_that_lays_margins_upon_margins_carries_no_corners(self) -> None:
+    def test_translation_of_margins_onto_margins_maps_no_corners(self) -> None:
         grid = surface_grid(wall(3), SHARE)
         corners = corner_cells(grid)
         assert maps_enough_corners(grid, corners, shift(2, 0, 0))
         assert not maps_enough_corners(grid, corners, shift(3, 0, 0))
 
-    def test_what_may_be_missing_of_a_scan_makes_no_corners(self) -> None:
+    def test_weak_items_of_a_scan_make_no_corners(self) -> None:
         grid = scan_grid(wall(4, 3), SHARE, 250_000)
         corners = corner_cells(grid)
         assert maps_enough_corners(grid, corners, shift(3, 0, 0))

@@ -35,12 +35,12 @@ from tests.stages.symmetry.planted import (
 SHARE = 0.03
 
 
-def sites_of(grid: SurfaceGrid, motion: np.ndarray) -> list[DockingSite]:
-    return find_docking_sites(grid, motion, *r_symmetric_cells(grid, motion))
+def sites_of(grid: SurfaceGrid, transform: np.ndarray) -> list[DockingSite]:
+    return find_docking_sites(grid, transform, *r_symmetric_cells(grid, transform))
 
 
-def has_motion(motions: np.ndarray, wanted: np.ndarray) -> bool:
-    both = np.concatenate([motions, np.linalg.inv(motions)])
+def has_transform(transforms: np.ndarray, wanted: np.ndarray) -> bool:
+    both = np.concatenate([transforms, np.linalg.inv(transforms)])
     return bool(np.abs(both - wanted).max(axis=(1, 2)).min() < 1e-6)
 
 
@@ -56,7 +56,7 @@ class TestSurface:
         assert ((np.isclose(lines, 0) | np.isclose(lines, 1)).sum(axis=1) == 2).all()
         assert np.isclose(grid.area.sum(), 6.0)
 
-    def test_slivers_and_doublets_change_nothing(self) -> None:
+    def test_slivers_and_duplicates_change_nothing(self) -> None:
         plain = box((0, 0, 0), (1, 1, 1))
         sliver = np.array([[[0, 0, 0], [1, 0, 0], [0.5, 0, 0]]], dtype=float)
         one, other = surface_grid(plain, 0.2), surface_grid(np.concatenate([plain, plain[:4], sliver]), 0.2)
@@ -65,26 +65,26 @@ class TestSurface:
 
 
 class TestSymmetricCells:
-    def test_sides_that_others_cover_in_part_are_alike_wherever_cells_cut_them(self) -> None:
+    def test_partly_covered_sides_match_wherever_cells_cut_them(self) -> None:
         """Braces as thin sheets that run into rails, in one plane with the rails' faces."""
         rails = [box((0, y, 0), (8.1, y + 0.3, 0.3)) for y in (0.0, 1.7)]
         sheet = np.array([[0, -0.05, 0.3], [1.7, -0.05, 0.3], [1.7, 0.05, 0.3], [0, 0.05, 0.3]])[[[0, 1, 2], [0, 2, 3]]]
         braces = [moved(sheet, shift(k + 0.5, 0.15, 0) @ screw(1.2, 0)) for k in range(7)]
         grid = surface_grid(np.concatenate([*rails, *braces]), 0.0271)
         for count in range(1, 6):
-            found = matched_items(grid, shift(count, 0, 0))
-            assert found[(grid.points[:, 0] > 0.2) & (grid.points[:, 0] < 7.4 - count)].all()
+            matched = matched_items(grid, shift(count, 0, 0))
+            assert matched[(grid.points[:, 0] > 0.2) & (grid.points[:, 0] < 7.4 - count)].all()
 
-    def test_all_of_a_wall_is_symmetric_but_what_lies_a_period_before_its_end(self, four_windows: SurfaceGrid) -> None:
+    def test_wall_is_symmetric_except_one_period_before_its_end(self, four_windows: SurfaceGrid) -> None:
         forth, back = symmetric_cells(four_windows, shift(1, 0, 0))
-        x = four_windows.origin[0] + four_windows.size * (four_windows.cells[:, 0] + 0.5)
-        slack = 1.01 * four_windows.size
+        x = four_windows.origin[0] + four_windows.cell_size * (four_windows.cells[:, 0] + 0.5)
+        slack = 1.01 * four_windows.cell_size
         # the left margin ends at 0.35, where a period later the first window ends; the last window begins at 3.85
         assert not forth[(x < slack) | (x > 4.2 + slack)].any()
         assert forth[(x > 0.35 + slack) & (x < 3.85 - slack)].all()
         assert not back[(x > 5.2 - slack) | (x < 1 - slack)].any()
 
-    def test_erosion_leaves_what_is_a_radius_away(self, four_windows: SurfaceGrid) -> None:
+    def test_erosion_keeps_cells_a_radius_away(self, four_windows: SurfaceGrid) -> None:
         symmetric = np.ones(len(four_windows), dtype=bool)
         symmetric[100] = False
         kept = erode_cells(four_windows, symmetric)
@@ -92,84 +92,86 @@ class TestSymmetricCells:
         assert not kept[away <= 3].any()
         assert kept[away > 4].all()
 
-    def test_what_is_r_symmetric_is_taken_to_what_is_r_symmetric_backward(self, four_windows: SurfaceGrid) -> None:
-        """A leak of the erosion on one side alone, as where two sheets are a cell apart, is one of both sides."""
-        motion = shift(1, 0, 0)
-        kept, kept_back = r_symmetric_cells(four_windows, motion)
-        middles = four_windows.origin + four_windows.size * (four_windows.cells + 0.5)
-        there = middles[np.flatnonzero(kept_back & (np.abs(middles[:, 0] - 3) < 0.05))[0]]
-        leak = np.linalg.norm(middles - there, axis=1) < 3.5 * four_windows.size
-        forth, back = mutually_symmetric_cells(four_windows, motion, kept, kept_back & ~leak)
-        away = np.linalg.norm(middles + np.array([1, 0, 0]) - there, axis=1) / four_windows.size
+    def test_mutually_symmetric_cells_map_onto_mutual_cells(self, four_windows: SurfaceGrid) -> None:
+        """A leak of the erosion on one side, as where two sheets are a cell apart, counts on both sides."""
+        transform = shift(1, 0, 0)
+        kept, kept_back = r_symmetric_cells(four_windows, transform)
+        middles = four_windows.origin + four_windows.cell_size * (four_windows.cells + 0.5)
+        target = middles[np.flatnonzero(kept_back & (np.abs(middles[:, 0] - 3) < 0.05))[0]]
+        leak = np.linalg.norm(middles - target, axis=1) < 3.5 * four_windows.cell_size
+        forth, back = mutually_symmetric_cells(four_windows, transform, kept, kept_back & ~leak)
+        away = np.linalg.norm(middles + np.array([1, 0, 0]) - target, axis=1) / four_windows.cell_size
         assert leak.sum() > 10
         assert not forth[away < 2.5].any()
-        assert (forth == mutually_symmetric_cells(four_windows, motion, kept, kept_back)[0])[away > 4.5].all()
+        assert (forth == mutually_symmetric_cells(four_windows, transform, kept, kept_back)[0])[away > 4.5].all()
         assert (back <= kept_back & ~leak).all()
 
-    def test_a_turn_that_maps_a_box_onto_itself_leaves_nothing(self) -> None:
+    def test_turn_that_maps_a_box_onto_itself_has_no_site(self) -> None:
         grid = surface_grid(box((-1, -1, -1), (1, 1, 1)), 0.1)
         assert matched_items(grid, screw(np.pi / 2, 0.0)).all()
         assert sites_of(grid, screw(np.pi / 2, 0.0)) == []
 
 
-class TestMotions:
-    def test_those_that_keep_a_direction_turn_nothing_over(self, four_windows: SurfaceGrid) -> None:
+class TestTransforms:
+    def test_transforms_that_keep_an_axis_turn_nothing_over(self, four_windows: SurfaceGrid) -> None:
         up = np.array([0.0, 0.0, 1.0])
         anywhere, upright = (candidate_transforms(four_windows, 64, axis) for axis in (None, up))
-        assert (anywhere[:, 2, 2] < 0).any(), "the wall is like itself upside down"
+        assert (anywhere[:, 2, 2] < 0).any(), "the wall equals itself upside down"
         assert len(upright)
         np.testing.assert_allclose(upright[:, :3, :3] @ up, np.tile(up, (len(upright), 1)), atol=1e-6)
 
     def test_the_period_of_a_wall_is_found(self, four_windows: SurfaceGrid) -> None:
-        motions = candidate_transforms(four_windows, 64)
+        transforms = candidate_transforms(four_windows, 64)
         for count in (1, 2, 3):
-            assert has_motion(motions, shift(count, 0, 0))
+            assert has_transform(transforms, shift(count, 0, 0))
 
     def test_the_screw_of_a_spiral_stair_is_found(self) -> None:
-        assert has_motion(candidate_transforms(surface_grid(spiral_stair(6), SHARE), 32), screw(0.5, 0.35))
+        assert has_transform(candidate_transforms(surface_grid(spiral_stair(6), SHARE), 32), screw(0.5, 0.35))
 
-    def test_a_turned_wall_has_turned_motions(self) -> None:
+    def test_turned_wall_has_turned_transforms(self) -> None:
         turn = screw(0.7, 0.0)
-        motions = candidate_transforms(surface_grid(moved(wall(3), turn), SHARE), 64)
-        assert has_motion(motions, turn @ shift(1, 0, 0) @ np.linalg.inv(turn))
+        transforms = candidate_transforms(surface_grid(moved(wall(3), turn), SHARE), 64)
+        assert has_transform(transforms, turn @ shift(1, 0, 0) @ np.linalg.inv(turn))
 
 
 class TestDockingSites:
     @pytest.mark.parametrize("windows", [3, 4, 6])
-    def test_a_wall_can_gain_and_lose_a_window(self, windows: int) -> None:
+    def test_wall_can_gain_and_lose_a_window(self, windows: int) -> None:
         grid = surface_grid(wall(windows), SHARE)
         sites = sites_of(grid, shift(1, 0, 0))
-        assert [each.kind for each in sites] == ["delete", "insert"]
+        assert [site.kind for site in sites] == ["delete", "insert"]
         delete, insert = sites
         for more, less in ((delete.secondary, delete.primary), (insert.primary, insert.secondary)):
             assert grid.area[np.setdiff1d(more, less)].sum() == pytest.approx(period_area(), rel=0.05)
-        for each in sites:
-            assert np.isin(each.border, np.r_[each.primary]).sum() == 0
+        for site in sites:
+            assert np.isin(site.border, np.r_[site.primary]).sum() == 0
 
-    def test_dockers_under_one_motion_are_disjoint(self, four_windows: SurfaceGrid) -> None:
+    def test_pieces_of_one_transform_are_disjoint(self, four_windows: SurfaceGrid) -> None:
         sites = sites_of(four_windows, shift(1, 0, 0))
         for one, other in itertools.combinations(sites, 2):
             assert not np.intersect1d(one.primary, other.primary).size
             assert not np.intersect1d(one.secondary, other.secondary).size
 
-    def test_dockers_whose_images_are_one_region_are_taken_together(self) -> None:
-        """Symmetry figure 5: two prongs of one side stand on a bridge of the other, which the motion makes one."""
+    def test_pieces_whose_images_are_one_region_are_one_piece(self) -> None:
+        """Symmetry figure 5: two prongs of one side map to a bridge of the other, which makes them one piece."""
         grid = surface_grid(prongs_and_bridge(), 0.02)
-        sites = [each for each in sites_of(grid, shift(9, 0, 0)) if each.kind == "replace"]
+        sites = [site for site in sites_of(grid, shift(9, 0, 0)) if site.kind == "replace"]
         assert len(sites) == 1
         x = grid.origin[0] + grid.cell_size * grid.cells[sites[0].primary, 0]
         assert ((x < 2.5).any(), ((x > 2.5) & (x < 4.5)).any(), (x > 4.5).any()) == (True, False, True)
 
-    def test_interlocked_dockers_take_the_place_of_each_other_as_one(self) -> None:
-        """Symmetry figure 5d: two prongs where the bridge is, and a bridge where they are, whose bar has four sides of
-        3 by 1 and covers two of 1 by 1."""
+    def test_interlocked_pieces_are_exchanged_as_one(self) -> None:
+        """Symmetry figure 5d: two prongs replace the bridge, and the bridge replaces them.
+
+        The bar of the bridge has four sides of 3 by 1 and covers two of 1 by 1.
+        """
         triangles = prongs_and_bridge()
         grid = surface_grid(triangles, 0.02)
-        dockers = find_docked_pieces(grid, shift(9, 0, 0)[None])
-        seams = seams_by_site(grid, dockers)
+        pieces = find_docked_pieces(grid, shift(9, 0, 0)[None])
+        seams = seams_by_site(grid, pieces)
         whole = Soup(grid.corners, grid.faces)
         z = grid.origin[2] + grid.cell_size * grid.cells[:, 2]
-        prongs, bridge = (each for each in dockers if z[each.cells].min() > 1)
+        prongs, bridge = (piece for piece in pieces if z[piece.cells].min() > 1)
         assert prongs.site == bridge.site
         for old, new, more in ((prongs, bridge, 10.0), (bridge, prongs, -10.0)):
             _, stays = cut_out(whole, grid, old.cells, old.frame, seams[old.site])
@@ -178,20 +180,20 @@ class TestDockingSites:
             assert area(shape) == pytest.approx(area(triangles) + more, rel=1e-9)
             assert r_similarity(triangles, shape, grid.radius, 60, np.random.default_rng(0)).share == 1.0
 
-    def test_dockers_on_two_sides_of_a_bar_have_sites_of_two_classes(self) -> None:
-        """Where the bar is the same on both sides of a site, the left end of it lies near the right end of another."""
+    def test_pieces_on_two_sides_of_a_bar_have_sites_of_two_classes(self) -> None:
+        """Where the bar is equal on both sides of a site, its left end lies near the right end of another."""
         grid = surface_grid(prongs_and_bridge(), 0.02)
         across = grid.origin[0] + grid.cell_size * (grid.cells[:, 0] + 0.5)
         sides: dict[int, set[bool]] = {}
-        for each in find_docked_pieces(grid, np.array([shift(9, 0, 0), shift(15, 0, 0), shift(4, 0, 0)])):
-            if np.ptp(across[each.border]) < 2 * grid.cell_size:
-                rightward = bool(across[each.cells].mean() > across[each.border].mean())
-                sides.setdefault(each.site, set()).add(rightward)
+        for piece in find_docked_pieces(grid, np.array([shift(9, 0, 0), shift(15, 0, 0), shift(4, 0, 0)])):
+            if np.ptp(across[piece.border]) < 2 * grid.cell_size:
+                rightward = bool(across[piece.cells].mean() > across[piece.border].mean())
+                sides.setdefault(piece.site, set()).add(rightward)
         assert {True} in sides.values()
         assert {False} in sides.values()
         assert {True, False} not in sides.values()
 
-    def test_a_straight_prism_slips_one_way_and_a_plane_three(self) -> None:
+    def test_straight_prism_slips_one_way_and_plane_three(self) -> None:
         grid = surface_grid(box((0, 0, 0), (6, 1, 1)), 0.03)
         x, z = (grid.origin[d] + grid.cell_size * (grid.cells[:, d] + 0.5) for d in (0, 2))
         around = np.flatnonzero(np.abs(x - 3) < 0.3).astype(np.int32)
@@ -201,5 +203,5 @@ class TestDockingSites:
 
 
 def period_area() -> float:
-    """Of one bay of the wall: two sides without the hole, the hole's own four sides, top and bottom."""
+    """Return the area of a bay of the wall: two sides without the hole, its own four sides, top and bottom."""
     return 2 * (1 * 2.4 - 0.5 * 1.0) + 0.3 * (2 * 0.5 + 2 * 1.0) + 2 * 0.3 * 1

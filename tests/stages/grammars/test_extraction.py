@@ -4,17 +4,17 @@ import numpy as np
 
 from stages.grammars.extraction.extract import SurfaceMesh, extract_grammar
 from stages.shape.arrays import IntArray
+from stages.shape.geometry.triangles import area_vectors
 from tests.stages.symmetry.planted import mesh, wall
 
 
 def facing(corners: np.ndarray) -> IntArray:
-    """Along which axis triangles (f, 3, 3) face, int (f,)."""
-    ways = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    found: IntArray = np.abs(ways).argmax(axis=1).astype(np.int32)
-    return found
+    """Return the axis along which triangles (f, 3, 3) face, int (f,)."""
+    axes: IntArray = np.abs(area_vectors(corners)).argmax(axis=1).astype(np.int32)
+    return axes
 
 
-def test_terminals_have_the_colours_of_their_faces_where_others_without_area_are_left_out() -> None:
+def test_terminals_keep_face_colours_without_triangles_of_no_area() -> None:
     vertices, faces = mesh(wall(3))
     colors = np.eye(3, dtype=np.uint8)[facing(vertices[faces])] * 200
     flat = np.zeros((5, 3), dtype=np.int32)
@@ -24,6 +24,6 @@ def test_terminals_have_the_colours_of_their_faces_where_others_without_area_are
     )  # fmt: skip
     assert found.grammar.productions
     assert found.grammar.grids
-    for each in (*found.grammar.meshes, found.grammar.exemplar):
-        assert (each.face_colors.argmax(axis=1) == facing(each.vertices[each.faces])).all()
-        assert (each.face_colors.max(axis=1) == 200).all()
+    for part in (*found.grammar.meshes, found.grammar.exemplar):
+        assert (part.face_colors.argmax(axis=1) == facing(part.vertices[part.faces])).all()
+        assert (part.face_colors.max(axis=1) == 200).all()

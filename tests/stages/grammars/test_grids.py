@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from eval.grammars.similarity import r_similarity
-from stages.grammars.derivation import START, Derivation, grid_poses
+from stages.grammars.derivation import START_SITE, Derivation, grid_poses
 from stages.grammars.extraction.docked_pieces import DockedPiece, find_docked_pieces, surrounding_cells
 from stages.grammars.extraction.grids import ExtractedGrid, crossing_rows, cut_grid, find_rows
 from stages.grammars.extraction.productions import ExtractedProduction, extract_productions, seams_by_site
@@ -19,7 +19,7 @@ SHARE = 0.03
 
 
 class Planted:
-    """A surface with its dockers and its first grid."""
+    """A surface with its docked pieces and its first grid."""
 
     def __init__(self, triangles: np.ndarray) -> None:
         self.triangles = triangles
@@ -29,21 +29,21 @@ class Planted:
         self.rows = find_rows(self.grid, self.docked_pieces, self.seams)
         self.sets = crossing_rows(self.grid, self.docked_pieces, self.rows)
         self.first: ExtractedGrid = cut_grid(
-            self.grid, self.docked_pieces, [self.rows[each] for each in self.sets[0]], self.seams
+            self.grid, self.docked_pieces, [self.rows[index] for index in self.sets[0]], self.seams
         )
 
     def resized(self, *counts: int) -> np.ndarray:
-        """The triangles of the first grid with so many cells along its rows."""
+        """Return the triangles of the first grid with these numbers of cells in its rows."""
         return np.concatenate(
             [
                 transform_points(pose, self.first.pieces[piece][1].corners.reshape(-1, 3)).reshape(-1, 3, 3)
                 for piece, pose in grid_poses(
-                    self.first.transforms, self.first.counts, [where for where, _ in self.first.pieces], counts
+                    self.first.transforms, self.first.counts, [along for along, _ in self.first.pieces], counts
                 )
             ]
         )
 
-    def similar(self, triangles: np.ndarray) -> float:
+    def similar_share(self, triangles: np.ndarray) -> float:
         rng = np.random.default_rng(0)
         return r_similarity(self.triangles, triangles, self.grid.radius, 80, rng).share
 
@@ -59,33 +59,33 @@ def facade() -> Planted:
 
 
 @pytest.fixture(scope="module")
-def found(row: Planted) -> list[ExtractedProduction]:
+def productions(row: Planted) -> list[ExtractedProduction]:
     return extract_productions(row.grid, row.docked_pieces, row.seams, np.random.default_rng(0))[0]
 
 
 class TestSites:
-    def test_the_ends_of_a_wall_with_none_to_three_bays_dock_at_one_class_of_sites(self, row: Planted) -> None:
-        """Symmetry §3.4.2: sites of one shape are identified across the model."""
+    def test_ends_of_a_wall_with_up_to_three_bays_dock_at_one_class_of_sites(self, row: Planted) -> None:
+        """Symmetry §3.4.2: equal sites are identified across the model."""
         bay = 2 * (1 * 2.4 - 0.5) + 0.3 * 3 + 0.6
-        classes = [[each.area for each in row.docked_pieces if each.site == site] for site in range(9)]
-        found = max(classes, key=lambda each: max(each, default=0.0))
-        end = min(found)
-        windows = (np.array(sorted(found)) - end) * area(row.triangles) / bay
+        classes = [[piece.area for piece in row.docked_pieces if piece.site == site] for site in range(9)]
+        areas = max(classes, key=lambda areas: max(areas, default=0.0))
+        end = min(areas)
+        windows = (np.array(sorted(areas)) - end) * area(row.triangles) / bay
         assert np.allclose(windows, np.round(windows), atol=0.1)
         assert set(np.round(windows)) == {0, 1, 2, 3}
 
 
 class TestGrids:
-    def test_a_wall_of_four_windows_is_a_row_of_three_cells_and_what_holds_the_fourth(self, row: Planted) -> None:
-        assert [each.count for each in row.rows] == [3, 3]  # cut from the left and from the right
+    def test_wall_of_four_windows_is_a_row_of_three_cells_and_its_ends(self, row: Planted) -> None:
+        assert [known.count for known in row.rows] == [3, 3]  # cut from the left and from the right
         assert np.allclose(np.abs(row.first.transforms[0, :3, 3]), (1, 0, 0), atol=1e-9)
-        assert [where for where, _ in row.first.pieces] == [(0,), (1,), (2,)]
+        assert [along for along, _ in row.first.pieces] == [(0,), (1,), (2,)]
 
     @pytest.mark.parametrize("count", [0, 3, 7])
-    def test_a_row_of_any_count_is_the_wall_of_so_many_windows(self, row: Planted, count: int) -> None:
+    def test_row_of_any_count_is_the_wall_with_one_window_more(self, row: Planted, count: int) -> None:
         shape = row.resized(count)
         assert area(shape) == pytest.approx(area(wall(count + 1)), rel=1e-9)
-        assert row.similar(shape) == 1.0
+        assert row.similar_share(shape) == 1.0
 
     def test_two_rows_that_cross_are_a_grid_of_nine_pieces(self, facade: Planted) -> None:
         """Symmetry figure 7a."""
@@ -94,35 +94,33 @@ class TestGrids:
         one, other = facade.first.transforms
         assert np.allclose(one @ other, other @ one)
 
-    def test_rows_whose_sites_cross_unlike_from_cell_to_cell_make_no_grid(self, facade: Planted) -> None:
-        """Symmetry figure 7b: the sites of each row are symmetric under its motion, but those of one lie higher in one
-        cell of the other."""
-        grid, one, other = facade.grid, *(facade.rows[each] for each in facade.sets[0])
+    def test_rows_whose_sites_cross_differently_from_cell_to_cell_make_no_grid(self, facade: Planted) -> None:
+        """Symmetry figure 7b: both rows have symmetric sites, but those of one lie higher in one cell of the other."""
+        grid, one, other = facade.grid, *(facade.rows[index] for index in facade.sets[0])
         upward, along = (one, other) if abs(one.transform[2, 3]) > 1 else (other, one)
         middles = grid.origin + grid.cell_size * (grid.cells + 0.5)
         above = middles[:, 2] if upward.transform[2, 3] > 0 else 6.4 - 0.4 - middles[:, 2]
 
         def cut_at(heights: np.ndarray) -> list[DockedPiece]:
-            """The dockers, those of the row upward beginning at a height, float64 (n,) for each cell, and a storey of 2
-            further each."""
-            dockers = list(facade.docked_pieces)
-            for number, place in enumerate(upward.docked_pieces):
+            """Return the pieces; those of the upward row are cut at heights (n,) of the cells, plus 2 per storey."""
+            pieces = list(facade.docked_pieces)
+            for number, index in enumerate(upward.docked_pieces):
                 cells = np.flatnonzero(above > heights + 2 * number).astype(np.int32)
-                dockers[place] = replace(dockers[place], cells=cells, border=surrounding_cells(grid, cells))
-            return dockers
+                pieces[index] = replace(pieces[index], cells=cells, border=surrounding_cells(grid, cells))
+            return pieces
 
         in_one_bay = (middles[:, 0] > 1.6) & (middles[:, 0] < 2.6)
         assert crossing_rows(grid, cut_at(np.full(len(grid), 0.4)), [along, upward]) == [(0, 1)]
         assert crossing_rows(grid, cut_at(np.where(in_one_bay, 0.1, 0.4)), [along, upward]) == [(0,), (1,)]
 
-    def test_a_grid_of_any_counts_is_the_wall_of_so_many_windows(self, facade: Planted) -> None:
+    def test_grid_of_any_counts_is_the_larger_wall(self, facade: Planted) -> None:
         across = facade.first.counts.index(3)
         counts = (4, 3) if across == 0 else (3, 4)
         shape = facade.resized(*counts)
         assert area(shape) == pytest.approx(area(wall(5, 4)), rel=1e-9)
-        assert facade.similar(shape) == 1.0
+        assert facade.similar_share(shape) == 1.0
 
-    def test_a_spiral_stair_goes_on_step_by_step_by_its_screw(self) -> None:
+    def test_spiral_stair_continues_by_its_screw_motion(self) -> None:
         stair = Planted(spiral_stair(5))
         own = stair.rows[0].count
         assert own >= 2
@@ -130,26 +128,26 @@ class TestGrids:
         assert np.allclose(stair.rows[0].transform, step, atol=1e-6)
         longer = stair.resized(own + 2)
         assert area(longer) == pytest.approx(area(stair.triangles) * 7 / 5, rel=1e-9)
-        assert stair.similar(longer) == 1.0
+        assert stair.similar_share(longer) == 1.0
 
 
 class TestProductions:
-    def test_what_the_exemplar_has_at_every_place_gives_the_exemplar_back(
-        self, row: Planted, found: list[ExtractedProduction]
+    def test_original_derivations_have_the_area_of_the_exemplar(
+        self, row: Planted, productions: list[ExtractedProduction]
     ) -> None:
-        def whole(one: Derivation) -> float:
-            return found[one.production].terminal.area + sum(map(whole, one.parts))
+        def whole(derivation: Derivation) -> float:
+            return productions[derivation.production].terminal.area + sum(map(whole, derivation.parts))
 
-        starts = [each for each in found if each.site == START]
+        starts = [production for production in productions if production.site == START_SITE]
         assert starts
-        for each in starts:
-            parts = sum(whole(place.original) for place in each.non_terminals)
-            assert each.terminal.area + parts == pytest.approx(area(row.triangles), rel=1e-9)
+        for production in starts:
+            parts = sum(whole(known.original) for known in production.non_terminals)
+            assert production.terminal.area + parts == pytest.approx(area(row.triangles), rel=1e-9)
 
-    def test_a_bay_is_followed_by_what_it_stands_beside(self, found: list[ExtractedProduction]) -> None:
-        """The rule of a 1-grid: a site of the class of its own site is left in what docks there."""
-        recursive = [each for each in found if [place.site for place in each.non_terminals] == [each.site]]
-        assert min(each.terminal.area for each in recursive) == pytest.approx(
+    def test_bay_is_followed_by_its_own_site(self, productions: list[ExtractedProduction]) -> None:
+        """The production of a 1-grid leaves a site of its own class."""
+        recursive = [known for known in productions if [left.site for left in known.non_terminals] == [known.site]]
+        assert min(known.terminal.area for known in recursive) == pytest.approx(
             2 * (1 * 2.4 - 0.5) + 0.3 * 3 + 0.6, rel=1e-9
         )
-        assert any(each.site == recursive[0].site and not each.non_terminals for each in found)
+        assert any(known.site == recursive[0].site and not known.non_terminals for known in productions)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 
 from eval.grammars.similarity import r_similarity, triangles_of
 from stages.grammars.collisions import Collisions
-from stages.grammars.derivation_text import format_derivation, placed_terminals, shape_of_text, surface_digest
+from stages.grammars.derivation import Derivation, ResizedGrid
+from stages.grammars.derivation_text import format_derivation
+from stages.grammars.derived_shape import placed_terminals, shape_of_text, surface_digest
 from stages.grammars.extraction.extract import ExtractedGrammar, SurfaceMesh, extract_grammar
 from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.random_derivations import DerivationCollides, random_derivation, random_resized_grid
@@ -21,35 +25,31 @@ from tests.stages.symmetry.planted import (
     wall,
 )
 
-MOST = 8
-"""So many shapes of a grammar are looked at."""
+MAX_TESTED_SHAPES = 8
 
 
 def extraction(triangles: FloatArray, radius: float) -> ExtractedGrammar:
-    """The grammar of triangles (f, 3, 3) in grey."""
+    """Extract the grammar of grey triangles (f, 3, 3)."""
     vertices, faces = mesh(triangles)
     grey = np.full((len(faces), 3), 160, np.uint8)
     return extract_grammar(SurfaceMesh(vertices, faces, grey), "planted", radius, "z", np.random.default_rng(0))
 
 
 def shapes_of(grammar: ShapeGrammar) -> list[FloatArray]:
-    """Different shapes by random rules and by grids in turn, as triangles (t, 3, 3)."""
+    """Return different shapes by random productions and by grids in turn, as triangles (t, 3, 3)."""
     collisions = Collisions(grammar)
     texts: dict[str, str] = {}
-    for seed in range(2 * MOST):
-        try:
-            drawn = random_derivation(grammar, collisions, 5, np.random.default_rng(seed))
-            texts.setdefault(
-                surface_digest(grammar, placed_terminals(grammar, drawn)), format_derivation(grammar, drawn)
-            )
-        except DerivationCollides:
-            pass
-        counts = random_resized_grid(grammar, 7, np.random.default_rng(seed))
-        if not collisions.whole(counts):
-            texts.setdefault(
-                surface_digest(grammar, placed_terminals(grammar, counts)), format_derivation(grammar, counts)
-            )
-    return [triangles_of(shape_of_text(grammar, each)) for each in list(texts.values())[:MOST]]
+    for seed in range(2 * MAX_TESTED_SHAPES):
+        derivations: list[Derivation | ResizedGrid] = []
+        with suppress(DerivationCollides):
+            derivations.append(random_derivation(grammar, collisions, 5, np.random.default_rng(seed)))
+        resized = random_resized_grid(grammar, 7, np.random.default_rng(seed))
+        if not collisions.grid_collides(resized):
+            derivations.append(resized)
+        for derivation in derivations:
+            digest = surface_digest(grammar, placed_terminals(grammar, derivation))
+            texts.setdefault(digest, format_derivation(grammar, derivation))
+    return [triangles_of(shape_of_text(grammar, text)) for text in list(texts.values())[:MAX_TESTED_SHAPES]]
 
 
 @pytest.mark.parametrize(
@@ -62,22 +62,22 @@ def shapes_of(grammar: ShapeGrammar) -> list[FloatArray]:
         (spiral_stair(5), 0.03, 3, [(4,)] * 2),
         (blind_corners(), 0.045, 4, [(1,)] * 4),
     ],
-    ids=["wall", "2-grid", "uneven wall", "interlocked dockers", "spiral stair", "rows that do not tile"],
+    ids=["wall", "2-grid", "uneven wall", "interlocked pieces", "spiral stair", "rows that do not tile"],
 )
-def test_sites_and_grids_are_those_expected_and_every_shape_is_r_similar(
+def test_planted_sites_and_grids_are_found_and_every_shape_is_r_similar(
     triangles: FloatArray, radius: float, classes: int, grids: list[tuple[int, ...]]
 ) -> None:
     found = extraction(triangles, radius)
-    assert len({each.site for each in found.docked_pieces}) == classes
-    assert [each.counts for each in found.grammar.grids] == grids
+    assert found.site_classes == classes
+    assert [grid.counts for grid in found.grammar.grids] == grids
     shapes = shapes_of(found.grammar)
-    assert len(shapes) >= MOST - 1
+    assert len(shapes) >= MAX_TESTED_SHAPES - 1
     for shape in shapes:
         assert r_similarity(triangles, shape, found.grammar.radius, 60, np.random.default_rng(0)).share == 1.0
 
 
-def test_rows_that_cross_otherwise_from_cell_to_cell_make_no_2_grid() -> None:
-    """Symmetry figure 7b: bays and storeys are rows that overlap, by motions that commute."""
+def test_rows_that_cross_differently_from_cell_to_cell_make_no_2_grid() -> None:
+    """Symmetry figure 7b: bays and storeys are rows that overlap, by transforms that commute."""
     found = extraction(blind_corners(), 0.045)
     cells: dict[tuple[float, ...], list[set[int]]] = {}
     for row in found.rows:
@@ -87,4 +87,4 @@ def test_rows_that_cross_otherwise_from_cell_to_cell_make_no_2_grid() -> None:
     assert set(cells) == {(1, 0, 0), (0, 0, 1)}
     assert all(bays & storeys for bays in cells[1, 0, 0] for storeys in cells[0, 0, 1])
     assert len(found.grammar.grids) == len(found.rows) == 4
-    assert all(len(each.counts) == 1 for each in found.grammar.grids)
+    assert all(len(grid.counts) == 1 for grid in found.grammar.grids)

@@ -10,12 +10,12 @@ from stages.symmetry.surface.soup import Soup, carve
 from tests.stages.symmetry.planted import blocks, box, mesh, one_object, screw, spiral_stair, wall
 
 
-def counts(triangles: np.ndarray) -> list[int]:
-    return sorted(len(each.poses) for each in repeated_pieces(*mesh(triangles)))
+def copy_counts(triangles: np.ndarray) -> list[int]:
+    return sorted(len(piece.poses) for piece in repeated_pieces(*mesh(triangles)))
 
 
 class TestCarve:
-    def test_both_sides_of_a_seam_make_the_whole_with_one_border(self) -> None:
+    def test_both_sides_of_a_seam_are_the_whole_surface_with_one_border(self) -> None:
         corners = wall(3)
         grid = surface_grid(corners, 0.03)
         left = np.flatnonzero(grid.cells[:, 0] < np.median(grid.cells[:, 0])).astype(np.int32)
@@ -36,69 +36,69 @@ class TestCarve:
 
 
 class TestRepeatedPieces:
-    def test_a_wall_is_its_two_ends_and_a_bay_for_each_window(self) -> None:
+    def test_wall_is_two_ends_and_one_bay_per_window(self) -> None:
         pieces = repeated_pieces(*mesh(wall(5)))
-        assert sorted(len(each.poses) for each in pieces) == [1, 1, 5]
-        bays = next(each for each in pieces if len(each.poses) == 5)
+        assert sorted(len(piece.poses) for piece in pieces) == [1, 1, 5]
+        bays = next(piece for piece in pieces if len(piece.poses) == 5)
         assert np.allclose(np.sort([pose[0, 3] for pose in bays.poses]) - min(p[0, 3] for p in bays.poses), range(5))
 
     def test_a_row_is_cut_although_a_rail_runs_along_it_from_end_to_end(self) -> None:
-        """No docking site parts the model, for the rail goes around it, as a crane's ladder does."""
+        """No docking site separates the model, because the rail goes around it, as a crane's ladder does."""
         rail = blocks(
             [0.1, 0.2, 4.0, 4.1], [-0.5, -0.4, 0.0], [1.8, 1.9], lambda x, y, _: y < -0.4 or not 0.2 < x < 4.0
         )  # fmt: skip
         pieces = repeated_pieces(*mesh(np.concatenate([wall(3), rail])))
-        assert max(len(each.poses) for each in pieces) >= 3
-        bays = max(pieces, key=lambda each: len(each.poses))
+        assert max(len(piece.poses) for piece in pieces) >= 3
+        bays = max(pieces, key=lambda piece: len(piece.poses))
         assert bays.triangles.area == pytest.approx(2 * (2.4 - 0.5) + 0.3 * (2 * 0.5 + 2 * 1.0) + 2 * 0.3, rel=0.15)
 
     def test_two_grids_that_cross_make_nine_pieces(self) -> None:
         """Symmetry figure 7a: the corners once, the borders in one direction, the middle in both."""
-        assert counts(wall(4, 3)) == [1, 1, 1, 1, 3, 3, 4, 4, 12]
+        assert copy_counts(wall(4, 3)) == [1, 1, 1, 1, 3, 3, 4, 4, 12]
 
     @pytest.mark.slow
     def test_the_steps_of_a_spiral_stair_are_one_piece_under_a_screw(self) -> None:
         pieces = repeated_pieces(*mesh(spiral_stair(7)))
-        steps = [each for each in pieces if len(each.poses) == 7]
+        steps = [piece for piece in pieces if len(piece.poses) == 7]
         assert steps
         relative = np.linalg.inv(steps[0].poses[0]) @ steps[0].poses[1]
         assert min(np.abs(relative - screw(a, b)).max() for a, b in ((0.5, 0.35), (-0.5, -0.35))) < 1e-6
 
     def test_pieces_at_their_poses_are_the_surface(self) -> None:
         pieces = repeated_pieces(*mesh(wall(4)))
-        area = sum(len(each.poses) * each.triangles.area for each in pieces)
+        area = sum(len(piece.poses) * piece.triangles.area for piece in pieces)
         assert area == pytest.approx(2 * (5.2 * 2.4 - 2) + 0.3 * (2 * 7.6 + 12), rel=1e-6)
 
-    def test_what_repeats_nothing_stays_whole(self) -> None:
-        assert counts(box((0, 0, 0), (3, 2, 1))) == [1]
+    def test_surface_without_repetition_stays_whole(self) -> None:
+        assert copy_counts(box((0, 0, 0), (3, 2, 1))) == [1]
 
 
-class TestBridge:
-    def test_a_mesh_in_one_piece_is_cut_by_what_it_repeats(self) -> None:
+class TestCutSurface:
+    def test_mesh_in_one_piece_is_cut_by_its_repetitions(self) -> None:
         source, why, parts = pick_segmentation(one_object(wall(4)))
         assert source == "symmetry"
         assert "6 pieces between copies of what repeats" in why
         assert len(parts.surfaces) == 3
-        assert sorted(np.bincount([each.surface for each in parts.placements]).tolist()) == [1, 1, 4]
+        assert sorted(np.bincount([placement.surface for placement in parts.placements]).tolist()) == [1, 1, 4]
 
     @pytest.mark.parametrize(
-        ("taper", "said"),
-        [(0.0, ()), (0.004, ("what runs along a row is alike at all its copies now; it differed by 14%",))],
+        ("taper", "warnings"),
+        [(0.0, ()), (0.004, ("what runs along a row was made equal at its copies; it differed by 14%",))],
     )
-    def test_what_runs_along_a_row_unevenly_is_told(self, taper: float, said: tuple[str, ...]) -> None:
+    def test_uneven_strip_along_a_row_makes_a_warning(self, taper: float, warnings: tuple[str, ...]) -> None:
         """The far end of a cable is thicker by less than a cell."""
         cable = box((0.0, -0.031, 1.6), (6.2, -0.001, 1.7))
         cable[..., 2] += taper * cable[..., 0] * (cable[..., 2] > 1.65)
         parts = segment_scene(one_object(np.concatenate([wall(5), cable])), "symmetry")
-        assert np.bincount([each.surface for each in parts.placements]).max() == 5
-        assert parts.warnings == said
+        assert np.bincount([placement.surface for placement in parts.placements]).max() == 5
+        assert parts.warnings == warnings
 
-    def test_a_mesh_that_repeats_nothing_is_left_alone(self) -> None:
+    def test_mesh_without_repetition_keeps_its_objects(self) -> None:
         source, why, _ = pick_segmentation(one_object(box((0, 0, 0), (3, 2, 1))))
         assert source == "objects"
         assert "nothing tells parts apart" in why
 
-    def test_much_surface_in_a_small_box_is_not_searched_unasked(self) -> None:
+    def test_large_surface_in_a_small_box_is_not_searched_by_default(self) -> None:
         x, y, z = np.arange(20) / 19, np.array([0.0, 1.0]), np.arange(20) % 2
         fold = np.array([[[x[k], y[0], z[k]], [x[k + 1], y[0], z[k + 1]], [x[k], y[1], z[k]]] for k in range(19)])
         back = np.array(
@@ -109,7 +109,7 @@ class TestBridge:
         assert "too much surface to look unasked for what repeats" in why
         assert len(parts.placements) == 1
 
-    def test_a_mesh_without_any_area_stays_as_it_is(self) -> None:
+    def test_mesh_without_area_keeps_its_objects(self) -> None:
         flat = np.array([[[0, 0, 0], [1, 0, 0], [0.5, 0, 0]]], dtype=float)
         source, why, parts = pick_segmentation(one_object(flat))
         assert source == "objects"

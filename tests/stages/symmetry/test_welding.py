@@ -8,7 +8,7 @@ from tests.stages.symmetry.planted import wall
 
 
 @pytest.mark.parametrize("others", [0, 1, 40])
-def test_what_is_put_together_of_a_welded_surface_and_of_others_is_as_if_welded_anew(others: int) -> None:
+def test_parts_of_a_welded_surface_with_other_triangles_equal_a_fresh_weld(others: int) -> None:
     rng = np.random.default_rng(others)
     near = wall(3) + rng.uniform(-1e-9, 1e-9, (len(wall(3)), 3, 3))
     first, last = rng.permutation(len(near))[: len(near) // 2].reshape(2, -1).astype(np.int32)
@@ -16,7 +16,7 @@ def test_what_is_put_together_of_a_welded_surface_and_of_others_is_as_if_welded_
     pieces = near[rng.integers(len(near), size=others)] + 1e-9
     pieces[:, 1] = (pieces[:, 0] + pieces[:, 1]) / 2
     pieces[: others // 4, 2] -= 9
-    had = WeldedSurface(near, 1e-6).around(first, pieces, last)
-    wanted = weld(np.concatenate([near[first], pieces, near[last]]), 1e-6)
-    assert np.array_equal(had[0], wanted[0])
-    assert np.array_equal(had[1], wanted[1])
+    merged = WeldedSurface(near, 1e-6).around(first, pieces, last)
+    expected = weld(np.concatenate([near[first], pieces, near[last]]), 1e-6)
+    assert np.array_equal(merged[0], expected[0])
+    assert np.array_equal(merged[1], expected[1])
