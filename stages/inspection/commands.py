@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 from pydantic import ValidationError
@@ -27,7 +27,7 @@ COMMANDS = typer.Typer()
 def inspect(
     models: Annotated[
         list[str],
-        typer.Argument(metavar="MODEL...", help="GLB, glTF, OBJ, PLY, STL, OFF or DAE; or a point cloud, PLY or XYZ"),
+        typer.Argument(metavar="MODEL", help="GLB, glTF, OBJ, PLY, STL, OFF or DAE; or a point cloud, PLY or XYZ"),
     ],
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object, for programs")] = False,
     as_table: Annotated[bool, typer.Option("--table", help="print a Markdown row for each model by itself")] = False,
@@ -67,7 +67,7 @@ def inspect(
         "parts": max_parts,
         "triangles": max_triangles,
     }
-    contact = {"tolerance": tolerance, "kinds": None if kinds is None else [kind.strip() for kind in kinds.split(",")]}
+    contact = {"tolerance": tolerance, "kinds": None if kinds is None else _kinds(kinds)}
     paths = [path for text in models for path in model_paths(text)]
     for path in paths:
         check_exists(path)
@@ -75,7 +75,7 @@ def inspect(
     try:
         limits = ReadLimits.model_validate(_stated(stated_limits))
         config = KitConfig.model_validate(
-            {"name": "inspected", "shapes": paths, "contact": _stated(contact), **_stated(settings)}
+            {"name": "inspected", "shapes": tuple(paths), "contact": _stated(contact), **_stated(settings)}
         )
     except ValidationError as error:
         raise _wrong_options(error) from None
@@ -135,7 +135,16 @@ def _stated(settings: Mapping[str, object]) -> dict[str, object]:
     return {key: value for key, value in settings.items() if value is not None}
 
 
-def _label_map(labels: list[str]) -> dict[str, list[str]]:
+def _kinds(text: str) -> tuple[str, ...]:
+    """Return kinds of contact in the order of ContactKind; KitConfig refuses unknown ones."""
+    from stages.shape.kit import ContactKind
+
+    known = get_args(ContactKind)
+    kinds = {kind.strip() for kind in text.split(",")}
+    return (*(kind for kind in known if kind in kinds), *sorted(kinds - set(known)))
+
+
+def _label_map(labels: list[str]) -> dict[str, tuple[str, ...]]:
     label_map = {}
     for text in labels:
         name, _, patterns = text.partition("=")
@@ -143,7 +152,7 @@ def _label_map(labels: list[str]) -> dict[str, list[str]]:
             raise typer.BadParameter(
                 f"{text!r} is no NAME=PATTERN,..., such as leg='*leg*,foot*'", param_hint="--label"
             )
-        label_map[name] = patterns.split(",")
+        label_map[name] = tuple(patterns.split(","))
     return label_map
 
 
