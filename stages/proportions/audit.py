@@ -1,4 +1,4 @@
-"""How `make verify` looks at samples that are exemplars in other proportions."""
+"""Check samples that are exemplars in other proportions."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import PackagedSample
 
 
-def _anew(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
-    """The text is read, and written again; the shape that it makes holds together as the exemplar does."""
+def _recheck(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
+    """Read and write the text again, and check that the shape keeps the contacts of its exemplar."""
     record = sample.record
     if record["language"] != LANGUAGE.name:
         return
@@ -26,9 +26,9 @@ def _anew(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
         yield str(error)
         return
     if proportion_text(name, warp) != record["text"]:
-        yield "its proportions are written in another way than they are read"
+        yield "its proportions read and written again give another text"
     if fault is not None:
-        yield f"beside its exemplar: {fault}"
+        yield f"compared with its exemplar: {fault}"
 
 
-AUDIT = Audit(recheck=_anew)
+AUDIT = Audit(recheck=_recheck)

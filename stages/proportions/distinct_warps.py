@@ -1,4 +1,4 @@
-"""Warps of one exemplar that were drawn, and how they differ."""
+"""Warps of one exemplar, and how they differ."""
 
 from __future__ import annotations
 
@@ -7,16 +7,22 @@ import numpy as np
 from stages.proportions.warp import Lattice, Warp
 
 MIN_GAP = 1e-9
-"""What differs by less is the same."""
+"""Smaller differences are rounding."""
 
 
 class DistinctWarps:
-    """Warps of an exemplar, held against it and each other by their signatures: by the greatest difference of one
-    coordinate, where some end of a part lies, as a share of the diagonal."""
+    """Warps of an exemplar, compared with it and each other by their signatures.
 
-    def __init__(self, lattice: Lattice, apart: float) -> None:
-        """apart: so far a warp must be from the exemplar and from all others."""
-        self._lattice, self._apart = lattice, max(apart, MIN_GAP)
+    The difference of two signatures is the greatest difference of one coordinate: where some end of a part lies, as a
+    share of the diagonal.
+    """
+
+    def __init__(self, lattice: Lattice, min_difference: float) -> None:
+        """Start without warps.
+
+        min_difference: minimum difference of a warp from the exemplar and from all others
+        """
+        self._lattice, self._min_difference = lattice, max(min_difference, MIN_GAP)
         self._origin = lattice.signature([np.ones(len(lengths)) for lengths in lattice.lengths])
         self._points = np.empty((64, len(self._origin)))
         self._count = 0
@@ -25,10 +31,13 @@ class DistinctWarps:
         return self._count
 
     def is_new(self, warp: Warp) -> bool:
-        """Whether it is far enough from the exemplar and all that were added."""
+        """Return whether a warp differs enough from the exemplar and all that were added."""
         point = self._lattice.signature(warp)
         gaps = np.abs(self._points[: self._count] - point).max(axis=1, initial=0.0)
-        return bool((gaps >= self._apart).all() and np.abs(self._origin - point).max(initial=0.0) >= self._apart)
+        return bool(
+            (gaps >= self._min_difference).all()
+            and np.abs(self._origin - point).max(initial=0.0) >= self._min_difference
+        )
 
     def add(self, warp: Warp) -> None:
         """Keep a warp, whether it is new or not."""
@@ -37,15 +46,17 @@ class DistinctWarps:
         self._points[self._count] = self._lattice.signature(warp)
         self._count += 1
 
-    def farthest_first(self, most: int) -> list[int]:
-        """The places of at most `most` of those added, in the order in which they were: each in turn the one that is
-        farthest from the exemplar and from those before it, as long as that is far enough."""
+    def farthest_first(self, count: int) -> list[int]:
+        """Return the indices of at count `count` of the added warps, farthest first.
+
+        Each is the one farthest from the exemplar and from those before it, as long as that is far enough.
+        """
         points = self._points[: self._count]
         gaps = np.abs(points - self._origin).max(axis=1, initial=0.0)
         chosen: list[int] = []
-        while len(chosen) < min(most, len(points)):
+        while len(chosen) < min(count, len(points)):
             place = int(gaps.argmax())
-            if gaps[place] < self._apart:
+            if gaps[place] < self._min_difference:
                 break
             chosen.append(place)
             gaps = np.minimum(gaps, np.abs(points - points[place]).max(axis=1, initial=0.0))

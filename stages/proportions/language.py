@@ -1,4 +1,4 @@
-"""The language of proportions: a sample is an exemplar with factors, and its shape is the exemplar's with these."""
+"""The language of proportions: a sample is an exemplar with factors, and its shape is the exemplar resized by them."""
 
 from __future__ import annotations
 
@@ -25,27 +25,29 @@ class Proportions:
         self.sources = Kits(kits).sources
 
     def shape(self, sample: Sample) -> Shape:
-        """The exemplar as the sample's text says. Raises ProportionError for a text that is none of its kit."""
+        """Return the exemplar resized by the sample's text. Raises ProportionError for a text that does not fit its
+        kit.
+        """
         return shape_of_text(self._kits[sample.kit], sample.text)
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
-        """The exemplars, hubs among their parts."""
-        found = [
+        """Return the exemplars, hubs among their parts."""
+        exemplars = [
             (exemplar.name, kit_shape(kit, exemplar.whole)) for kit in self._kits.values() for exemplar in kit.exemplars
         ]
-        return [(f"{name}, {part_count(shape)}", shape) for name, shape in found[:count]]
+        return [(f"{name}, {part_count(shape)}", shape) for name, shape in exemplars[:count]]
 
 
 def _reads(plan: Plan) -> tuple[str, ...]:
     return tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
 
 
-def _anew(places: DatasetPaths) -> RebuildShape:
+def _rebuild(places: DatasetPaths) -> RebuildShape:
     kits = dataset_kits(places)
 
     def shape(record: Mapping[str, Any], _: IntArray) -> Shape:
         if record["kit"] not in kits:
-            raise LookupError(f"kit {record['kit']} is not beside the dataset in .work")
+            raise LookupError(f"kit {record['kit']} is missing in the dataset's .work folder")
         return upright(shape_of_text(kits[record["kit"]], record["text"]))
 
     return shape
@@ -58,7 +60,7 @@ LANGUAGE = Language(
     graphs=False,
     text="Its proportions as JSON: the exemplar, and for each axis the factors of the intervals between the ends of "
     "the exemplar's parts.",
-    rebuild=_anew,
-    coordinates="The unit is that of the model files, and the lowest point is as high as in the exemplar's. The origin "
-    "of a mesh is the middle of the box around the part, and poses turn nothing.",
+    rebuild=_rebuild,
+    coordinates="The unit is that of the model files, and the lowest point is as high as in the exemplar. The origin "
+    "of a mesh is the middle of the box around the part, and poses do not rotate.",
 )

@@ -1,8 +1,8 @@
 """Stage `proportions`: exemplars in; the same in other proportions out, as the shards `<dataset>-<split>-<index>.tar`.
 
-Its first shards, some lanes for each kit, draw factors and keep those under which the exemplar holds together. Then one
-chooses of them, those farthest apart first, and gives each its split and shard. A sample carries no meshes: its text is
-its factors, and `stages.proportions.text.shape_of_text` makes the shape.
+Its first shards, several for each kit, draw factors and keep those under which the exemplar holds together. Then one
+shard chooses among them, the most different first, and assigns each to its split and shard. A sample carries no meshes:
+its text is its factors, and `stages.proportions.text.shape_of_text` makes the shape.
 """
 
 from __future__ import annotations
@@ -38,36 +38,44 @@ from stages.variations.settings import VariationsConfig
 
 BYTES_A_SAMPLE = 8_000
 CANDIDATES_PER_SAMPLE = 2
-"""So many times the shapes wanted are found, for the choice."""
+"""Candidates that the choice has for each requested sample."""
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """The lanes of all kits; the choice; when that is made, the shards of the collection. What they are to make is in
-    their params: it is asked for by the own section, or comes instead of layouts."""
-    config = _wanted(plan)
+    """Return the searches of all kits, then the choice and, once that is made, the shards of the collection.
+
+    Their params hold what they must make: the section requests it, or it replaces layouts.
+    """
+    config = _requested_config(plan)
     if not config.samples_per_kit:
         return []
-    asked = config.model_dump(mode="json", include={"samples_per_kit", "splits", "require"})
-    lanes = [
-        Shard(f"{kit}-lane{lane:02}", {"job": "lane", "kit": kit, "lane": lane, "asked": asked}, (f"exemplars/{kit}",))
+    request = config.model_dump(mode="json", include={"samples_per_kit", "splits", "require"})
+    searches = [
+        Shard(
+            _search_name(kit, number),
+            {"job": "search", "kit": kit, "number": number, "request": request},
+            (f"exemplars/{kit}",),
+        )
         for kit in plan.shards("exemplars")
-        for lane in range(config.parallel_searches)
+        for number in range(config.parallel_searches)
     ]
     inputs = (
         *(f"exemplars/{kit}" for kit in plan.shards("exemplars")),
-        *(f"proportions/{shard.name}" for shard in lanes),
+        *(f"proportions/{shard.name}" for shard in searches),
     )
-    params = {"job": "choice", "lanes": [shard.name for shard in lanes], "asked": asked}
+    params = {"job": "choice", "searches": [shard.name for shard in searches], "request": request}
     choice = Shard(choice_name(plan.config.name), params, inputs)
     summary = plan.summary("proportions", choice.name)
     if summary is None:
-        return [*lanes, choice]
-    return [*lanes, choice, *planned_collection(plan, summary["shards"], (f"proportions/{choice.name}",))]
+        return [*searches, choice]
+    return [*searches, choice, *planned_collection(plan, summary["shards"], (f"proportions/{choice.name}",))]
 
 
-def _wanted(plan: Plan) -> ProportionsConfig:
-    """The section, or where proportions come instead of layouts, with what is asked of these: how many, shared out how,
-    and that they stand where the exemplars do."""
+def _requested_config(plan: Plan) -> ProportionsConfig:
+    """Return the section, or the request for layouts that proportions replace.
+
+    The latter has the number of samples and the splits of the layouts, and requires shapes as stable as the exemplars.
+    """
     own, chosen = plan.config.section(ProportionsConfig), resolved_fallback(plan)
     if own.samples_per_kit or not chosen:
         return own
@@ -84,64 +92,71 @@ def _wanted(plan: Plan) -> ProportionsConfig:
     )
 
 
-def _asked(task: Task) -> ProportionsConfig:
-    """The section, with what the plan has asked for."""
-    asked = ProportionsConfig.model_validate_json(json.dumps(task.shard.params["asked"]))
-    update = {key: getattr(asked, key) for key in ("samples_per_kit", "splits", "require")}
+def _task_config(task: Task) -> ProportionsConfig:
+    """Return the section with the plan's request."""
+    request = ProportionsConfig.model_validate_json(json.dumps(task.shard.params["request"]))
+    update = {key: getattr(request, key) for key in ("samples_per_kit", "splits", "require")}
     return task.config.section(ProportionsConfig).model_copy(update=update)
 
 
+def _search_name(kit: str, number: int) -> str:
+    """Return the shard of one search of a kit; its name selects the stream of random numbers."""
+    return f"{kit}-lane{number:02}"
+
+
 def choice_name(dataset: str) -> str:
-    """The shard that chooses the shapes of a dataset."""
+    """Return the shard that chooses the shapes of a dataset."""
     return f"{dataset}-choice"
 
 
 def run_shard(task: Task) -> Outcome:
-    """A lane, the choice, or a shard of the collection."""
-    jobs = {"lane": run_lane, "choice": run_choice, "collection": run_collection}
+    """Run a search, the choice, or a shard of the collection."""
+    jobs = {"search": run_search, "choice": run_choice, "collection": run_collection}
     return jobs[task.shard.params["job"]](task)
 
 
-def run_lane(task: Task) -> Outcome:
-    """File of the shard: `.txt`, a text a line of shapes that hold together and are what they must be."""
-    config = _asked(task)
+def run_search(task: Task) -> Outcome:
+    """Write `.txt`: the texts of shapes that hold together and meet the requirements, one a line."""
+    config = _task_config(task)
     kit = input_kit(task, task.shard.params["kit"])
     exemplars = [exemplar.whole for exemplar in kit.exemplars]
     lattices = [lattice_of(kit, exemplar) for exemplar in exemplars]
-    drawn = [DistinctWarps(lattice, config.min_difference) for lattice in lattices]
+    distinct = [DistinctWarps(lattice, config.min_difference) for lattice in lattices]
     wanted = -(-CANDIDATES_PER_SAMPLE * config.samples_per_kit // config.parallel_searches)
-    found: list[str] = []
+    texts: list[str] = []
     tries = 0
-    while len(found) < wanted and tries < config.oversample * wanted:
-        place = tries % len(exemplars)
+    while len(texts) < wanted and tries < config.oversample * wanted:
+        index = tries % len(exemplars)
         tries += 1
-        name, whole, lattice = kit.exemplars[place].name, exemplars[place], lattices[place]
+        name, whole, lattice = kit.exemplars[index].name, exemplars[index], lattices[index]
         text = proportion_text(name, lattice.draw(task.rng("factors", tries), config.log_std, config.max_factor))
         warp = read_proportions(text)[1]
-        if not drawn[place].is_new(warp):
-            task.reject(text, "nearly the exemplar, or one drawn before")
+        if not distinct[index].is_new(warp):
+            task.reject(text, "too near the exemplar or an earlier draw")
             continue
         shape = warped(kit, whole, lattice, warp)
-        wrong = warp_fault(kit, whole, shape) or unmet_requirement(config.require, shape)
-        if wrong is not None:
-            task.reject(text, wrong)
+        reason = warp_fault(kit, whole, shape) or unmet_requirement(config.require, shape)
+        if reason is not None:
+            task.reject(text, reason)
             continue
-        drawn[place].add(warp)
-        found.append(text)
-        task.progress(len(found), wanted)
+        distinct[index].add(warp)
+        texts.append(text)
+        task.progress(len(texts), wanted)
     with task.output(f"{task.shard.name}.txt") as stream:
-        stream.write("".join(f"{text}\n" for text in found).encode())
-    return Outcome(0, {"tries": tries, "found": len(found)})
+        stream.write("".join(f"{text}\n" for text in texts).encode())
+    return Outcome(0, {"tries": tries, "found": len(texts)})
 
 
 def run_choice(task: Task) -> Outcome:
-    """Files of the shard: one for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line. Raises
-    ShardFailed where there are no shapes."""
-    config = _asked(task)
+    """Write one file for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line.
+
+    Raises ShardFailed if there are no shapes.
+    """
+    config = _task_config(task)
     texts: dict[str, list[str]] = {}
-    for lane in task.shard.params["lanes"]:
-        kit = lane.rpartition("-lane")[0]
-        texts.setdefault(kit, []).extend(task.input("proportions", f"{lane}.txt").read_text().splitlines())
+    for search in task.shard.params["searches"]:
+        kit = search.rpartition("-lane")[0]
+        texts.setdefault(kit, []).extend(task.input("proportions", f"{search}.txt").read_text().splitlines())
     rows: list[dict[str, Any]] = []
     counts: dict[str, int] = {}
     files = {kit.name: [shape.path for shape in kit.shapes] for kit in task.config.section(ExemplarsConfig).kits}
@@ -150,15 +165,15 @@ def run_choice(task: Task) -> Outcome:
         chosen: list[dict[str, Any]] = []
         for number, (exemplar, path) in enumerate(zip(kit.exemplars, files[name], strict=True)):
             own = [text for text in of_kit if read_proportions(text)[0] == exemplar.name]
-            drawn = DistinctWarps(lattice_of(kit, exemplar.whole), config.min_difference)
+            distinct = DistinctWarps(lattice_of(kit, exemplar.whole), config.min_difference)
             for text in own:
-                drawn.add(read_proportions(text)[1])
-            share = len(range(number, config.samples_per_kit, len(kit.exemplars)))
+                distinct.add(read_proportions(text)[1])
+            count = len(range(number, config.samples_per_kit, len(kit.exemplars)))
             graph = kit.labelled(exemplar.assembly)
             digest = graph_digest(graph.types, graph.edges)
-            for place in drawn.farthest_first(share):
+            for index in distinct.farthest_first(count):
                 parents = ["/".join(path.parts[-2:])]
-                row = {"kit": name, "graph": digest, "method": "proportions", "parents": parents, "text": own[place]}
+                row = {"kit": name, "graph": digest, "method": "proportions", "parents": parents, "text": own[index]}
                 chosen.append(row)
         for number, row in enumerate(chosen):
             rows.append({"key": f"{name}-{number:06d}", **row})
@@ -179,52 +194,56 @@ def run_collection(task: Task) -> Outcome:
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """How many shapes each kit has, what was refused, and where there are fewer than wanted."""
-    config = _wanted(plan)
+    """Return the number of shapes of each kit, the rejects, and warnings where there are fewer than requested."""
+    config = _requested_config(plan)
     made = plan.summary("proportions", choice_name(plan.config.name)) if config.samples_per_kit else None
     if made is None:
         return []
     lines = []
     for kit, count in made["shapes"].items():
-        refused: dict[str, int] = {}
-        for lane in range(config.parallel_searches):
-            for reason, number in plan.rejects("proportions", f"{kit}-lane{lane:02}").items():
-                refused[reason] = refused.get(reason, 0) + number
-        why = ", ".join(f"{number:,} {reason}" for reason, number in sorted(refused.items()))
-        lines.append(f"{kit}: {count:,} of {config.samples_per_kit:,} shapes; refused: {why or 'none'}")
+        rejected: dict[str, int] = {}
+        for search in range(config.parallel_searches):
+            for reason, rejects in plan.rejects("proportions", _search_name(kit, search)).items():
+                rejected[reason] = rejected.get(reason, 0) + rejects
+        why = ", ".join(f"{rejects:,} {reason}" for reason, rejects in sorted(rejected.items()))
+        lines.append(f"{kit}: {count:,} of {config.samples_per_kit:,} shapes; rejected: {why or 'none'}")
         if count < config.samples_per_kit:
             lines.append(
-                f"warning: {kit} has fewer shapes than wanted; set proportions.min_difference smaller, or "
-                "proportions.oversample or spread larger"
+                f"warning: {kit} has fewer shapes than requested; lower proportions.min_difference, or "
+                "raise proportions.oversample or log_std"
             )
     return [*lines, *(f"warning: {sentence}" for sentence in missing_licenses(exemplar_origins(plan.config)))]
 
 
 def check(config: Config) -> None:
-    """Raises ConfigError where there is nothing that could have other proportions."""
+    """Raise ConfigError if shapes are requested and there are no exemplars."""
     if config.section(ProportionsConfig).samples_per_kit and not config.section(ExemplarsConfig).kits:
         raise ConfigError(
             f"{config.path}: proportions.samples_per_kit asks for shapes, and there are no exemplars.kits"
         )
 
 
-def asked(config: Config) -> Sequence[int]:
-    """The shapes of each shard of the collection, if as many are found as are asked for."""
+def requested_samples(config: Config) -> Sequence[int]:
+    """Return the shapes of each shard of the collection if all requested ones are found."""
     section = config.section(ProportionsConfig)
     return section.splits.shard_sizes(section.samples_per_kit * len(config.section(ExemplarsConfig).kits))
 
 
 def trial(config: Config) -> ProportionsConfig:
-    """Few shapes of each kit."""
+    """Return a request for a few shapes of each kit."""
     section = config.section(ProportionsConfig)
     few = max(32 // max(len(config.section(ExemplarsConfig).kits), 1), 4)
-    update = {"samples_per_kit": min(section.samples_per_kit, few), "lanes": 1, "splits": section.splits.for_trial()}
+    update = {
+        "samples_per_kit": min(section.samples_per_kit, few),
+        "parallel_searches": 1,
+        "splits": section.splits.for_trial(),
+    }
     return section.model_copy(update=update)
 
 
 def estimate_bytes(plan: Plan) -> int:
-    """Bytes of all texts, in their lanes and in the collection."""
-    return 2 * BYTES_A_SAMPLE * _wanted(plan).samples_per_kit * len(plan.shards("exemplars"))
+    """Return the bytes of all texts, in their searches and in the collection."""
+    return 2 * BYTES_A_SAMPLE * _requested_config(plan).samples_per_kit * len(plan.shards("exemplars"))
 
 
 STAGE = Stage(
@@ -238,6 +257,6 @@ STAGE = Stage(
     estimate_bytes=estimate_bytes,
     report=report,
     check=check,
-    requested_samples=asked,
+    requested_samples=requested_samples,
     trial_config=trial,
 )

@@ -1,8 +1,8 @@
 """Other proportions of an exemplar: along each axis a monotone map that is linear between the ends of its parts.
 
-The mapping is one for all of space and taken a vertex at a time (substructures §5.2), so what touches goes on touching,
-and what lies apart goes on lying apart. Lengths along an axis that were equal stay equal, and thin ones along all axes:
-legs stay alike, boards as thick as each other, gaps even, and what is its own mirror image remains so.
+One map moves all vertices (substructures §5.2), so parts that touch keep touching, and separate parts stay separate.
+Lengths along an axis that were equal stay equal, and so do thin ones along all axes. So legs stay alike, boards equally
+thick, gaps even, and symmetric shapes symmetric.
 """
 
 from __future__ import annotations
@@ -19,15 +19,14 @@ from stages.shape.kit import Assembly, Kit, PartMesh
 from stages.shape.shape import Shape, kit_shape
 
 MERGED_ENDS_SHARE = 2e-3
-"""Ends of parts that are nearer to each other than this share of the longest side are one."""
+"""Ends of parts nearer to each other than this share of the longest side are one."""
 EQUAL_LENGTH_TOLERANCE = 0.02
 """Lengths that differ by less, as a share, are equal."""
 MIN_SCALED_LENGTH_SHARE = 0.15
-"""A length of more than this share of the longest side follows the size of the whole along its axis; what is thinner
-has a thickness of its own."""
+"""Lengths above this share of the longest side follow the size along their axis; thinner ones have their own factors.
+"""
 MAX_FREE_INTERVALS = 12
-"""With more intervals along an axis than this all of them follow the size of the whole; and with more lengths than this
-each has the less of its own."""
+"""Along an axis with more intervals all follow the size of the whole. With more lengths, own factors vary less."""
 FACTOR_DECIMALS = 3
 
 Warp = tuple[FloatArray, FloatArray, FloatArray]
@@ -36,7 +35,10 @@ Warp = tuple[FloatArray, FloatArray, FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class WarpedMesh(PartMesh):
-    """The surface of a part in other proportions. of: the mesh as it is."""
+    """The surface of a part in other proportions.
+
+    of: mesh in the kit's proportions
+    """
 
     of: PartMesh
 
@@ -49,55 +51,57 @@ class WarpedMesh(PartMesh):
 class Lattice:
     """The intervals of an exemplar.
 
-    knots: for each axis float64 (k + 1,), ascending, where parts begin or end, in the coordinates of the exemplar;
-    lengths: for each axis int64 (k,), the number of each interval's length: equal lengths have one number, along all
-    axes; up: the axis that points up.
+    knots: for each axis where parts begin or end, ascending, in the coordinates of the exemplar, float64 (k + 1,)
+    lengths: for each axis the number of each interval's length, int64 (k,); equal lengths share a number along all axes
+    up: axis that points up
     """
 
     knots: tuple[FloatArray, FloatArray, FloatArray]
     lengths: tuple[np.ndarray, np.ndarray, np.ndarray]
     up: int
 
-    def draw(self, rng: np.random.Generator, spread: float, most: float) -> Warp:
-        """Random factors, rounded, at most `most` and at least its inverse."""
+    def draw(self, rng: np.random.Generator, log_std: float, max_factor: float) -> Warp:
+        """Return random rounded factors, at most `max_factor` and at least its inverse."""
         count = 1 + max((int(numbers.max()) for numbers in self.lengths if len(numbers)), default=-1)
-        sizes = rng.normal(0.0, spread, 3)
-        own = rng.normal(0.0, spread * min(1.0, np.sqrt(MAX_FREE_INTERVALS / max(count, 1))), count)
-        found = []
+        sizes = rng.normal(0.0, log_std, 3)
+        own = rng.normal(0.0, log_std * min(1.0, np.sqrt(MAX_FREE_INTERVALS / max(count, 1))), count)
+        warp = []
         large = MIN_SCALED_LENGTH_SHARE * max(float(axis_knots[-1] - axis_knots[0]) for axis_knots in self.knots)
         for knots, lengths, size in zip(self.knots, self.lengths, sizes, strict=True):
             gaps = np.diff(knots)
             follows = (gaps > large) | (len(gaps) > MAX_FREE_INTERVALS)
             factors = np.exp(own[lengths] + np.where(follows, size, 0.0))
-            found.append(np.round(np.clip(factors, 1 / most, most), FACTOR_DECIMALS))
-        x, y, z = found
+            warp.append(np.round(np.clip(factors, 1 / max_factor, max_factor), FACTOR_DECIMALS))
+        x, y, z = warp
         return x, y, z
 
     def images(self, warp: Sequence[FloatArray]) -> list[FloatArray]:
-        """Where the knots of each axis come to lie. The lowest stays where it is, and so does the middle along the
-        other axes. Raises ValueError for factors that are none of this lattice."""
-        found = []
+        """Return the moved knots of each axis.
+
+        The lowest keeps its height, and the middle along the other axes is kept. Raises ValueError for factors that do
+        not fit this lattice.
+        """
+        moved = []
         for axis, (knots, factors) in enumerate(zip(self.knots, warp, strict=True)):
             if len(factors) != len(knots) - 1 or not np.isfinite(factors).all() or (np.asarray(factors) <= 0).any():
                 raise ValueError(
-                    f"axis {'xyz'[axis]} has {len(knots) - 1} intervals: it needs as many positive factors"
+                    f"axis {'xyz'[axis]} has {len(knots) - 1} intervals and needs one positive factor for each"
                 )
             images = knots[0] + np.concatenate([[0.0], np.cumsum(np.diff(knots) * factors)])
             if axis != self.up:
                 images += (knots[0] + knots[-1] - images[0] - images[-1]) / 2
-            found.append(images)
-        return found
+            moved.append(images)
+        return moved
 
     def signature(self, warp: Sequence[FloatArray]) -> FloatArray:
-        """What tells proportions apart, whatever the size: the knots of all axes, float64 (sum of k + 1,), about the
-        middle and by the diagonal."""
+        """Return the scale-free knots of all axes, float64 (sum of k + 1,), centred and divided by the diagonal."""
         images = self.images(warp)
         diagonal = float(np.linalg.norm([image[-1] - image[0] for image in images]))
         return np.concatenate([(image - (image[0] + image[-1]) / 2) / max(diagonal, 1e-12) for image in images])
 
 
 def lattice_of(kit: Kit, exemplar: Assembly) -> Lattice:
-    """The intervals of an exemplar of a kit, hubs among its parts."""
+    """Return the intervals of an exemplar of a kit, hubs among its parts."""
     boxes = world_boxes(kit.types, exemplar.types, exemplar.poses)
     near = max(kit.contact_tolerance, MERGED_ENDS_SHARE * float(np.ptp(boxes, axis=(0, 1)).max()))
     known: list[float] = []
@@ -108,23 +112,22 @@ def lattice_of(kit: Kit, exemplar: Assembly) -> Lattice:
         places = np.array([group.mean() for group in groups])
         numbers = []
         for gap in np.diff(places).tolist():
-            same = (
-                place
-                for place, one in enumerate(known)
-                if abs(one - gap) <= max(2 * near, EQUAL_LENGTH_TOLERANCE * one)
-            )
-            place = next(same, len(known))
-            known += [gap] if place == len(known) else []
-            numbers.append(place)
+            tolerances = [max(2 * near, EQUAL_LENGTH_TOLERANCE * length) for length in known]
+            equal = (number for number, length in enumerate(known) if abs(length - gap) <= tolerances[number])
+            number = next(equal, len(known))
+            known += [gap] if number == len(known) else []
+            numbers.append(number)
         knots.append(places)
         lengths.append(np.array(numbers, dtype=np.int64))
     return Lattice((knots[0], knots[1], knots[2]), (lengths[0], lengths[1], lengths[2]), {"y": 1, "z": 2}[kit.up])
 
 
 def warped(kit: Kit, exemplar: Assembly, lattice: Lattice, warp: Sequence[FloatArray]) -> Shape:
-    """An exemplar in other proportions: each part has a mesh of its own, whose origin is the middle of the box around
-    it; poses turn nothing, and contacts are those of the exemplar. Raises ValueError for factors that are none of this
-    lattice."""
+    """Return an exemplar in other proportions.
+
+    Each part has a mesh of its own whose origin is the middle of its box. Poses do not rotate, and contacts are those
+    of the exemplar. Raises ValueError for factors that do not fit this lattice.
+    """
     shape, images = kit_shape(kit, exemplar), lattice.images(warp)
     poses = np.tile(np.eye(4), (len(exemplar), 1, 1))
     meshes = []
@@ -140,7 +143,9 @@ def warped(kit: Kit, exemplar: Assembly, lattice: Lattice, warp: Sequence[FloatA
 
 
 def _mapped(places: FloatArray, knots: FloatArray, images: FloatArray) -> FloatArray:
-    """Places along an axis, float64 (v,); a knot is the mean of ends that lie near, so some lie a little outside."""
+    """Return moved positions along an axis, float64 (v,). A knot is the mean of near ends, so some lie a little
+    outside.
+    """
     inside = np.interp(places, knots, images)
-    found: FloatArray = inside + np.minimum(places - knots[0], 0.0) + np.maximum(places - knots[-1], 0.0)
-    return found
+    mapped: FloatArray = inside + np.minimum(places - knots[0], 0.0) + np.maximum(places - knots[-1], 0.0)
+    return mapped

@@ -1,5 +1,7 @@
-"""Does a shape in other proportions still hold together? Asked of its meshes: the map is followed by vertices alone,
-and a large face across several intervals is straight where the map is not."""
+"""Does a resized exemplar keep its contacts? Tested on its meshes.
+
+The map moves vertices only, and a large face across several intervals stays straight where the map does not.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +14,11 @@ from stages.shape.stretch import STRETCHED_DEPTH
 
 
 def warp_fault(kit: Kit, exemplar: Assembly, shape: Shape) -> str | None:
-    """Why a shape that `warped` has made is none, or None: `contact lost`, where parts that touch in the exemplar are
-    apart by more than STRETCHED_DEPTH of the smaller one's diagonal; `parts clash`, where parts without contact there
-    reach into each other by more."""
+    """Return why a shape of `warped` is rejected, or None.
+
+    `contact lost`: parts that touch in the exemplar are apart by more than STRETCHED_DEPTH of the smaller one's
+    diagonal. `parts clash`: parts without contact in the exemplar penetrate deeper than that.
+    """
     meshes, poses = shape.meshes, shape.assembly.poses
     boxes = world_boxes(meshes, shape.assembly.types, poses)
     slack = {part: STRETCHED_DEPTH * mesh.diagonal for part, mesh in enumerate(meshes)}

@@ -1,4 +1,4 @@
-"""How `make verify` looks at sketches: is this a drawing of this shape, by this camera?"""
+"""Check that a sketch is a drawing of this shape by this camera."""
 
 from __future__ import annotations
 
@@ -16,32 +16,37 @@ from stages.shape.collection.packaged import PackagedSample
 from stages.sketches.cameras import projected
 
 INK_SHARE_RANGE = (2e-4, 0.9)
-"""How much of a drawing is ink, at least and at most, as a share of a black picture."""
+"""Minimum and maximum share of ink, relative to a black picture."""
 MAX_ROTATION_ERROR = 1e-9
-"""How far the rotation of a camera may be from one."""
+"""Largest deviation of a camera's rotation from orthogonality."""
 RAYS_ACROSS = 112
-"""The shape is looked at with so many rays across the picture."""
+"""Number of rays across the picture with which the shape is tested."""
 FINE_RAY_SPACING_PIXELS = 0.25
-"""Where no ray has hit near some ink, it is looked at with rays so far apart; pixels."""
+"""Spacing of rays near ink where no ray has hit the shape."""
 MIN_OUTLINE_DRAWN = 0.75
-"""At least so much of the outline has ink."""
+"""Minimum share of the outline that has ink."""
 MAX_INK_ASTRAY = 0.02
-"""At most so much of the ink lies off the shape."""
+"""Maximum share of the ink that lies off the shape."""
 
 
 def sketch_faults(sample: PackagedSample) -> Iterator[str]:
-    """A sentence for each drawing that cannot be read, is blank, or shows no shape where its camera sees it."""
+    """Yield a sentence for each drawing that cannot be read, is blank, or does not show the shape where its camera sees
+    it.
+    """
     corners = np.array(list(itertools.product(*np.transpose(sample.record["bounds"]))))
     for index, camera in enumerate(sample.record["sketches"]):
         name = f"sketch{index}.png"
-        for what in _drawing_faults(sample.members[name], camera, corners, sample):
-            yield f"{name} {what}"
+        for fault in _drawing_faults(sample.members[name], camera, corners, sample):
+            yield f"{name} {fault}"
 
 
 def _drawing_faults(
     content: bytes, camera: Mapping[str, Any], corners: FloatArray, sample: PackagedSample
 ) -> Iterator[str]:
-    """What is wrong with one drawing of a sample in a box with these corners, float64 (8, 3)."""
+    """Yield what is wrong with one drawing of a sample.
+
+    corners: of the sample's bounding box, float64 (8, 3)
+    """
     from PIL import Image
 
     pose = np.array(camera["world_to_camera"])
@@ -51,23 +56,23 @@ def _drawing_faults(
         or np.linalg.det(turn) < 0
         or pose[3].tolist() != [0, 0, 0, 1]
     ):
-        yield "has a camera whose world_to_camera is no rigid motion"
+        yield "has a camera whose world_to_camera is not a rigid transform"
     if (camera["intrinsics"][0][0] < 0) != camera["flipped"]:
-        yield "has a camera whose intrinsics and flipped do not say the same"
+        yield "has a camera whose intrinsics contradict flipped"
     try:
         drawing = np.asarray(Image.open(io.BytesIO(content)))
     except (OSError, SyntaxError, ValueError) as error:
         yield f"cannot be read: {error}"
         return
     if drawing.dtype != np.uint8 or drawing.shape != (camera["height"], camera["width"]):
-        yield f"has pixels {drawing.dtype} {drawing.shape}, not those that its record says"
+        yield f"has pixels {drawing.dtype} {drawing.shape}, not those of its record"
         return
     share = 1.0 - float(drawing.mean()) / 255.0
     if not INK_SHARE_RANGE[0] <= share <= INK_SHARE_RANGE[1]:
         yield f"is blank or full: {share:.2%} of it is ink"
         return
     seen = projected(camera, corners)
-    # A corner of the box may be behind the camera although nothing of the shape is.
+    # A corner of the box may be behind the camera although no part of the shape is.
     if np.isfinite(seen).all():
         rows, columns = np.nonzero(drawing < 255)
         ink = np.array([[columns.min(), rows.min()], [columns.max() + 1, rows.max() + 1]])
@@ -89,8 +94,10 @@ def _outline_faults(inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], sam
 def outline_shares(
     inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], sample: PackagedSample
 ) -> tuple[float, float]:
-    """How much of the outline that a camera sees has ink near it, and how much of the ink lies off the shape, as
-    shares. inked: bool (h, w), where there is ink."""
+    """Return the share of the visible outline that has ink near it, and the share of the ink that lies off the shape.
+
+    inked: where there is ink, bool (h, w)
+    """
     from scipy.ndimage import binary_erosion, distance_transform_edt
 
     step = max(1, -(-max(inked.shape) // RAYS_ACROSS))
@@ -110,24 +117,25 @@ def outline_shares(
 
 
 def _is_seen_near(place: npt.NDArray[np.int64], near: float, camera: Mapping[str, Any], sample: PackagedSample) -> bool:
-    """Whether the shape is seen `near` the pixel in row and column `place`, (2,), with rays that no thin part slips
-    through."""
+    """Return whether the shape is seen `near` a pixel, with rays dense enough for thin parts.
+
+    place: row and column of the pixel, (2,)
+    """
     offsets = np.arange(-near, near + FINE_RAY_SPACING_PIXELS, FINE_RAY_SPACING_PIXELS)
     origins, directions = _rays(camera, place[1] + 0.5 + offsets, place[0] + 0.5 + offsets)
     return bool(sample.rays.hit(origins.reshape(-1, 3), directions.reshape(-1, 3)).any())
 
 
 def _rays(camera: Mapping[str, Any], columns: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Origins and directions, float64 (h, w, 3), of the rays through places of the picture, in the coordinates of the
-    mesh."""
+    """Return origins and directions, float64 (h, w, 3), of the rays through picture points, in mesh coordinates."""
     intrinsics, pose = np.array(camera["intrinsics"]), np.array(camera["world_to_camera"])
-    turn, place = pose[:3, :3].T, -pose[:3, :3].T @ pose[:3, 3]
+    rotation, origin = pose[:3, :3].T, -pose[:3, :3].T @ pose[:3, 3]
     x, y = np.meshgrid((columns - intrinsics[0, 2]) / intrinsics[0, 0], (rows - intrinsics[1, 2]) / intrinsics[1, 1])
     ahead = np.stack([x, y, np.ones_like(x)], axis=-1)
     if camera["projection"] == "perspective":
-        return np.broadcast_to(place, ahead.shape), ahead @ turn.T
-    beside = np.stack([x, y, np.zeros_like(x)], axis=-1)
-    return beside @ turn.T + place, np.broadcast_to(turn[:, 2], ahead.shape)
+        return np.broadcast_to(origin, ahead.shape), ahead @ rotation.T
+    in_plane = np.stack([x, y, np.zeros_like(x)], axis=-1)
+    return in_plane @ rotation.T + origin, np.broadcast_to(rotation[:, 2], ahead.shape)
 
 
 AUDIT = Audit(faults=sketch_faults)

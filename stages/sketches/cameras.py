@@ -1,4 +1,4 @@
-"""The camera of a drawing as its record has it: how points of the mesh come to stand in the picture."""
+"""The camera of a drawing in its record: how points of the mesh map to the picture."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from stages.shape.views.camera import View
 
 OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 CAMERA_DECIMALS = 12
-"""Further digits of a matrix are noise."""
+"""Decimals of a matrix; further digits are noise."""
 
 _PIXELS = {"type": "integer", "minimum": 1}
 _ROW = {"type": "array", "items": {"type": "number"}}
@@ -41,14 +41,17 @@ CAMERA_FIELDS: Mapping[str, Any] = {
         "minItems": 4,
         "maxItems": 4,
     },
-    "flipped": {"description": "whether left and right are changed over; intrinsics know of it", "type": "boolean"},
+    "flipped": {"description": "whether left and right are mirrored; intrinsics account for it", "type": "boolean"},
 }
-"""JSON schema of what `camera_fields` gives, by name."""
+"""JSON schema of the fields of `camera_fields`, by name."""
 
 
 def camera_fields(view: View, size: int, flipped: bool) -> dict[str, Any]:
-    """What a record says of the camera of a square picture of `size` pixels; a flipped one was mirrored after it was
-    drawn."""
+    """Return the record of the camera of a square picture.
+
+    size: side of the picture in pixels
+    flipped: whether the picture was mirrored after it was drawn
+    """
     half = size / 2
     across, down = view.projection[0, 0] * half, view.projection[1, 1] * half
     intrinsics = np.array([[-across if flipped else across, 0.0, half], [0.0, down, half], [0.0, 0.0, 1.0]])
@@ -64,8 +67,10 @@ def camera_fields(view: View, size: int, flipped: bool) -> dict[str, Any]:
 
 
 def projected(camera: Mapping[str, Any], points: FloatArray) -> FloatArray:
-    """Where points of the mesh (n, 3) are seen by a camera of a record, in pixels, float64 (n, 2); NaN for what is not
-    in front of it."""
+    """Return the pixels, float64 (n, 2), where a camera of a record sees points of the mesh (n, 3).
+
+    Points that are not in front of it are NaN.
+    """
     intrinsics, pose = np.array(camera["intrinsics"]), np.array(camera["world_to_camera"])
     seen = points @ pose[:3, :3].T + pose[:3, 3]
     if camera["projection"] == "perspective":

@@ -13,7 +13,7 @@ from stages.sketches.settings import SketchView, StrokeOptions
 
 
 def jittered_camera(view: SketchView, rng: np.random.Generator) -> Camera:
-    """The camera of a view for one sample: each jittered value drawn uniformly, in a fixed order, from `rng`."""
+    """Return the camera of a view for one sample; jitters are drawn uniformly from `rng` in a fixed order."""
     azimuth, elevation, fov, distance = rng.uniform(-1.0, 1.0, 4).tolist()
     return Camera(
         azimuth=view.azimuth + azimuth * view.azimuth_jitter,
@@ -26,16 +26,16 @@ def jittered_camera(view: SketchView, rng: np.random.Generator) -> Camera:
 
 
 def draw_sketch(
-    scene: Scene, camera: Camera, size: int, supersample: int, options: StrokeOptions, backend: RendererName
+    scene: Scene, camera: Camera, size: int, supersample: int, options: StrokeOptions, renderer: RendererName
 ) -> tuple[ByteArray, View]:
-    """Dark lines on white, uint8 (size, size), and the view that they show.
+    """Return dark lines on white, uint8 (size, size), and the view that they show.
 
-    Raises ShardFailed where nothing is seen or nothing would be drawn: a blank drawing is never a sample.
+    Raises ShardFailed if nothing is seen or drawn: a blank drawing is never a sample.
     """
     from stages.shape.views.ink import ink_strokes
     from stages.shape.views.strokes import BOUNDARY_LINE, CONTOUR_LINE, CREASE_LINE, OUTLINE_LINE, find_strokes
 
-    seen = visible_triangles(scene, camera, (size * supersample, size * supersample), backend)
+    seen = visible_triangles(scene, camera, (size * supersample, size * supersample), renderer)
     strokes = find_strokes(seen, options.crease_angle, options.step * supersample, options.shortest * supersample)
     widths = {
         OUTLINE_LINE: options.outline,

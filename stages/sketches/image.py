@@ -14,7 +14,12 @@ from stages.sketches.settings import Augmentation
 
 
 class Augmented(NamedTuple):
-    """A changed drawing (h, w), whether it is mirrored, and by how many pixels its lines have grown wider at most."""
+    """A changed drawing.
+
+    drawing: uint8 (h, w)
+    flipped: whether it is mirrored
+    thicker: pixels by which its lines have grown wider at most
+    """
 
     drawing: ByteArray
     flipped: bool
@@ -22,7 +27,7 @@ class Augmented(NamedTuple):
 
 
 def augment(drawing: ByteArray, chances: Augmentation, rng: np.random.Generator) -> Augmented:
-    """The drawing (h, w), mirrored, thickened or thinned by the chances given; always two draws from `rng`."""
+    """Return the drawing (h, w), mirrored, thickened or thinned with the given chances; always two draws from `rng`."""
     mirror, morphology = rng.random(2)
     flipped, thicker = bool(mirror < chances.flip), 0
     if flipped:
@@ -35,26 +40,26 @@ def augment(drawing: ByteArray, chances: Augmentation, rng: np.random.Generator)
 
 
 def flip(drawing: ByteArray) -> ByteArray:
-    """Left and right changed over."""
+    """Mirror left and right."""
     return np.ascontiguousarray(drawing[:, ::-1])
 
 
 def dilate(drawing: ByteArray, size: int) -> ByteArray:
-    """Lines thicker: each pixel as dark as the darkest in the square of side `size` around it."""
+    """Thicken lines: each pixel gets the darkest value in the square of side `size` around it."""
     import OpenImageIO as oiio
 
     return _pixels(oiio.ImageBufAlgo.erode(_buffer(drawing), size, size))
 
 
 def erode(drawing: ByteArray, size: int) -> ByteArray:
-    """Lines thinner: each pixel as light as the lightest in the square of side `size` around it."""
+    """Thin lines: each pixel gets the lightest value in the square of side `size` around it."""
     import OpenImageIO as oiio
 
     return _pixels(oiio.ImageBufAlgo.dilate(_buffer(drawing), size, size))
 
 
 def png_bytes(drawing: ByteArray) -> bytes:
-    """The drawing (h, w) as a single-channel 8-bit PNG; equal drawings give equal bytes."""
+    """Return the drawing (h, w) as a single-channel 8-bit PNG; equal drawings give equal bytes."""
     import OpenImageIO as oiio
 
     height, width = drawing.shape
@@ -72,7 +77,7 @@ def png_bytes(drawing: ByteArray) -> bytes:
 
 
 def png_array(content: bytes) -> ByteArray:
-    """The pixels uint8 (h, w) of a single-channel PNG. Raises ValueError for anything else."""
+    """Return the pixels uint8 (h, w) of a single-channel PNG. Raises ValueError for anything else."""
     import OpenImageIO as oiio
 
     with tempfile.TemporaryDirectory() as folder:

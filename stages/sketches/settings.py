@@ -1,4 +1,4 @@
-"""Config of the stage `sketches`."""
+"""The `sketches` section of a config."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from stages.shape.views.buffers import RendererName
 
 
 class SketchView(StrictModel):
-    """One drawing of each sample, and how far its camera wanders from sample to sample."""
+    """One drawing of each sample, and how much its camera varies between samples."""
 
     name: str = Field(
         "view", pattern=r"^[a-z0-9_]+$", max_length=64, description="name of the view, as the sample's JSON lists it"
@@ -72,13 +72,13 @@ class StrokeOptions(StrictModel):
         0.25, gt=0.0, le=20.0, description="smallest jump in depth that is drawn as a contour; unit: pixels"
     )
     shortest: float = Field(
-        4.0, ge=0.0, le=100.0, description="connected lines shorter in all than this are left out; unit: pixels"
+        4.0, ge=0.0, le=100.0, description="connected lines of less total length are left out; unit: pixels"
     )
     crowding: float = Field(
         3.0,
         ge=0.0,
         le=50.0,
-        description="where lines stand closer than this, inner lines get thinner and lighter; unit: pixels (0: never)",
+        description="where lines are closer than this, inner lines get thinner and lighter; unit: pixels (0: never)",
     )
     ink: float = Field(0.9, gt=0.0, le=1.0, description="darkness of a full line, 1 is black; unit: share")
 
@@ -103,7 +103,7 @@ class SketchesConfig(StrictModel):
 
     size: int = Field(224, ge=16, le=2048, description="side of the square picture; unit: pixels")
     supersample: int = Field(
-        2, ge=1, le=8, description="the view is looked at this many times finer in x and y; unit: pixels a pixel"
+        2, ge=1, le=8, description="the view is rendered this many times finer in x and y; unit: pixels per pixel"
     )
     views: tuple[SketchView, ...] = Field(
         (
@@ -120,7 +120,7 @@ class SketchesConfig(StrictModel):
     augment: Augmentation = Field(Augmentation(), description="chances of changes after drawing")
     renderer: RendererName = Field(
         "raster",
-        description="what finds the visible surfaces, in sketches and preview; raster: our own rasteriser, the "
+        description="what finds the visible surfaces in sketches and preview; raster: our own rasteriser, the "
         "same everywhere; egl: OpenGL, always by Mesa's llvmpipe, at the system's version. Their pictures differ in a "
         "few pixels",
     )

@@ -22,16 +22,16 @@ from stages.sketches.settings import SketchesConfig
 
 
 def run_shard(task: Task) -> Outcome:
-    """The members of each sample that `members.py` declares.
+    """Make the members of each sample that `members.py` declares.
 
     Raises ShardFailed, naming the sample, for a drawing without a line.
     """
     config = task.config.section(SketchesConfig)
 
-    def made(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
+    def sketch_members(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
         return drawings(task, config, sample, scene_of(collection.shape(sample)))
 
-    samples = add_members(task, made)
+    samples = add_members(task, sketch_members)
     summary = {
         "split": task.shard.params["split"],
         "views": [view.name for view in config.views],
@@ -42,7 +42,7 @@ def run_shard(task: Task) -> Outcome:
 
 
 def drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene) -> dict[str, bytes]:
-    """The members of one sample. Raises ShardFailed for a drawing without a line."""
+    """Return the members of one sample. Raises ShardFailed for a drawing without a line."""
     strokes = config.strokes
     widest = max(strokes.outline, strokes.contour, strokes.boundary, strokes.crease, 1.0)
     members: dict[str, bytes] = {}
@@ -57,13 +57,13 @@ def drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene) -
         if drawing.min() == drawing.max():
             raise ShardFailed(f"sample {sample.key}, view {view.name}: eroding by {config.augment.size} left no line")
         members[f"sketch{index}.png"] = png_bytes(drawing)
-        said = camera_fields(seen, config.size, flipped)
-        described.append({"view": view.name, **said, "line_width": float(widest + thicker)})
+        fields = camera_fields(seen, config.size, flipped)
+        described.append({"view": view.name, **fields, "line_width": float(widest + thicker)})
     return {"json": json_bytes({"sketches": described}), **members}
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """What drew the sketches: one line, or several where machines differ."""
+    """Return what drew the sketches: one line, or several if machines differ."""
     summaries = (plan.summary("sketches", name) for name in plan.shards("sketches"))
     drawn = Counter(
         f"{summary['renderer']}, {summary['renderer_version']}" for summary in summaries if summary is not None
@@ -72,12 +72,12 @@ def report(plan: Plan) -> Sequence[str]:
 
 
 def check_machine(config: Config) -> None:
-    """Raises ConfigError where the config's backend cannot draw: no other draws in its place."""
+    """Raise ConfigError if the config's renderer cannot draw: no other takes its place."""
     check_renderer(config.section(SketchesConfig).renderer, f"{config.path}: sketches.renderer")
 
 
 def estimate_bytes(plan: Plan) -> int:
-    """Bytes of all drawings: about a fifth of a byte a pixel, and the tar's headers and padding."""
+    """Return the bytes of all drawings: about a fifth of a byte a pixel, and the tar's headers and padding."""
     config = plan.config.section(SketchesConfig)
     return int(sample_count(plan) * len(config.views) * (0.2 * config.size**2 + 1024))
 

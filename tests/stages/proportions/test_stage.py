@@ -52,7 +52,7 @@ def samples(out: Path) -> list[Sample]:
 def test_a_dataset_of_stools_goes_the_whole_way_and_is_the_same_with_two_workers(tmp_path: Path) -> None:
     config = write_config(tmp_path)
     said = run(config, tmp_path / "one", *STAGES)
-    assert "stool: 9 of 9 shapes; refused: none" in said
+    assert "stool: 9 of 9 shapes; rejected: none" in said
     found = samples(tmp_path / "one")
     assert len({each.key for each in found}) == len({each.text for each in found}) == 9
     assert {each.split for each in found} == {"train", "val", "test"}

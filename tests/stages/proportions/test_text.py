@@ -25,12 +25,12 @@ def test_a_text_comes_back_and_makes_the_shape_that_it_says() -> None:
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("", "no proportions"),
+        ("", "not valid proportions"),
         ("[1, 2]", "proportions"),
         ('{"exemplar": "a", "x": [1], "y": [1]}', "keys exemplar, x, y and z"),
         ('{"exemplar": 1, "x": [1], "y": [1], "z": [1]}', "keys exemplar, x, y and z"),
-        ('{"exemplar": "a", "x": ["b"], "y": [1], "z": [1]}', "no proportions"),
-        ('{"exemplar": "a", "x": {"b": 1}, "y": [1], "z": [1]}', "no proportions"),
+        ('{"exemplar": "a", "x": ["b"], "y": [1], "z": [1]}', "not valid proportions"),
+        ('{"exemplar": "a", "x": {"b": 1}, "y": [1], "z": [1]}', "not valid proportions"),
         ('{"exemplar": "another", "x": [1], "y": [1], "z": [1]}', "has no exemplar 'another'"),
         ('{"exemplar": "exemplar-0", "x": [1], "y": [1], "z": [1]}', "exemplar"),
     ],

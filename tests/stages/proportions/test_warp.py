@@ -88,7 +88,7 @@ def test_factors_stay_within_their_bounds_and_signatures_know_no_size() -> None:
 @pytest.mark.parametrize("wrong", [[1.0], [1.0, -1.0, 1.0], [1.0, np.nan, 1.0]])
 def test_factors_of_another_lattice_are_refused(wrong: list[float]) -> None:
     factors = [np.array(wrong), *(np.ones(len(each)) for each in lattice().lengths[1:])]
-    with pytest.raises(ValueError, match="axis x has 3 intervals: it needs as many positive factors"):
+    with pytest.raises(ValueError, match="axis x has 3 intervals and needs one positive factor for each"):
         warped(kit(), whole(), lattice(), factors)
 
 
