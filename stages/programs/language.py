@@ -13,7 +13,7 @@ from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
 
 
-class ProgramDecoder:
+class ParameterDecoder:
     """Builds the shapes of samples of a program."""
 
     def __init__(self, name: str) -> None:
@@ -32,8 +32,8 @@ def _reads(_: Plan) -> tuple[str, ...]:
     return ()
 
 
-def _decoder(task: Task) -> ProgramDecoder:
-    return ProgramDecoder(task.config.section(ProgramsConfig).program)
+def _decoder(task: Task) -> ParameterDecoder:
+    return ParameterDecoder(task.config.section(ProgramsConfig).program)
 
 
 def _rebuild(_: DatasetPaths) -> RebuildShape:

@@ -82,7 +82,7 @@ def _ours(program: Program, learnt: Clouds) -> Racer:
     clouds, classes, _ = learnt
     inputs = np.array([quantized_cloud(each[: 2 * entry.points]) for each in clouds])
     module = new_network(entry, program, 0)
-    learner = RecoveryTask(module, {}, entry, program, {"inputs": inputs, "classes": classes}, {}, ())
+    learner = RecoveryTask(module, {}, entry, {"inputs": inputs, "classes": classes}, {}, program, ())
     optimizer = torch.optim.Adam(module.parameters(), lr=entry.learning_rate)
     batches: Iterator[tuple[Tensor, Tensor]] = learner.batches(np.random.default_rng(0))
     noise = torch.Generator().manual_seed(0)

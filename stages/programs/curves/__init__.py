@@ -1,8 +1,7 @@
-"""Curve building blocks: what shape programs are written with (geocode §3.1).
+"""Curve building blocks of shape programs (geocode §3.1).
 
-A shape element is a triplet: a `Curve` (where it runs), a `Profile` (its cross-section) and a `Style` (how wide the
-profile is on the way), made into a mesh by `sweep`. Elements are attached to each other at relative positions along
-curves. A stool, whole:
+A shape element is a triplet: a `Curve` (where it runs), a `Profile` (its cross-section) and a `Style` (its width along
+the curve). `sweep` makes a mesh of it. Elements are attached to each other at relative positions along curves. A stool:
 
     import numpy as np
     from stages.programs.curves import *
@@ -16,17 +15,17 @@ curves. A stool, whole:
         foot = top * [1 + splay, 0, 1 + splay]
         rail = line(foot, top)
         leg = Part("leg", sweep(rail, circle(0.025), Style.taper(0.6, 1.0), up=(0, 0, 1)), WOOD)
-        legs = radial([leg], 4)                                       # labels and colours stay
+        legs = radial([leg], 4)                                       # labels and colours are kept
         ends = [rail.at(0.4), rail.at(0.4) * [-1, 1, 1]]              # a rung, two fifths up the legs
         rung = Part("rung", sweep(line(*ends), square_circle(0.5, 0.02)), WOOD)
         return [seat, *legs, *radial([rung], 4)]
 
-    assert not any(mesh_faults(part.mesh) for part in stool(0.45, 0.6, 0.2))
+    assert not any(mesh_defects(part.mesh) for part in stool(0.45, 0.6, 0.2))
     meshes = [part.part_mesh() for part in stool(0.45, 0.6, 0.2)]     # triangles, for export
 
 Conventions: y is up, +z the front, lengths in units of about a shape's size, angles in degrees, counter-clockwise seen
-from the tip of their axis. All values are immutable; every function returns a new one. What is degenerate raises
-ValueError and says the mend.
+from the tip of their axis. All values are immutable; every function returns a new one. Degenerate input raises
+ValueError with a remedy.
 
     where it runs    line polyline bezier arc helix spiral chain; Curve.at .tangents .frames .position_where .part
     cross-section    square_circle superellipse circle rectangle rounded_rectangle polygon Profile.of; .curve .inset
@@ -35,7 +34,7 @@ ValueError and says the mend.
     placing          attach stretch frame translation rotation scaling mirroring; x.transformed(matrix)
     copies           symmetric radial linear copies evenly
     deformation      mesh.deformed(function), with bend taper twist follow
-    parts            Part joined; mesh_faults says what is wrong with a mesh
+    parts            Part joined; mesh_defects lists the defects of a mesh
 """
 
 from __future__ import annotations

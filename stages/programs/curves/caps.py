@@ -14,8 +14,8 @@ from stages.shape.arrays import FloatArray, IntArray
 class Cap:
     """A filling of an outline of k points.
 
-    quads: int32 (q, 4), counter-clockwise with the outline; a triangle repeats its last index. middle: whether index k
-    is used: it stands for the mean of the points.
+    quads: int32 (q, 4), counter-clockwise with the outline; a triangle repeats its last index
+    middle: whether index k is used, for the mean of the points
     """
 
     quads: IntArray
@@ -23,7 +23,7 @@ class Cap:
 
 
 def polygon_cap(points: FloatArray) -> Cap:
-    """A filling of a simple counter-clockwise polygon, float64 (k, 2): from the middle where all of it is seen."""
+    """Fill a simple counter-clockwise polygon, float64 (k, 2), from its middle where that sees all sides."""
     from stages.programs.curves.kernels import all_seen
 
     count = len(points)
@@ -49,24 +49,24 @@ def fan(count: int) -> IntArray:
 
 @lru_cache(maxsize=64)
 def _spokes(count: int) -> IntArray:
-    """Triangles between an outline and its middle: of two at a notch no quad could be made."""
-    place = np.arange(count, dtype=np.int32)
-    after = np.roll(place, -1)
-    return np.stack([place, after, np.full_like(place, count), np.full_like(place, count)], axis=1)
+    """Triangles between an outline and its middle, since two at a notch make no valid quad."""
+    index = np.arange(count, dtype=np.int32)
+    after = np.roll(index, -1)
+    return np.stack([index, after, np.full_like(index, count), np.full_like(index, count)], axis=1)
 
 
 @lru_cache(maxsize=1024)
 def _clipped(outline: bytes) -> IntArray:
-    """Ear clipping, the fattest ear first, int32 (k - 2, 4)."""
+    """Clip ears, the fattest first, int32 (k - 2, 4)."""
     points = np.frombuffer(outline, dtype=np.float64).reshape(-1, 2)
     left = list(range(len(points)))
     quads = []
     while len(left) > 3:
         best, ear = -1.0, -1
-        for place in range(len(left)):
-            quality = _ear_quality(points, left, place)
+        for index in range(len(left)):
+            quality = _ear_quality(points, left, index)
             if quality > best:
-                best, ear = quality, place
+                best, ear = quality, index
         if best <= 0.0:
             raise ValueError("the outline crosses or touches itself and cannot be filled: move its points apart")
         i, j, k = left[ear - 1], left[ear], left[(ear + 1) % len(left)]
@@ -76,15 +76,15 @@ def _clipped(outline: bytes) -> IntArray:
     return np.array(quads, dtype=np.int32)
 
 
-def _ear_quality(points: FloatArray, left: list[int], place: int) -> float:
-    """How fat the triangle at a place is: area over the square of its longest side; -1 where it is no ear."""
-    i, j, k = left[place - 1], left[place], left[(place + 1) % len(left)]
+def _ear_quality(points: FloatArray, left: list[int], index: int) -> float:
+    """Area of the triangle at an index over the square of its longest side; -1 where it is no ear."""
+    i, j, k = left[index - 1], left[index], left[(index + 1) % len(left)]
     corners = points[[i, j, k]]
     sides = np.roll(corners, -1, axis=0) - corners
     area = sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]
     if area <= 0.0:
         return -1.0
-    others = points[[each for each in left if each not in (i, j, k)]]
+    others = points[[other for other in left if other not in (i, j, k)]]
     offsets = others[:, None] - corners
     within = (sides[:, 0] * offsets[..., 1] - sides[:, 1] * offsets[..., 0] >= 0.0).all(axis=1)
     return -1.0 if within.any() else float(area / (sides * sides).sum(axis=1).max())

@@ -1,4 +1,4 @@
-"""A curve in space: points, and what stands at any relative position along it (geocode §3.1, "curve sampling")."""
+"""A curve in space: points, tangents and frames at any relative position (geocode §3.1, "curve sampling")."""
 
 from __future__ import annotations
 
@@ -16,29 +16,30 @@ from stages.shape.arrays import BoolArray, FloatArray
 Axis = Literal["x", "y", "z"]
 
 MAX_CORNER_COSINE = np.cos(np.radians(30.0))
-"""Where a curve turns by more than 30 degrees at a point it has a corner there; else it is smooth."""
+"""A turn by more than 30 degrees at a point is a corner; else the curve is smooth there."""
 
 REVERSAL_TOLERANCE = 1e-6
-"""Segments that point against each other but for this much (of a dot product) have no plane between them."""
+"""Segments whose directions are opposite up to this difference of their dot product have no mitre plane."""
 
 MAX_MITRE_RATIO = 4.0
-"""A mitre reaches this far at most: beyond a turn of 151 degrees the tip of a swept corner is blunt."""
+"""Beyond a turn of 151 degrees, the tip of a swept corner is blunt."""
 
 
 def axis_index(axis: Axis) -> int:
-    """0, 1 or 2. Raises ValueError for what is no axis."""
-    place = "xyz".find(axis)
-    if len(axis) != 1 or place < 0:
-        raise ValueError(f"axis {axis!r} is none of 'x', 'y', 'z'")
-    return place
+    """0, 1 or 2. Raises ValueError for another name."""
+    index = "xyz".find(axis)
+    if len(axis) != 1 or index < 0:
+        raise ValueError(f"axis {axis!r} must be 'x', 'y' or 'z'")
+    return index
 
 
 class Stations(NamedTuple):
-    """Where the rings of a sweep stand.
+    """Positions of the rings of a sweep.
 
-    positions: float64 (n,), relative arc length; points, tangents: float64 (n, 3); fold, excess: float64 (n, 3) and
-    (n,), the direction in which a ring is stretched so that the pieces before and after a corner keep their width,
-    and by how much more than 1.
+    positions: float64 (n,), relative arc length
+    points, tangents: float64 (n, 3)
+    fold: float64 (n, 3), direction in which a ring is stretched at a corner, so that the pieces keep their width
+    excess: float64 (n,), factor of that stretch, minus 1
     """
 
     positions: FloatArray
@@ -52,9 +53,10 @@ class Stations(NamedTuple):
 class Curve:
     """A curve through points, straight in between.
 
-    points: float64 (n, 3), distinct neighbours; the last is joined to the first where the curve is `closed`, and is
-    not repeated. Positions are relative arc length: 0 the start, 1 the end, of a closed curve modulo 1. What is sampled
-    lies on the same segments that are swept, so that an attachment lies exactly within the mesh.
+    points: float64 (n, 3), neighbours distinct; the first is not repeated where the curve is `closed`
+
+    Positions are relative arc length: 0 is the start, 1 the end; modulo 1 for a closed curve. Sampled points are on the
+    segments that are swept, so attachments are exactly within the mesh.
 
     Make curves with `polyline`, `line`, `bezier`, `arc`, `helix`, `spiral`, which check their points.
     """
@@ -64,19 +66,19 @@ class Curve:
 
     @staticmethod
     def through(points: npt.ArrayLike, closed: bool = False) -> Curve:
-        """The curve through points (n, 3), or (n, 2) in the plane z = 0. Neighbours at one place count once.
+        """The curve through points (n, 3), or (n, 2) in the plane z = 0. Coincident neighbours count once.
 
-        Raises ValueError where fewer than two (closed: three) distinct points are left, where a number is not finite
-        and where the curve turns back onto itself.
+        Raises ValueError for fewer than two (closed: three) distinct points, for numbers that are not finite, and where
+        the curve turns back onto itself.
         """
         given = np.asarray(points, dtype=np.float64)
         if given.ndim != 2 or given.shape[1] not in (2, 3) or not np.isfinite(given).all():
             raise ValueError(f"a curve needs finite points of shape (n, 3) or (n, 2), these are {given.shape}")
         if given.shape[1] == 2:
             given = np.column_stack([given, np.zeros(len(given))])
-        found = Curve(given, closed)._measured if len(given) > 1 else None
-        if found is not None and found[1].min() <= 1e-9 * found[1].sum():
-            distinct = found[1] > 1e-9 * found[1].sum()
+        lengths = Curve(given, closed)._measured[1] if len(given) > 1 else None
+        if lengths is not None and lengths.min() <= 1e-9 * lengths.sum():
+            distinct = lengths > 1e-9 * lengths.sum()
             given = given[distinct if closed else np.concatenate([distinct, [True]])]
         if len(given) < (3 if closed else 2):
             kind = "closed curve needs three" if closed else "curve needs two"
@@ -84,8 +86,8 @@ class Curve:
         curve = Curve(given, closed)
         turns = curve._measured[2]
         if turns.min() < REVERSAL_TOLERANCE - 1.0:
-            where = int(turns.argmin())
-            raise ValueError(f"the curve turns back onto itself at point {where}: move that point aside, or end there")
+            index = int(turns.argmin())
+            raise ValueError(f"the curve turns back onto itself at point {index}: move that point aside, or end there")
         return curve
 
     @cached_property
@@ -122,7 +124,7 @@ class Curve:
 
     @cached_property
     def own_stations(self) -> Stations:
-        """The stations at the curve's own points. A tangent halves the turn between the segments beside it."""
+        """The stations at the curve's own points. A tangent halves the turn between its two segments."""
         from stages.programs.curves.kernels import halve_turns
 
         directions, _, turns = self._measured
@@ -137,7 +139,7 @@ class Curve:
         if self.closed:
             where = where % 1.0
         elif where.size and (where.min() < -1e-9 or where.max() > 1.0 + 1e-9):
-            raise ValueError(f"position {where[np.argmax(np.abs(where - 0.5))]:g} lies outside the curve, 0 to 1")
+            raise ValueError(f"position {where[np.argmax(np.abs(where - 0.5))]:g} is outside the curve, 0 to 1")
         directions, lengths, _ = self._measured
         own = self.own_stations
         distance = np.clip(where, 0.0, 1.0) * self._reached[-1]
@@ -170,16 +172,16 @@ class Curve:
     def frames(self, positions: npt.ArrayLike, up: npt.ArrayLike | None = None) -> FloatArray:
         """Frames at relative positions, float64 (4, 4) for a number, (k, 4, 4) for k of them.
 
-        Columns: the profile's x, the profile's y, the tangent, the point. The frames are those that a sweep with the
-        same `up` has there: they roll as little as the curve allows from its start on.
+        Columns: the profile's x, the profile's y, the tangent, the point. A sweep with the same `up` has the same
+        frames: they roll as little as possible from the start on.
         """
         wanted = np.atleast_1d(np.asarray(positions, dtype=np.float64))
         if self.closed:
             wanted = wanted % 1.0
-        every, place = np.unique(np.concatenate([self.positions, wanted]), return_inverse=True)
-        stations = self.stations(every)
-        x, y = rail_axes(stations.points, stations.tangents, every, self.closed, up)
-        at = place[len(self.positions) :]
+        sampled, inverse = np.unique(np.concatenate([self.positions, wanted]), return_inverse=True)
+        stations = self.stations(sampled)
+        x, y = rail_axes(stations.points, stations.tangents, sampled, self.closed, up)
+        at = inverse[len(self.positions) :]
         frames = np.zeros((len(wanted), 4, 4))
         frames[:, :3, 0], frames[:, :3, 1] = x[at], y[at]
         frames[:, :3, 2], frames[:, :3, 3] = stations.tangents[at], stations.points[at]
@@ -189,7 +191,7 @@ class Curve:
     def position_where(self, axis: Axis, value: float) -> float:
         """The first relative position at which a coordinate has a value, such as the height of a rail on a leg.
 
-        Raises ValueError where the curve never gets there.
+        Raises ValueError where it never has it.
         """
         along = self.points[:, axis_index(axis)] - value
         after = np.roll(along, -1) if self.closed else along[1:]
@@ -203,10 +205,10 @@ class Curve:
         return float((self._reached[first] + share * self._measured[1][first]) / self._reached[-1])
 
     def resampled(self, count: int) -> Curve:
-        """A curve of `count` segments of equal length; the corners stay, in addition."""
+        """A curve of `count` segments of equal length, and its corners."""
         even = np.linspace(0.0, 1.0, count, endpoint=False) if self.closed else np.linspace(0.0, 1.0, count + 1)
-        every = np.unique(np.concatenate([even, self.positions[self.corners]]))
-        return Curve.through(self.at(every), self.closed)
+        positions = np.unique(np.concatenate([even, self.positions[self.corners]]))
+        return Curve.through(self.at(positions), self.closed)
 
     def part(self, start: float, end: float) -> Curve:
         """The piece from one relative position to a later one, an open curve. Raises ValueError unless start < end."""
@@ -219,7 +221,7 @@ class Curve:
         return Curve.through(np.concatenate([ends[:1], self.at(inner), ends[1:]]))
 
     def reversed(self) -> Curve:
-        """The same curve, run the other way; a closed one starts at the same point."""
+        """The curve in the opposite direction; a closed one starts at the same point."""
         backwards = self.points[::-1]
         return Curve(np.roll(backwards, 1, axis=0) if self.closed else backwards, self.closed)
 

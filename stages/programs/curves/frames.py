@@ -13,10 +13,13 @@ def rail_axes(
 ) -> tuple[FloatArray, FloatArray]:
     """The axes x and y of a profile at each of n stations, float64 (n, 3) each; x cross y is the tangent.
 
-    points, tangents: float64 (n, 3); positions: float64 (n,), relative arc length. At the first station y leans
-    towards `up` (3,); None is the world's +y, or +z where the rail starts steeper than 45 degrees. From there on the
-    frames do not roll about the tangent; on a closed rail what is left after a round is spread over its length.
-    Raises ValueError where `up` runs along the rail.
+    The frames do not roll about the tangent. On a closed rail, the angle left after a round is spread over its length.
+
+    points, tangents: float64 (n, 3)
+    positions: float64 (n,), relative arc length
+    up: (3,), y leans towards it at the start; None: the world's +y, or +z for a rail steeper than 45 degrees
+
+    Raises ValueError where `up` is parallel to the rail.
     """
     from stages.programs.curves.kernels import carry
 
@@ -33,5 +36,5 @@ def _start_axis(tangent: FloatArray, up: npt.ArrayLike | None) -> FloatArray:
     x = np.array([b * w - c * v, c * u - a * w, a * v - b * u])
     size = float(np.sqrt(x @ x))
     if not size > 1e-6 * float(np.abs(wanted).max()):
-        raise ValueError(f"up {wanted.tolist()} runs along the start of the rail: give a direction across it")
+        raise ValueError(f"up {wanted.tolist()} is parallel to the start of the rail: give a direction across it")
     return x / size

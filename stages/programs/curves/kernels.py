@@ -1,4 +1,4 @@
-"""Compiled loops over the few points of a curve or ring, where the overhead of array calls is most of the time."""
+"""Compiled loops over curves and rings of few points, where array calls would be mostly overhead."""
 
 from __future__ import annotations
 
@@ -50,13 +50,13 @@ def halve_turns(directions, turns, closed, sharpest):
 
 
 @numba.njit(cache=True)
-def ease(points, girth, rounds, patience):
-    """The points (n, 3) with those beside a tight bend moved towards their neighbours, round by round, until no mitre
-    of a profile that reaches `girth` (n,) eats up its segments; from the round `patience` on, all are moved."""
+def ease(points, girth, max_rounds, local_rounds):
+    """Move points (n, 3) next to tight bends towards their neighbours, until every mitre of a profile of radius `girth`
+    (n,) fits into its segments. After `local_rounds` all points are moved."""
     count = len(points)
     moved, before = points.copy(), np.empty_like(points)
     lengths, mitres, near = np.empty(count - 1), np.zeros(count), np.zeros(count, dtype=np.bool_)
-    for turn in range(rounds):
+    for turn in range(max_rounds):
         before[:] = moved
         for i in range(count - 1):
             total = 0.0
@@ -68,7 +68,7 @@ def ease(points, girth, rounds, patience):
             for k in range(3):
                 cosine += (before[i + 1, k] - before[i, k]) * (before[i, k] - before[i - 1, k])
             cosine /= lengths[i] * lengths[i - 1]
-            # A mitre eats so much of the segments on both of its sides: the tangent of half the turn.
+            # A mitre takes the tangent of half the turn from the segments on both sides.
             mitres[i] = girth[i] * np.sqrt(max(1.0 - cosine, 0.0) / max(1.0 + cosine, 1e-6))
         near[:] = False
         for i in range(count - 1):
@@ -77,7 +77,7 @@ def ease(points, girth, rounds, patience):
         if not near.any():
             break
         for i in range(1, count - 1):
-            if near[i] or turn >= patience:
+            if near[i] or turn >= local_rounds:
                 for k in range(3):
                     moved[i, k] += 0.45 * (before[i + 1, k] + before[i - 1, k] - 2.0 * before[i, k])
     return moved
@@ -87,7 +87,7 @@ def ease(points, girth, rounds, patience):
 def carry(points, tangents, positions, first, closed):
     """The axes x and y (n, 3) at each point: `first`, carried along by double reflection (Wang et al. 2008).
 
-    On a closed curve the angle that is left after a round is spread over it.
+    On a closed curve, the angle left after a round is spread over its length.
     """
     count = len(points)
     x, y = np.empty((count, 3)), np.empty((count, 3))
@@ -104,7 +104,7 @@ def carry(points, tangents, positions, first, closed):
         m0, m1, m2 = u[0] - t[0] + q * s0, u[1] - t[1] + q * s1, u[2] - t[2] + q * s2
         r = 2.0 * (m0 * a0 + m1 * a1 + m2 * a2) / (m0 * m0 + m1 * m1 + m2 * m2)
         a0, a1, a2 = a0 - r * m0, a1 - r * m1, a2 - r * m2
-        # Rounding adds up along a long curve: back across the tangent, to unit length.
+        # Rounding errors add up along a long curve: make it perpendicular and of unit length again.
         out = a0 * u[0] + a1 * u[1] + a2 * u[2]
         a0, a1, a2 = a0 - out * u[0], a1 - out * u[1], a2 - out * u[2]
         size = np.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
@@ -150,7 +150,7 @@ def place_rings(points, x, y, scale, twist, fold, excess, outlines):
 
 @numba.njit(cache=True)
 def all_seen(points):
-    """Whether every side of a polygon (k, 2) is seen from the mean of its points, and whether no turn is right."""
+    """Whether every side of a polygon (k, 2) is visible from the mean of its points, and whether it is convex."""
     count = len(points)
     mx, my = points[:, 0].mean(), points[:, 1].mean()
     size = 0.0
@@ -176,26 +176,28 @@ def _facing(a, b, c, x, y, z):
 
 @numba.njit(cache=True)
 def cut(vertices, quads):
-    """Triangles, int32 (f, 3): each quad is cut where the smaller of its two pieces is the larger, seen from its front:
-    a quad with a notch is cut there."""
+    """Triangles, int32 (f, 3): each quad is cut along the diagonal with the larger smaller piece, seen from its front.
+
+    A quad with a notch is cut there.
+    """
     triangles = np.empty((2 * len(quads), 3), dtype=np.int32)
-    made = 0
+    count = 0
     for i in range(len(quads)):
         i0, i1, i2, i3 = quads[i, 0], quads[i, 1], quads[i, 2], quads[i, 3]
         if i2 == i3:
-            triangles[made, 0], triangles[made, 1], triangles[made, 2] = i0, i1, i2
-            made += 1
+            triangles[count, 0], triangles[count, 1], triangles[count, 2] = i0, i1, i2
+            count += 1
             continue
         a, b, c, d = vertices[i0], vertices[i1], vertices[i2], vertices[i3]
         e0, e1, e2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
         f0, f1, f2 = d[0] - b[0], d[1] - b[1], d[2] - b[2]
         x, y, z = e1 * f2 - e2 * f1, e2 * f0 - e0 * f2, e0 * f1 - e1 * f0
-        one = min(_facing(a, b, c, x, y, z), _facing(a, c, d, x, y, z))
+        first = min(_facing(a, b, c, x, y, z), _facing(a, c, d, x, y, z))
         other = min(_facing(a, b, d, x, y, z), _facing(b, c, d, x, y, z))
-        # Equal halves are cut along 0-2, whatever rounding says, so that a moved mesh is cut alike.
-        if other > one + 1e-6 * abs(one):
+        # Equal halves are cut along 0-2 despite rounding, so that a moved mesh has the same triangles.
+        if other > first + 1e-6 * abs(first):
             i0, i1, i2, i3 = i1, i2, i3, i0
-        triangles[made, 0], triangles[made, 1], triangles[made, 2] = i0, i1, i2
-        triangles[made + 1, 0], triangles[made + 1, 1], triangles[made + 1, 2] = i0, i2, i3
-        made += 2
-    return triangles[:made]
+        triangles[count, 0], triangles[count, 1], triangles[count, 2] = i0, i1, i2
+        triangles[count + 1, 0], triangles[count + 1, 1], triangles[count + 1, 2] = i0, i2, i3
+        count += 2
+    return triangles[:count]

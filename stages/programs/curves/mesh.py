@@ -1,4 +1,4 @@
-"""A mesh of quads: what every block makes, kept as quads until export (geocode §3.1)."""
+"""A mesh of quads, the result of every building block (geocode §3.1)."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from stages.shape.arrays import FloatArray, IntArray
 class QuadMesh:
     """Vertices and faces of four corners.
 
-    vertices: float64 (v, 3); quads: int32 (q, 4), counter-clockwise seen from outside. A triangle repeats its last
-    index: (a, b, c, c). What the blocks of this library make is closed, oriented outwards and two-manifold;
-    `mesh_faults` says where a mesh is not.
+    vertices: float64 (v, 3)
+    quads: int32 (q, 4), counter-clockwise seen from outside; a triangle repeats its last index: (a, b, c, c)
+
+    Meshes of the building blocks are closed, oriented outwards and two-manifold; `mesh_defects` checks it.
     """
 
     vertices: FloatArray
@@ -26,7 +27,7 @@ class QuadMesh:
 
     @cached_property
     def triangles(self) -> IntArray:
-        """The faces as triangles, int32 (f, 3), each quad cut where the smaller of its pieces is the larger."""
+        """The faces as triangles, int32 (f, 3); each quad is cut along the diagonal with the larger smaller piece."""
         from stages.programs.curves.kernels import cut
 
         triangles: IntArray = cut(self.vertices, self.quads)
@@ -34,7 +35,7 @@ class QuadMesh:
 
     @cached_property
     def bounds(self) -> FloatArray:
-        """Lowest and highest corner of the box around the mesh, float64 (2, 3)."""
+        """Lowest and highest corner of the bounding box, float64 (2, 3)."""
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     @property
@@ -44,13 +45,13 @@ class QuadMesh:
         return float(dots(a, cross(b, c)).sum()) / 6.0
 
     def relative(self, points: FloatArray) -> FloatArray:
-        """Points (n, 3) in the box around the mesh, 0 to 1 along each side; 0 along a side without length."""
+        """Relative coordinates of points (n, 3) in the bounding box, 0 to 1; 0 along a side without length."""
         low, high = self.bounds
         share: FloatArray = (points - low) / np.where(high > low, high - low, 1.0)
         return share
 
     def transformed(self, matrix: FloatArray) -> QuadMesh:
-        """The mesh moved by an affine matrix (4, 4); a reflection turns the faces round.
+        """The mesh moved by an affine matrix (4, 4); a reflection reverses the faces.
 
         Raises ValueError for a matrix that flattens the mesh.
         """
@@ -64,14 +65,16 @@ class QuadMesh:
         )
         if not abs(volume) > 1e-15:
             raise ValueError("the matrix flattens the mesh: every scale must differ from 0")
-        return QuadMesh(self.vertices @ linear.T + matrix[:3, 3], self.quads if volume > 0.0 else _turned(self.quads))
+        return QuadMesh(
+            self.vertices @ linear.T + matrix[:3, 3], self.quads if volume > 0.0 else reversed_faces(self.quads)
+        )
 
     def deformed(self, function: Callable[[FloatArray], FloatArray]) -> QuadMesh:
-        """The mesh with its vertices (v, 3) moved by `function` to where it says, (v, 3).
+        """The mesh with its vertices (v, 3) moved by `function` to new positions (v, 3).
 
-        `mesh.deformed(lambda v: v + [0, 0.1, 0] * np.sin(v[:, :1]))`; `mesh.relative` helps with places within the
-        box. A reflection through the function leaves the mesh inside out: use `transformed`. Raises ValueError for
-        another shape and for values that are not finite.
+        `mesh.deformed(lambda v: v + [0, 0.1, 0] * np.sin(v[:, :1]))`; `mesh.relative` gives relative positions.
+        A reflection by the function leaves the mesh inside out: use `transformed`. Raises ValueError for another shape
+        and for values that are not finite.
         """
         moved = np.asarray(function(self.vertices.copy()), dtype=np.float64)
         if moved.shape != self.vertices.shape or not np.isfinite(moved).all():
@@ -80,16 +83,16 @@ class QuadMesh:
 
     @staticmethod
     def joined(meshes: Iterable[QuadMesh]) -> QuadMesh:
-        """One mesh of several, which stay separate surfaces. Raises ValueError for none."""
-        every = list(meshes)
-        if not every:
+        """One mesh of several, which remain separate surfaces. Raises ValueError for an empty sequence."""
+        listed = list(meshes)
+        if not listed:
             raise ValueError("there is no mesh to join")
-        first = np.cumsum([0, *(len(mesh.vertices) for mesh in every[:-1])])
-        quads = [mesh.quads + np.int32(start) for mesh, start in zip(every, first.tolist(), strict=True)]
-        return QuadMesh(np.concatenate([mesh.vertices for mesh in every]), np.concatenate(quads))
+        first = np.cumsum([0, *(len(mesh.vertices) for mesh in listed[:-1])])
+        quads = [mesh.quads + np.int32(start) for mesh, start in zip(listed, first.tolist(), strict=True)]
+        return QuadMesh(np.concatenate([mesh.vertices for mesh in listed]), np.concatenate(quads))
 
 
-def _turned(quads: IntArray) -> IntArray:
-    """The faces turned round, int32 (q, 4); a triangle still repeats its last index."""
+def reversed_faces(quads: IntArray) -> IntArray:
+    """The faces with opposite orientation, int32 (q, 4); a triangle still repeats its last index."""
     four = (quads[:, 2] != quads[:, 3])[:, None]
     return np.where(four, quads[:, ::-1], quads[:, [1, 0, 2, 2]]).astype(np.int32)

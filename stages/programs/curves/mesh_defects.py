@@ -1,4 +1,4 @@
-"""What is wrong with a mesh: open or shared edges, orientation, faces without area, for tests and authors."""
+"""Defects of a mesh, for tests and authors: open or shared edges, orientation, faces without area."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from stages.shape.geometry.components import connected_components
 
 
 def mesh_defects(mesh: QuadMesh) -> list[str]:
-    """Every way in which a mesh is not closed, oriented outwards and two-manifold, one sentence each; none is good.
+    """List the reasons why a mesh is not closed, oriented outwards and two-manifold; empty for a good mesh.
 
     Checks finite numbers, indices, unused vertices, faces without area, folded quads, open edges, edges of more than
-    two faces, faces turned against each other, points where surfaces touch in a vertex alone, and surfaces inside out,
-    each connected one by itself. It does not look for surfaces that pass through each other.
+    two faces, faces of opposite orientation, surfaces that touch in a vertex alone, and surfaces inside out. Does not
+    check for intersections.
     """
     if not len(mesh.quads):
         return ["the mesh has no faces"]
@@ -24,63 +24,63 @@ def mesh_defects(mesh: QuadMesh) -> list[str]:
     if mesh.quads.min() < 0 or mesh.quads.max() >= len(mesh.vertices):
         return [f"a face names a vertex outside 0 to {len(mesh.vertices) - 1}"]
     faces = mesh.triangles
-    faults = []
+    defects = []
     unused = len(mesh.vertices) - len(np.unique(faces))
     if unused:
-        faults.append(f"{unused} vertices belong to no face")
+        defects.append(f"{unused} vertices belong to no face")
     corners = mesh.vertices[faces]
     normals = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     sides = corners - np.roll(corners, 1, axis=1)
     longest = (sides * sides).sum(axis=2).max(axis=1)
     thin = int((dots(normals, normals) <= 1e-18 * longest * longest).sum())
     if thin:
-        faults.append(f"{thin} triangles have no area")
+        defects.append(f"{thin} triangles have no area")
     folded = _folded(mesh)
     if folded:
-        faults.append(f"{folded} quads are folded over themselves")
+        defects.append(f"{folded} quads are folded over themselves")
     starts, ends = faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel().astype(np.int64)
     count = len(mesh.vertices)
-    _, way, uses = np.unique(
+    _, edge, uses = np.unique(
         np.minimum(starts, ends) * count + np.maximum(starts, ends), return_inverse=True, return_counts=True
     )
-    net = np.bincount(way, weights=np.where(starts < ends, 1.0, -1.0))
+    net = np.bincount(edge, weights=np.where(starts < ends, 1.0, -1.0))
     for wrong, sentence in (
         (uses == 1, "edges are open"),
         (uses > 2, "edges belong to more than two faces"),
         ((uses == 2) & (net != 0.0), "edges lie between faces turned against each other"),
     ):
         if wrong.any():
-            faults.append(f"{int(wrong.sum())} {sentence}")
+            defects.append(f"{int(wrong.sum())} {sentence}")
     if (uses == 2).all() and not net.any():
-        faults += _surface_faults(mesh, faces, way)
-    return faults
+        defects += _surface_defects(mesh, faces, edge)
+    return defects
 
 
 def _folded(mesh: QuadMesh) -> int:
-    """How many quads have halves that face against each other, whichever way they are cut."""
+    """The number of quads whose halves have opposite orientations, along either diagonal."""
     quads = mesh.quads[mesh.quads[:, 2] != mesh.quads[:, 3]]
     a, b, c, d = (mesh.vertices[quads[:, k]] for k in range(4))
-    one = dots(cross(b - a, c - a), cross(c - a, d - a))
+    first = dots(cross(b - a, c - a), cross(c - a, d - a))
     other = dots(cross(b - a, d - a), cross(c - b, d - b))
-    return int(((one < 0.0) & (other < 0.0)).sum())
+    return int(((first < 0.0) & (other < 0.0)).sum())
 
 
-def _surface_faults(mesh: QuadMesh, faces: IntArray, way: np.ndarray) -> list[str]:
-    """Vertices where surfaces only touch, and surfaces inside out; every edge has two faces."""
+def _surface_defects(mesh: QuadMesh, faces: IntArray, edge: np.ndarray) -> list[str]:
+    """Vertices where surfaces only touch, and surfaces inside out, where every edge has two faces."""
     corner = np.arange(faces.size)
-    pairs = np.argsort(way, kind="stable").reshape(-1, 2)
+    pairs = np.argsort(edge, kind="stable").reshape(-1, 2)
     # Across an edge the start of one side is the end of the other.
     after = corner - corner % 3 + (corner + 1) % 3
     one = np.concatenate([pairs[:, 0], after[pairs[:, 0]]])
     two = np.concatenate([after[pairs[:, 1]], pairs[:, 1]])
     umbrellas = int(connected_components(faces.size, np.column_stack([one, two])).max(initial=-1)) + 1
-    faults = []
+    defects = []
     if umbrellas > len(mesh.vertices):
-        faults.append(f"surfaces touch in a vertex alone at {umbrellas - len(mesh.vertices)} places")
+        defects.append(f"surfaces touch in a vertex alone at {umbrellas - len(mesh.vertices)} places")
     owner = connected_components(len(faces), pairs // 3)
     surfaces = int(owner.max(initial=-1)) + 1
     a, b, c = (mesh.vertices[faces[:, k]] - mesh.vertices.mean(axis=0) for k in range(3))
     volumes = np.bincount(owner, weights=dots(a, cross(b, c)), minlength=surfaces)
     if (volumes <= 0.0).any():
-        faults.append(f"{int((volumes <= 0.0).sum())} of {surfaces} surfaces are inside out or enclose nothing")
-    return faults
+        defects.append(f"{int((volumes <= 0.0).sum())} of {surfaces} surfaces are inside out or enclose nothing")
+    return defects

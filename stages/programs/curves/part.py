@@ -1,4 +1,4 @@
-"""A part of a shape: a mesh with a label and a colour, which stay with it through copies and symmetries."""
+"""A part of a shape: a mesh with a label and a colour, which its copies keep."""
 
 from __future__ import annotations
 
@@ -14,7 +14,11 @@ from stages.shape.kit import PartMesh
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """label: what the part is, such as "leg"; color: sRGB, 0 to 255."""
+    """A labelled mesh of one colour.
+
+    label: such as "leg"
+    color: sRGB, 0 to 255
+    """
 
     label: str
     mesh: QuadMesh
@@ -25,7 +29,7 @@ class Part:
         return Part(self.label, self.mesh.transformed(matrix), self.color)
 
     def deformed(self, function: Callable[[FloatArray], FloatArray]) -> Part:
-        """The part with its vertices (v, 3) moved by `function`, as `QuadMesh.deformed`."""
+        """The part deformed by `function`, as `QuadMesh.deformed`."""
         return Part(self.label, self.mesh.deformed(function), self.color)
 
     def part_mesh(self) -> PartMesh:
@@ -37,7 +41,7 @@ class Part:
 
 
 def joined(parts: Iterable[Part], label: str | None = None) -> Part:
-    """One part of several, with the colour of the first, and its label where `label` is None."""
-    every = list(parts)
-    mesh = QuadMesh.joined(part.mesh for part in every)
-    return Part(every[0].label if label is None else label, mesh, every[0].color)
+    """One part of several, with the colour of the first, and with its label by default."""
+    listed = list(parts)
+    mesh = QuadMesh.joined(part.mesh for part in listed)
+    return Part(listed[0].label if label is None else label, mesh, listed[0].color)

@@ -12,7 +12,7 @@ from stages.shape.arrays import FloatArray
 
 
 def polyline(points: npt.ArrayLike, closed: bool = False) -> Curve:
-    """Straight pieces through points (n, 3), or (n, 2) in the plane z = 0; a sweep mitres the corners."""
+    """Straight pieces through points (n, 3), or (n, 2) in the plane z = 0; sweeps mitre the corners."""
     return Curve.through(points, closed)
 
 
@@ -24,8 +24,10 @@ def line(start: npt.ArrayLike, end: npt.ArrayLike) -> Curve:
 def bezier(controls: npt.ArrayLike, count: int = 12, closed: bool = False) -> Curve:
     """A chain of cubic Bezier pieces of `count` segments each.
 
-    controls: (3 m + 1, 3) or (3 m + 1, 2): point, handle, handle, point, handle, handle, point, and so on. A closed
-    chain leaves out the last point, which is the first: (3 m, 3). Raises ValueError for another number of controls.
+    controls: (3 m + 1, 3) or (3 m + 1, 2): point, handle, handle, point, handle, handle, point, ...; (3 m, 3) for a
+    closed chain, without the last point
+
+    Raises ValueError for another number of controls.
     """
     given = np.asarray(controls, dtype=np.float64)
     if closed and len(given):
@@ -65,9 +67,9 @@ def arc(radius: float, start: float = 0.0, end: float = 360.0, axis: Axis = "y",
 
 
 def helix(radius: float, height: float, turns: float, axis: Axis = "y", count: int = 16) -> Curve:
-    """A helix from angle 0 at the origin's level up to `height` along the axis; `count` segments a turn.
+    """A helix from angle 0 at the origin's level up to `height` along the axis; `count` segments per turn.
 
-    Negative turns run the other way. Raises ValueError unless radius and turns differ from 0.
+    Negative turns are clockwise. Raises ValueError unless radius and turns differ from 0.
     """
     if radius <= 0.0 or turns == 0.0:
         raise ValueError(f"a helix needs a radius above 0 and some turns, not {radius:g} and {turns:g}")
@@ -76,7 +78,7 @@ def helix(radius: float, height: float, turns: float, axis: Axis = "y", count: i
 
 
 def spiral(inner: float, outer: float, turns: float, axis: Axis = "y", count: int = 16) -> Curve:
-    """A flat spiral from one radius to another; `count` segments a turn. Raises ValueError for equal radii."""
+    """A flat spiral from one radius to another; `count` segments per turn. Raises ValueError for equal radii."""
     if min(inner, outer) < 0.0 or inner == outer or turns == 0.0:
         raise ValueError(f"a spiral needs two different radii, not {inner:g} and {outer:g}, and some turns")
     t = np.linspace(0.0, 1.0, max(int(np.ceil(abs(turns) * count)), 2) + 1)
@@ -84,7 +86,7 @@ def spiral(inner: float, outer: float, turns: float, axis: Axis = "y", count: in
 
 
 def chain(*curves: Curve) -> Curve:
-    """Open curves one after another; the end of each is joined to the start of the next by a straight piece."""
+    """Join open curves in order; straight pieces bridge the gaps."""
     if any(curve.closed for curve in curves):
         raise ValueError("a closed curve has no end to chain another to: take a part() of it")
     return Curve.through(np.concatenate([curve.points for curve in curves]))
@@ -92,8 +94,8 @@ def chain(*curves: Curve) -> Curve:
 
 def _turned(radii: FloatArray, angles: FloatArray, heights: FloatArray, axis: Axis) -> FloatArray:
     """Points at radii and angles around an axis, at heights along it, float64 (n, 3)."""
-    across, beside, sense = {0: (1, 2, 1.0), 1: (0, 2, -1.0), 2: (0, 1, 1.0)}[axis_index(axis)]
+    first, second, sense = {0: (1, 2, 1.0), 1: (0, 2, -1.0), 2: (0, 1, 1.0)}[axis_index(axis)]
     points = np.empty((len(angles), 3))
-    points[:, across], points[:, beside] = radii * np.cos(angles), sense * radii * np.sin(angles)
+    points[:, first], points[:, second] = radii * np.cos(angles), sense * radii * np.sin(angles)
     points[:, axis_index(axis)] = heights
     return points

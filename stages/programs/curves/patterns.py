@@ -21,27 +21,27 @@ class Movable(Protocol):
 
 
 def copies(elements: Sequence[Moved], poses: Iterable[FloatArray]) -> list[Moved]:
-    """All elements at each of the poses (4, 4), such as the frames of a curve; labels stay."""
+    """All elements at each of the poses (4, 4), such as the frames of a curve; labels are kept."""
     return [element.transformed(pose) for pose in poses for element in elements]
 
 
 def evenly(count: int, start: float = 0.0, end: float = 1.0) -> FloatArray:
-    """Relative positions of `count` copies from start to end, float64 (count,); one alone stands in the middle."""
+    """Relative positions of `count` copies from start to end, float64 (count,); a single one is in the middle."""
     return np.array([(start + end) / 2.0]) if count == 1 else np.linspace(start, end, count)
 
 
 def linear(elements: Sequence[Moved], count: int, step: tuple[float, float, float]) -> list[Moved]:
-    """`count` copies in a row, each `step` after the one before; the first stays where it is."""
-    return copies(elements, [translation(*(place * each for each in step)) for place in range(count)])
+    """`count` copies in a row, each `step` from the one before; the first is not moved."""
+    return copies(elements, [translation(*(index * length for length in step)) for index in range(count)])
 
 
 def radial(elements: Sequence[Moved], count: int, axis: Axis = "y", angle: float = 360.0) -> list[Moved]:
-    """`count` copies around an axis through the origin, the first where it is.
+    """`count` copies around an axis through the origin; the first is not moved.
 
-    Over 360 degrees they share the turn evenly; over a smaller `angle` the last stands at its end.
+    Over 360 degrees they are evenly spaced; over a smaller `angle` the last is at its end.
     """
     gaps = count if abs(angle) >= 360.0 else max(count - 1, 1)
-    return copies(elements, [rotation(axis, angle * place / gaps) for place in range(count)])
+    return copies(elements, [rotation(axis, angle * index / gaps) for index in range(count)])
 
 
 def symmetric(elements: Sequence[Moved], axis: Axis, at: float = 0.0) -> list[Moved]:

@@ -17,16 +17,16 @@ from stages.shape.arrays import FloatArray
 class Profile:
     """A closed curve in the plane.
 
-    points: float64 (k, 2), counter-clockwise, the first not repeated. The origin is where the rail passes.
+    points: float64 (k, 2), counter-clockwise, the first not repeated; the rail is at the origin
     """
 
     points: FloatArray
 
     @staticmethod
     def of(points: npt.ArrayLike) -> Profile:
-        """A custom profile, points (k, 2) in either direction; it may be concave but not cross itself.
+        """A custom profile from points (k, 2) in either direction; it may be concave but not intersect itself.
 
-        Neighbours at one place count once. Raises ValueError for fewer than three points, no area, and crossings.
+        Coincident neighbours count once. Raises ValueError for fewer than three points, no area, and crossings.
         """
         given = np.asarray(points, dtype=np.float64)
         if given.ndim != 2 or given.shape[1] != 2 or not np.isfinite(given).all():
@@ -51,17 +51,17 @@ class Profile:
 
     @property
     def size(self) -> FloatArray:
-        """Width and height of the box around it, float64 (2,)."""
+        """Width and height of its bounding box, float64 (2,)."""
         extent: FloatArray = self.points.max(axis=0) - self.points.min(axis=0)
         return extent
 
     @cached_property
     def cap(self) -> Cap:
-        """How the profile is filled with faces."""
+        """The faces that fill the profile."""
         return polygon_cap(self.points)
 
     def scaled(self, x: float, y: float | None = None) -> Profile:
-        """Scaled by x and y (the same where y is None). Raises ValueError unless both are above 0."""
+        """Scaled by x and y, or by x alone. Raises ValueError unless both are above 0."""
         factors = np.array([x, x if y is None else y])
         if factors.min() <= 0.0:
             raise ValueError(f"a profile's scale is above 0, not {factors.tolist()}")
@@ -188,7 +188,7 @@ def _area(points: FloatArray) -> float:
 
 
 def _crossing(points: FloatArray) -> tuple[int, int] | None:
-    """Two sides, not neighbours, that meet."""
+    """The indices of two sides that intersect and are no neighbours."""
     after = np.roll(points, -1, axis=0)
 
     def side_of(p: FloatArray, q: FloatArray, r: FloatArray) -> FloatArray:
@@ -200,10 +200,10 @@ def _crossing(points: FloatArray) -> tuple[int, int] | None:
     a, b = points[:, None], after[:, None]
     c, d = points[None], after[None]
     meets = (side_of(a, b, c) * side_of(a, b, d) <= 0.0) & (side_of(c, d, a) * side_of(c, d, b) <= 0.0)
-    # Collinear sides that lie apart pass the test above.
+    # Distant collinear sides pass the test above.
     low, high = np.minimum(a, b), np.maximum(a, b)
     meets &= ((low <= np.maximum(c, d)) & (np.minimum(c, d) <= high)).all(axis=-1)
-    places = np.arange(len(points))
-    apart = np.abs(places[:, None] - places)
-    found = np.argwhere(meets & (apart > 1) & (apart < len(points) - 1))
-    return (int(found[0, 0]), int(found[0, 1])) if len(found) else None
+    indices = np.arange(len(points))
+    steps = np.abs(indices[:, None] - indices)
+    pairs = np.argwhere(meets & (steps > 1) & (steps < len(points) - 1))
+    return (int(pairs[0, 0]), int(pairs[0, 1])) if len(pairs) else None

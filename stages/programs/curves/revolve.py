@@ -8,17 +8,20 @@ import numpy as np
 
 from stages.programs.curves.caps import Cap, fan, polygon_cap
 from stages.programs.curves.curve import Curve
-from stages.programs.curves.mesh import QuadMesh
+from stages.programs.curves.mesh import QuadMesh, reversed_faces
 from stages.programs.curves.skin import skin
 from stages.shape.arrays import FloatArray
 
 
 def revolve(outline: Curve, angle: float = 360.0, count: int = 24) -> QuadMesh:
-    """The solid that an outline in the plane z = 0 (x the radius, y the height) makes around the y axis.
+    """Revolve an outline in the plane z = 0 (x the radius, y the height) around the y axis.
 
-    An open outline runs from the foot to the top of a solid body, in either direction; where it ends off the axis the
-    body is closed flat. Points on the axis are poles. A closed outline makes a ring, such as a torus or a moulding.
-    `angle` degrees from +x towards -z in `count` steps; less than 360 gives a piece with flat sides.
+    An open outline goes from the foot to the top of a solid body, in either direction. The body is closed flat where
+    the outline ends off the axis. Points on the axis are poles. A closed outline makes a ring, such as a torus.
+
+    angle: in degrees, from +x towards -z; less than 360 gives a piece with flat sides
+    count: number of steps
+
     Raises ValueError for a negative radius, for an outline that touches the axis in between, and for other angles.
     """
     points = outline.points[:, :2]
@@ -45,7 +48,7 @@ def revolve(outline: Curve, angle: float = 360.0, count: int = 24) -> QuadMesh:
 
 
 def _closed_by_axis(section: FloatArray) -> FloatArray:
-    """The outline with its ends led to the axis."""
+    """The outline with its ends extended to the axis."""
     ends: list[FloatArray] = []
     if section[0, 0] > 0.0:
         ends.append(np.array([[0.0, section[0, 1]]]))
@@ -65,7 +68,7 @@ def _around(angle: float, count: int, whole: bool) -> FloatArray:
 
 
 def _ring(section: FloatArray, angle: float, count: int, whole: bool) -> QuadMesh:
-    """A closed outline around the axis."""
+    """The revolved closed outline."""
     rings = section[None, :, :1] * _around(angle, count, whole)[:, None]
     rings[..., 1] = section[:, 1]
     return skin(rings, polygon_cap(section), whole)
@@ -79,7 +82,7 @@ def _whole(section: FloatArray, count: int) -> QuadMesh:
 
 
 def _piece(section: FloatArray, angle: float, count: int) -> QuadMesh:
-    """A piece of a body: its two sides meet in the axis."""
+    """A piece of a body, whose two sides meet at the axis."""
     around = _around(angle, count, False)
     inner = section[1:-1]
     grid = inner[None, :, :1] * around[:, None]
@@ -95,10 +98,9 @@ def _piece(section: FloatArray, angle: float, count: int) -> QuadMesh:
     for last in (False, True):
         base = 2 + (grid.shape[0] - 1) * inside if last else 2
         # The section's points, pole to pole, then its middle.
-        place = np.concatenate([[0], base + np.arange(inside), [1], [total + last]])
-        quads = place[cap.quads]
-        four = (quads[:, 2] != quads[:, 3])[:, None]
-        sides.append(quads if last else np.where(four, quads[:, ::-1], quads[:, [1, 0, 2, 2]]))
+        index = np.concatenate([[0], base + np.arange(inside), [1], [total + last]])
+        quads = index[cap.quads]
+        sides.append(quads if last else reversed_faces(quads))
     return QuadMesh(
         np.concatenate(vertices), np.concatenate([_piece_faces(grid.shape[0], inside), *sides]).astype(np.int32)
     )
@@ -108,8 +110,8 @@ def _piece(section: FloatArray, angle: float, count: int) -> QuadMesh:
 def _piece_faces(columns: int, inside: int) -> np.ndarray:
     """The faces between the columns, from the lower pole 0 to the upper pole 1, int (q, 4)."""
     column = 2 + np.arange(columns - 1)[:, None] * inside
-    place = np.arange(inside - 1)
-    here, there = column + place, column + inside + place
+    index = np.arange(inside - 1)
+    here, there = column + index, column + inside + index
     quads = np.stack([here, here + 1, there + 1, there], axis=-1).reshape(-1, 4)
     low, low_next = column.ravel(), column.ravel() + inside
     zeros = np.zeros(len(low), dtype=np.int64)
@@ -119,10 +121,12 @@ def _piece_faces(columns: int, inside: int) -> np.ndarray:
 
 
 def hollow(outline: Curve, thickness: float) -> Curve:
-    """The outline of an open vessel with a wall: up the outer side of `outline`, over the rim, down the inner side.
+    """The outline of an open vessel with a wall: up the outer side, over the rim, down the inner side; for `revolve`.
 
-    outline: open, in the plane z = 0, from the foot to the rim, rising. The wall and the floor are `thickness` thick.
-    The result goes into `revolve`. Raises ValueError where no room is left within, or where the outline does not rise.
+    outline: the outer side, open, in the plane z = 0, rising from the foot to the rim
+    thickness: of wall and floor
+
+    Raises ValueError where no space is left within, or where the outline does not rise.
     """
     if thickness <= 0.0 or outline.closed or outline.points[-1, 1] <= outline.points[0, 1]:
         raise ValueError("a vessel needs a wall thicker than 0 and an open outline that rises from the foot to the rim")
@@ -130,14 +134,14 @@ def hollow(outline: Curve, thickness: float) -> Curve:
     tangents = outline.own_stations.tangents
     normals = np.stack([-tangents[:, 1], tangents[:, 0]], axis=1)
     inner = outer[:, :2] + thickness * normals
-    # The rim is level, and the floor is as thick as the wall.
+    # The rim is horizontal, and the floor is as thick as the wall.
     rim, floor = outer[-1, 1], outer[0, 1] + thickness
     if inner[-1, 0] <= 0.0 or floor >= rim:
-        raise ValueError(f"a wall of {thickness:g} leaves no room within the vessel: make it thinner")
+        raise ValueError(f"a wall of {thickness:g} leaves no space within the vessel: make it thinner")
     inner[-1] = [inner[-1, 0], rim]
     kept, lowest = [inner[-1]], rim
     for radius, height in inner[-2::-1].tolist():
-        # An offset around a tight bend runs back over itself, and one within a narrow foot through the axis.
+        # Offset outlines intersect themselves at tight bends, and cross the axis in narrow feet.
         if radius > 1e-6 and floor < height < lowest:
             kept.append(np.array([radius, height]))
             lowest = height

@@ -1,4 +1,4 @@
-"""Boxes, boards, cylinders, balls: solids that need no rail."""
+"""Solids without a rail: boxes, boards, cylinders, balls."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ BOX_QUADS = np.array(
 )
 """Corners are numbered 4 x + 2 y + z."""
 
-CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+BOX_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
 
 def box(size: npt.ArrayLike, center: npt.ArrayLike = (0.0, 0.0, 0.0)) -> QuadMesh:
     """A box with sides `size` (3,) around `center` (3,). Raises ValueError unless every side is above 0."""
-    return QuadMesh(CORNERS * _sizes(size) + np.asarray(center, dtype=np.float64), BOX_QUADS)
+    return QuadMesh(BOX_CORNERS * _sizes(size) + np.asarray(center, dtype=np.float64), BOX_QUADS)
 
 
 def rounded_box(
@@ -40,15 +40,15 @@ def rounded_box(
         raise ValueError(f"a box's edge radius lies within 0 and half its shortest side, {shortest / 2:g}")
     if radius < 1e-9 * shortest:
         return box(size, center)
-    # Just under half, where opposite edges would meet; the first and last rings keep a trace of a corner radius, or
-    # their points would meet.
+    # Slightly less than half, where opposite edges would meet; the first and last rings keep a small corner radius, or
+    # their points would coincide.
     radius = min(radius, 0.499 * shortest)
     angles = np.linspace(0.0, np.pi / 2.0, steps + 1)
     radii = np.maximum(radius * np.sin(angles), 0.02 * radius)
     rise = radius * (1.0 - np.cos(angles))
     around = np.radians(np.arange(4)[:, None] * 90.0 + np.linspace(0.0, 90.0, steps + 1)).ravel()
     corner = np.repeat([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]], steps + 1, axis=0)
-    # The plane of z and x, in which counter-clockwise is seen from +y.
+    # In the plane of z and x, counter-clockwise is as seen from +y.
     plan = corner * (np.array([depth, width]) / 2.0 - radius)
     rounded = plan + radii[:, None, None] * np.stack([np.cos(around), np.sin(around)], axis=1)
     rings = np.empty((2 * len(radii), len(plan), 3))
@@ -60,10 +60,11 @@ def rounded_box(
 def extrude(
     profile: Profile, height: float, axis: Axis = "y", base: float = 0.0, bevel: float = 0.0, steps: int = 1
 ) -> QuadMesh:
-    """A board: the profile in the plane across an axis (as `Profile.curve`), from `base` on `height` thick.
+    """A board: the profile in the plane across an axis (as `Profile.curve`), `height` thick from `base` on.
 
-    bevel: how far its upper and lower edges are rounded, in `steps` steps; 1 step cuts them at 45 degrees.
-    Raises ValueError for a height not above 0 and for a bevel that the profile or half the height cannot give.
+    bevel: radius of its upper and lower edges, in `steps` steps; 1 step cuts them at 45 degrees
+
+    Raises ValueError for a height not above 0 and for a bevel too large for the profile or the height.
     """
     if not height > 0.0:
         raise ValueError(f"a board's height is above 0, not {height:g}")
@@ -77,7 +78,7 @@ def extrude(
         rise = bevel * (1.0 - np.cos(angles))
         outlines, heights = [*edge, *edge[::-1]], np.concatenate([rise, (height - rise)[::-1]])
     rings = np.empty((len(outlines), len(profile), 3))
-    # The plane's axes and the one across it are right-handed but for y, where rings go from the top down.
+    # The axes of the plane and the one across it are right-handed except for y, where rings go from the top down.
     first, second = {0: (1, 2), 1: (0, 2), 2: (0, 1)}[axis_index(axis)]
     rings[..., first], rings[..., second] = np.moveaxis(np.array(outlines), 2, 0)
     rings[..., axis_index(axis)] = base + (heights if axis != "y" else height - heights)[:, None]

@@ -1,4 +1,4 @@
-"""A style: how wide a profile is and how it is turned along its rail (geocode §3.1, "triplets")."""
+"""A style: the scale and the twist of a profile along its rail (geocode §3.1, "triplets")."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ Scale = float | tuple[float, float]
 class Style:
     """Scale and twist at relative positions, linear in between.
 
-    positions: float64 (k,), from 0 to 1, rising; scale: float64 (k, 2), of the profile's x and y, not negative; 0 for
-    both at an end closes the mesh in a point; twist: float64 (k,), degrees about the rail, counter-clockwise.
-    A sweep puts a ring at each of the positions.
+    positions: float64 (k,), from 0 to 1, rising; a sweep has a ring at each of them
+    scale: float64 (k, 2), of the profile's x and y, not negative; 0 for both at an end closes the mesh in a point
+    twist: float64 (k,), degrees about the rail, counter-clockwise
     """
 
     positions: FloatArray
@@ -38,7 +38,7 @@ class Style:
 
     @staticmethod
     def taper(start: Scale, end: Scale, twist: float = 0.0, count: int = 1) -> Style:
-        """Evenly from one scale to another, with `twist` degrees on the way in `count` steps."""
+        """Linear from one scale to another, with `twist` degrees in `count` steps."""
         t = np.linspace(0.0, 1.0, count + 1)
         a, b = np.broadcast_to(start, 2), np.broadcast_to(end, 2)
         return Style(t, a + t[:, None] * (b - a), twist * t)
@@ -47,25 +47,25 @@ class Style:
     def knots(knots: Sequence[tuple[float, Scale]], smooth: bool = False, count: int = 12, twist: float = 0.0) -> Style:
         """Through `(position, scale)` pairs from position 0 to 1, straight or smooth.
 
-        A smooth style has `count` even steps beside its knots; it neither overshoots nor undershoots them.
+        A smooth style has `count` even steps besides its knots, and does not overshoot them.
         """
-        places = np.array([place for place, _ in knots], dtype=np.float64)
+        positions = np.array([position for position, _ in knots], dtype=np.float64)
         scales = np.array([np.broadcast_to(scale, 2) for _, scale in knots], dtype=np.float64)
         if not smooth:
-            return Style(places, scales, twist * places)
-        style = Style(places, scales, twist * places)
-        t = np.unique(np.concatenate([places, np.linspace(0.0, 1.0, count + 1)]))
-        return Style(t, _monotone(t, places, style.scale), twist * t)
+            return Style(positions, scales, twist * positions)
+        style = Style(positions, scales, twist * positions)
+        t = np.unique(np.concatenate([positions, np.linspace(0.0, 1.0, count + 1)]))
+        return Style(t, _monotone(t, positions, style.scale), twist * t)
 
     @staticmethod
     def of(scale: Callable[[FloatArray], npt.ArrayLike], count: int = 16, twist: float = 0.0) -> Style:
-        """From a function of positions (k,) to scales (k,) or (k, 2), at `count` even steps.
+        """Sample a function from positions (k,) to scales (k,) or (k, 2), at `count` even steps.
 
         `Style.of(lambda t: 1 + 0.1 * np.sin(8 * np.pi * t), count=48)` is a leg with four waves.
         """
         t = np.linspace(0.0, 1.0, count + 1)
-        found = np.asarray(scale(t), dtype=np.float64)
-        return Style(t, np.array(np.broadcast_to(found.T, (2, len(t))).T), twist * t)
+        scales = np.asarray(scale(t), dtype=np.float64)
+        return Style(t, np.array(np.broadcast_to(scales.T, (2, len(t))).T), twist * t)
 
     def at(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Scale (n, 2) and twist in degrees (n,) at relative positions (n,)."""
@@ -75,20 +75,20 @@ class Style:
         return scale, np.interp(positions, self.positions, self.twist)
 
 
-def _monotone(t: FloatArray, places: FloatArray, values: FloatArray) -> FloatArray:
-    """Cubic pieces through values (k, 2) at places (k,), with slopes that never overshoot (Fritsch, Butland 1984)."""
-    widths = np.diff(places)[:, None]
+def _monotone(t: FloatArray, positions: FloatArray, values: FloatArray) -> FloatArray:
+    """Cubic pieces through values (k, 2) at positions (k,) that never overshoot (Fritsch, Butland 1984)."""
+    widths = np.diff(positions)[:, None]
     rises = np.diff(values, axis=0) / widths
     slopes = np.concatenate([rises[:1], np.zeros((len(values) - 2, 2)), rises[-1:]])
     together = rises[:-1] * rises[1:]
     same = together > 0.0
     slopes[1:-1][same] = 2.0 * together[same] / (rises[:-1] + rises[1:])[same]
-    k = np.clip(np.searchsorted(places, t, side="right") - 1, 0, len(places) - 2)
-    u = ((t - places[k]) / widths[k, 0])[:, None]
+    k = np.clip(np.searchsorted(positions, t, side="right") - 1, 0, len(positions) - 2)
+    u = ((t - positions[k]) / widths[k, 0])[:, None]
     bend = u * u * (3.0 - 2.0 * u)
     leave, arrive = u * (1.0 - u) ** 2, u * u * (u - 1.0)
     through: FloatArray = (
         values[k] + bend * (values[k + 1] - values[k]) + widths[k] * (leave * slopes[k] + arrive * slopes[k + 1])
     )
-    # Rounding must not turn a scale of 0 into one below it.
+    # Rounding must not make a scale negative.
     return np.maximum(through, 0.0)

@@ -1,4 +1,4 @@
-"""Matrices that place one element by another: attachment, stretching, turning, mirroring (geocode §3.1)."""
+"""Transforms of elements: attachment, stretching, turning, mirroring (geocode §3.1)."""
 
 from __future__ import annotations
 
@@ -10,38 +10,43 @@ from stages.shape.arrays import FloatArray
 
 
 def translation(x: float, y: float, z: float) -> FloatArray:
-    """Moves by (x, y, z)."""
+    """Move by (x, y, z)."""
     matrix = np.eye(4)
     matrix[:3, 3] = x, y, z
     return matrix
 
 
 def rotation(axis: Axis, degrees: float, center: npt.ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
-    """Turns about an axis through `center` (3,), counter-clockwise seen from the axis' tip."""
-    place = axis_index(axis)
-    one, two = (place + 1) % 3, (place + 2) % 3
+    """Turn about an axis through `center` (3,), counter-clockwise seen from the axis' tip."""
+    index = axis_index(axis)
+    first, second = (index + 1) % 3, (index + 2) % 3
     cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     matrix = np.eye(4)
-    matrix[one, one], matrix[two, two], matrix[one, two], matrix[two, one] = cosine, cosine, -sine, sine
+    matrix[first, first], matrix[second, second], matrix[first, second], matrix[second, first] = (
+        cosine,
+        cosine,
+        -sine,
+        sine,
+    )
     return _about(matrix, center)
 
 
 def scaling(x: float, y: float, z: float, center: npt.ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
-    """Scales along the axes about `center` (3,)."""
+    """Scale along the axes about `center` (3,)."""
     return _about(np.diag([x, y, z, 1.0]), center)
 
 
 def mirroring(axis: Axis, at: float = 0.0) -> FloatArray:
-    """Mirrors in the plane where the coordinate `axis` is `at`."""
+    """Mirror in the plane where the coordinate `axis` is `at`."""
     matrix = np.eye(4)
     matrix[axis_index(axis), axis_index(axis)], matrix[axis_index(axis), 3] = -1.0, 2.0 * at
     return matrix
 
 
 def frame(origin: npt.ArrayLike, z: npt.ArrayLike, y: npt.ArrayLike) -> FloatArray:
-    """A frame at `origin` (3,) whose third axis runs along `z` and whose second leans towards `y`, (4, 4).
+    """A frame (4, 4) at `origin` (3,) whose third axis is parallel to `z` and whose second leans towards `y`.
 
-    Axes as those of `Curve.frames`: the third is the tangent. Raises ValueError where `y` runs along `z`.
+    As in `Curve.frames`, the third axis is the tangent. Raises ValueError where `y` is parallel to `z`.
     """
     third, lean = np.asarray(z, dtype=np.float64), np.asarray(y, dtype=np.float64)
     first = np.cross(lean, third)
@@ -56,9 +61,9 @@ def frame(origin: npt.ArrayLike, z: npt.ArrayLike, y: npt.ArrayLike) -> FloatArr
 
 
 def attach(own: FloatArray, to: FloatArray) -> FloatArray:
-    """The matrix that brings an element with its frame `own` onto the frame `to`, both rigid (4, 4).
+    """The matrix that moves an element with its frame `own` onto the frame `to`, both rigid (4, 4).
 
-    Frames come from `Curve.frames`, which gives those of relative positions, and from `frame`.
+    `Curve.frames` gives frames at relative positions, and `frame` any other.
     """
     inverse = np.eye(4)
     inverse[:3, :3] = own[:3, :3].T
@@ -73,11 +78,11 @@ def stretch(
     own_up: npt.ArrayLike = (0.0, 1.0, 0.0),
     uniform: bool = False,
 ) -> FloatArray:
-    """The matrix that stretches an element between two attachments: `own` = (start, end) goes onto `to` = (start, end).
+    """The matrix that stretches an element between two attachments, from `own` = (start, end) onto `to` = (start, end).
 
-    The element keeps its cross-section, or grows with its length where `uniform`. Its direction `own_up` is turned to
-    lean towards `up`. Works on meshes, parts and curves: stretch a unit curve, then sweep it, to keep a handle's
-    thickness. Raises ValueError where two points coincide, and where an up runs along its line.
+    The element keeps its cross-section, or scales with its length where `uniform`. Its direction `own_up` is turned
+    towards `up`. To keep the thickness of a handle, stretch a unit curve, then sweep it. Raises ValueError where two
+    points coincide, and where an up direction is parallel to its line.
     """
     start, end = (np.asarray(point, dtype=np.float64) for point in own)
     goal, goal_end = (np.asarray(point, dtype=np.float64) for point in to)

@@ -1,4 +1,4 @@
-"""Dot, cross and unit length of rows of vectors; `np.cross` and `np.linalg.norm` cost more than a whole sweep."""
+"""Dot products, cross products and unit vectors by rows; `np.cross` and `np.linalg.norm` cost more than a sweep."""
 
 from __future__ import annotations
 
@@ -23,6 +23,6 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def unit(rows: FloatArray) -> FloatArray:
-    """Each row (n, 3) at length 1; none may be zero."""
+    """Each row (n, 3) scaled to length 1; no row may be zero."""
     scaled: FloatArray = rows / np.sqrt(dots(rows, rows))[:, None]
     return scaled

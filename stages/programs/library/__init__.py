@@ -1,1 +1,1 @@
-"""The programs that come with Shapemill, one file each, and the pieces of each beside it."""
+"""The programs that come with Shapemill: one file each, and files with their pieces."""

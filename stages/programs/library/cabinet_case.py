@@ -1,4 +1,4 @@
-"""The case of a cabinet: boards, shelves, the top with its crown, and what it stands on."""
+"""The case of a cabinet: boards, shelves, the top with its crown, and the base."""
 
 from __future__ import annotations
 
@@ -21,33 +21,35 @@ from stages.programs.library.cabinet_dimensions import CabinetDimensions, block
 
 OAK, SHADE, DARK = (205, 172, 128), (184, 150, 106), (84, 66, 54)
 
-SUNK = 0.004
-"""How far boards reach into each other."""
+BOARD_OVERLAP = 0.004
+"""Depth to which boards reach into each other, in metres."""
 
-CORNER = 6
-"""Sides of a round corner."""
+CORNER_SEGMENTS = 6
 
-SIDEWAYS = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-"""Takes x and z of what is extruded upwards to z and y, and its height to x."""
+SIDEWAYS_TRANSFORM = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+"""Maps x and z of an upright extrusion to z and y, and its height to x."""
 
 
 def case_parts(cabinet: CabinetDimensions) -> list[Part]:
-    """Sides, bottom, dividers and back; what lies between the sides stands back a hair from their front edges."""
-    top, inner = cabinet.ceiling + SUNK, cabinet.half - cabinet.board
+    """Sides, bottom, dividers and back; the boards between the sides are a millimetre behind their front edges."""
+    top, inner = cabinet.ceiling + BOARD_OVERLAP, cabinet.half - cabinet.board
     side = block((-cabinet.half, cabinet.floor, cabinet.back), (-inner, top, cabinet.front))
     floor = block(
-        (-inner - SUNK, cabinet.floor, cabinet.back),
-        (inner + SUNK, cabinet.floor + cabinet.board, cabinet.front - 0.001),
+        (-inner - BOARD_OVERLAP, cabinet.floor, cabinet.back),
+        (inner + BOARD_OVERLAP, cabinet.floor + cabinet.board, cabinet.front - 0.001),
     )
     parts = [*symmetric([Part("side", side, OAK)], "x"), Part("bottom", floor, OAK)]
     behind = cabinet.back
     if cabinet.values["has_back"]:
         behind = cabinet.back + 0.008
-        panel = block((-inner - SUNK, cabinet.floor + cabinet.board - SUNK, cabinet.back), (inner + SUNK, top, behind))
+        panel = block(
+            (-inner - BOARD_OVERLAP, cabinet.floor + cabinet.board - BOARD_OVERLAP, cabinet.back),
+            (inner + BOARD_OVERLAP, top, behind),
+        )
         parts.append(Part("back", panel, SHADE))
     for column in cabinet.columns[1:]:
         right, bottom = column.low
-        low = (right - cabinet.board, bottom - SUNK, behind - SUNK * bool(cabinet.values["has_back"]))
+        low = (right - cabinet.board, bottom - BOARD_OVERLAP, behind - BOARD_OVERLAP * bool(cabinet.values["has_back"]))
         parts.append(Part("divider", block(low, (right, top, cabinet.front - 0.001)), OAK))
     return parts
 
@@ -57,11 +59,11 @@ def shelf_parts(cabinet: CabinetDimensions) -> list[Part]:
     shelves = []
     count = cabinet.values["shelf_count"]
     thick = min(cabinet.board, 0.024)
-    for column, bare in zip(cabinet.columns, cabinet.is_open, strict=True):
-        for place in range(count if bare else 0):
-            level = column.low[1] + (column.size[1] * (place + 1)) / (count + 1)
-            low = (column.low[0] - SUNK, level - thick / 2.0, cabinet.back + 0.004)
-            high = (column.high[0] + SUNK, level + thick / 2.0, cabinet.front - 0.012)
+    for column, is_open in zip(cabinet.columns, cabinet.is_open, strict=True):
+        for shelf in range(count if is_open else 0):
+            level = column.low[1] + (column.size[1] * (shelf + 1)) / (count + 1)
+            low = (column.low[0] - BOARD_OVERLAP, level - thick / 2.0, cabinet.back + 0.004)
+            high = (column.high[0] + BOARD_OVERLAP, level + thick / 2.0, cabinet.front - 0.012)
             shelves.append(Part("shelf", block(low, high), SHADE))
     return shelves
 
@@ -72,7 +74,7 @@ def top_parts(cabinet: CabinetDimensions) -> list[Part]:
     thick, flare = values["top_thickness"], 0.7 * cabinet.crown
     out = values["top_overhang"] + flare
     bevel = 0.45 * thick * values["edge_roundness"]
-    # It grows by what its round corners in front would let look out.
+    # It grows, or the case would show at its round front corners.
     radius = 0.14 * values["edge_roundness"]
     out += (1.0 - np.sqrt(0.5)) * (radius - bevel) + bevel
     outline = _rounded_in_front(cabinet.half + out, cabinet.back, cabinet.face + out, radius)
@@ -84,8 +86,8 @@ def top_parts(cabinet: CabinetDimensions) -> list[Part]:
 
 
 def _rounded_in_front(half: float, back: float, front: float, radius: float) -> Profile:
-    """A rectangle from -half to half and from back to front, whose corners in front have a radius."""
-    turn = np.linspace(0.0, np.pi / 2.0, CORNER + 1)
+    """A rectangle from -half to half and from back to front, with round front corners."""
+    turn = np.linspace(0.0, np.pi / 2.0, CORNER_SEGMENTS + 1)
     corner = np.stack([np.cos(turn) - 1.0, np.sin(turn) - 1.0], axis=1) * radius + [half, front]
     return Profile.of(np.concatenate([[[-half, back], [half, back]], corner, corner[::-1] * [-1.0, 1.0]]))
 
@@ -95,7 +97,7 @@ def _crown(cabinet: CabinetDimensions, flare: float) -> QuadMesh:
     turn = np.linspace(0.0, np.pi / 2.0, 6)
     out = np.concatenate([[0.0], 0.12 + 0.68 * (1.0 - np.cos(turn)), [1.0, 1.0]]) * flare
     rise = np.concatenate([[0.0], 0.08 + 0.72 * np.sin(turn), [0.86, 1.05]]) * cabinet.crown
-    # From the top down, counter-clockwise in the plane of x and z.
+    # Top down, counter-clockwise in the plane of x and z.
     out, rise = out[::-1], rise[::-1]
     rings = np.empty((len(out), 4, 3))
     rings[:, [0, 3], 0], rings[:, [1, 2], 0] = (cabinet.half + out)[:, None], -(cabinet.half + out)[:, None]
@@ -108,7 +110,7 @@ def base_parts(cabinet: CabinetDimensions) -> list[Part]:
     """A plinth, legs or runners."""
     kind = cabinet.values["base_kind"]
     inset = 0.1 * cabinet.values["base_inset"]
-    top = cabinet.floor + min(SUNK, cabinet.board / 3.0)
+    top = cabinet.floor + min(BOARD_OVERLAP, cabinet.board / 3.0)
     if kind == 0:
         low, high = (
             (0.005 + inset - cabinet.half, 0.0, cabinet.back),
@@ -119,10 +121,10 @@ def base_parts(cabinet: CabinetDimensions) -> list[Part]:
     x, z = cabinet.half - thick / 2.0 - 0.006 - inset, cabinet.front - thick / 2.0 - 0.006 - 0.6 * inset
     if kind == 2:
         return symmetric([Part("runner", _runner(x, z, thick, top), DARK)], "x")
-    # A square is as wide as its leg, and a circle fits well within it.
+    # A square is as wide as the leg; a circle is smaller.
     section = square_circle(cabinet.values["leg_roundness"], (1.0 - 0.12 * cabinet.values["leg_roundness"]) * thick)
     style = Style.taper(1.0 - 0.6 * cabinet.values["leg_taper"], 1.0)
-    # A wide cabinet has a pair of legs in its middle, too.
+    # A wide cabinet also has a pair of legs in its middle.
     sides = [(x, z), (x, -z), (-x, z), (-x, -z), *([(0.0, z), (0.0, -z)] if cabinet.half > 0.9 else [])]
     return [
         Part("leg", sweep(line((across, 0.0, along), (across, top, along)), section, style), DARK)
@@ -136,4 +138,4 @@ def _runner(x: float, z: float, thick: float, top: float) -> QuadMesh:
     # Seen from the side: along z, and upwards.
     side = [(-end, 0.0), (end, 0.0), (end, top), (post, top), (post, bar), (-post, bar), (-post, top), (-end, top)]
     mesh = extrude(Profile.of(side), thick, base=-thick / 2.0)
-    return mesh.transformed(translation(x, 0.0, 0.0) @ SIDEWAYS)
+    return mesh.transformed(translation(x, 0.0, 0.0) @ SIDEWAYS_TRANSFORM)

@@ -27,64 +27,64 @@ from stages.shape.arrays import FloatArray
 
 PLATE, BRASS, LIGHT = (150, 158, 168), (186, 148, 84), (250, 238, 196)
 
-PLAN, STEPS, AROUND, GLASS = 48, 20, 12, 24
-"""Points around the plate; segments of an arm and points around it; points around a bulb."""
+PLATE_OUTLINE_POINTS, BULB_OUTLINE_POINTS = 48, 24
+ARM_SEGMENTS, ARM_OUTLINE_POINTS = 20, 12
 
 
 def build(values: Values) -> Sequence[Part]:
-    """The parts of a lamp that hangs from the plane y = 0 around the y axis; its first arm points to +x."""
+    """Build the parts of a lamp that hangs from the plane y = 0 around the y axis; its first arm points to +x."""
     half = 0.05 + np.array([values["base_x"], values["base_y"]]) / 2.0
     parts = [Part("base", _base(values, half), PLATE)]
     wide, thick = 0.6 * values["light_frame_thickness_x"], 0.6 * values["light_frame_thickness_y"]
     end = 0.5 + 0.9 * values["light_frame_style"]
-    # A bulb stands out of the end of its arm, however thick that is.
+    # A bulb protrudes from the end of its arm, however thick that is.
     bulb = values["lightbulb_ radius"] + 0.3 * end * min(wide, thick)
     count = values["light_frame_count"]
-    # Arms start within the flat of the plate's underside, and end where the bulbs have room beside each other.
+    # Arms start within the flat underside of the plate, and end where the bulbs have room.
     seat = values["light_frame_radius"] * (0.8 * half - _inset(values, half) - 0.5 * max(wide, thick)).clip(min=0.004)
     needed = (1.3 * bulb + 0.015) / np.sin(np.pi / count) if count > 1 else 0.0
     reach = max(float(needed) - float(seat.min()), 0.0) + values["light_frame_end_point_y"]
     taper = Style.knots([(0.0, 1.0), (0.7, 0.7 + 0.15 * end), (1.0, end)], smooth=True, count=8)
-    # A round arm is turned: it swells on its way.
+    # A round arm is turned on a lathe: it swells along its length.
     swell = values["light_frame_roundness"] * (0.3 * max(wide, thick) + 0.036)
     rail = _rail(values, reach, 0.6 * (max(wide, thick) * taper.scale.max() + swell))
-    profile = square_circle(0.1 + 0.9 * values["light_frame_roundness"], thick, wide, count=AROUND)
+    profile = square_circle(0.1 + 0.9 * values["light_frame_roundness"], thick, wide, count=ARM_OUTLINE_POINTS)
     turned = np.sin(np.pi * rail.positions)[:, None] ** 2 * swell / np.array([thick, wide])
     style = Style(rail.positions, taper.at(rail.positions)[0] + turned, np.zeros(len(rail.positions)))
     swept = sweep(rail, profile, style, up=(0.0, 0.0, 1.0))
-    # An arm is cut level within the plate, whichever way it leaves.
+    # An arm ends at one level within the plate, whatever its direction.
     level = swept.vertices.copy()
-    level[:AROUND, 1] = level[-2, 1] = -0.5 * _thickness(values)
+    level[:ARM_OUTLINE_POINTS, 1] = level[-2, 1] = -0.5 * _thickness(values)
     arm = QuadMesh(level, swept.quads)
     light = _bulb(bulb, 0.4 * end * min(wide, thick)).transformed(rail.frames(1.0, up=(0.0, 0.0, 1.0)))
     shape = 0.1 + 0.9 * values["base_roundness"]
     for angle in (360.0 / count * np.arange(count)).tolist():
         across, along = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         share = (abs(across) ** (2.0 / shape) + abs(along) ** (2.0 / shape)) ** (-shape / 2.0)
-        place = translation(seat[0] * share * across, 0.0, -seat[1] * share * along) @ rotation("y", angle)
-        parts.append(Part("light_frame", arm.transformed(place), BRASS))
-        parts.append(Part("lightbulb", light.transformed(place), LIGHT))
+        pose = translation(seat[0] * share * across, 0.0, -seat[1] * share * along) @ rotation("y", angle)
+        parts.append(Part("light_frame", arm.transformed(pose), BRASS))
+        parts.append(Part("lightbulb", light.transformed(pose), LIGHT))
     return parts
 
 
 def _bulb(radius: float, neck: float) -> QuadMesh:
-    """A bulb along z, from a neck within the end of its arm at 0 to a ball around a point farther out."""
+    """A bulb along z, from a neck within the end of its arm at 0 to a ball farther out."""
     neck = min(neck, 0.6 * radius)
     turn = np.linspace(0.3 * np.pi, np.pi, 10)
     ball = np.stack([np.sin(turn), 1.35 - np.cos(turn)], axis=1) * radius
     arriving = ball[0] - 0.5 * radius * np.array([np.cos(turn[0]), np.sin(turn[0])])
     throat = cubic([[neck, -0.3 * radius], [neck, 0.4 * radius], arriving, ball[0]], 5)
     outline = polyline(np.concatenate([throat, ball[1:]]))
-    return revolve(outline, count=GLASS).transformed(rotation("x", 90.0))
+    return revolve(outline, count=BULB_OUTLINE_POINTS).transformed(rotation("x", 90.0))
 
 
 def _thickness(values: Values) -> float:
-    """Thickness of the plate: the thinnest shows its edge, too."""
+    """Thickness of the plate, enough to show its edge."""
     return 0.015 + float(values["base_thickness"])
 
 
 def _inset(values: Values, half: FloatArray) -> float:
-    """How much smaller the plate is at its underside."""
+    """The difference between the plate's outline and that of its underside."""
     strength = 0.35 + 0.65 * values["base_profile_strength"]
     return float(strength * min(0.6 * half.min(), 0.05 + 0.8 * _thickness(values)))
 
@@ -93,7 +93,7 @@ def _base(values: Values, half: FloatArray) -> QuadMesh:
     """The plate: its edge is slanted, rounded, hollowed or stepped."""
     inset, thickness = _inset(values, half), _thickness(values)
     turn = np.linspace(0.0, np.pi / 2.0, 7)
-    # Pairs of how far in and how far down, as shares, from the ceiling to the underside.
+    # Pairs of shares inwards and downwards, from the ceiling to the underside.
     edges = (
         np.array([[0.0, 0.0], [0.0, 0.3], [1.0, 1.0]]),
         np.column_stack([1.0 - np.cos(turn), np.sin(turn)]),
@@ -101,26 +101,28 @@ def _base(values: Values, half: FloatArray) -> QuadMesh:
         np.array([[0.0, 0.0], [0.0, 0.5], [0.85, 0.55], [1.0, 1.0]]),
     )
     edge = edges[values["base_profile_type"]][::-1]
-    plan = square_circle(0.1 + 0.9 * values["base_roundness"], 2.0, count=PLAN).points * [1.0, -1.0]
-    rings = np.empty((len(edge), PLAN, 3))
+    plan = square_circle(0.1 + 0.9 * values["base_roundness"], 2.0, count=PLATE_OUTLINE_POINTS).points * [1.0, -1.0]
+    rings = np.empty((len(edge), PLATE_OUTLINE_POINTS, 3))
     rings[:, :, [0, 2]] = plan * (half - inset * edge[:, :1])[:, None]
     rings[..., 1] = -thickness * edge[:, 1:]
     return loft_rings(rings)
 
 
 def _rail(values: Values, reach: float, girth: float) -> Curve:
-    """The curve of an arm from within the plate at x = 0 to its end at x = `reach`, bowed sideways on its
-    way; `girth` is how far its profile reaches."""
+    """The curve of an arm from within the plate at x = 0 to its end at x = `reach`, bowed sideways.
+
+    girth: radius of its profile
+    """
     under = -_thickness(values)
     position = 0.25 + 0.5 * values["light_frame_mid_point_pos"]
     out = position * reach + 0.04 + 0.24 * values["light_frame_mid_point_offset_y"]
     down = 0.08 + 0.2 * out
     end = 0.08 + values["light_frame_end_point_z"]
     middle = down + position * (end - 0.08) + 0.3 * values["light_frame_mid_point_offset_z"]
-    way = cubic([[0.0, 0.0], [0.0, -down], [out, -middle], [reach, -end]], STEPS)
-    length = float(np.hypot(*np.diff(way, axis=0).T).sum())
-    side = 0.3 * values["light_frame_turning_effect"] * length * np.sin(np.linspace(0.0, np.pi, STEPS + 1)) ** 2
-    below = np.column_stack([way[:, 0], way[:, 1] + under, side])
+    curve = cubic([[0.0, 0.0], [0.0, -down], [out, -middle], [reach, -end]], ARM_SEGMENTS)
+    length = float(np.hypot(*np.diff(curve, axis=0).T).sum())
+    side = 0.3 * values["light_frame_turning_effect"] * length * np.sin(np.linspace(0.0, np.pi, ARM_SEGMENTS + 1)) ** 2
+    below = np.column_stack([curve[:, 0], curve[:, 1] + under, side])
     points = np.concatenate([[[0.0, 0.5 * under, 0.0]], below])
     return Curve.through(eased(points, np.full(len(points), girth)))
 

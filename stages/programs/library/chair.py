@@ -17,17 +17,17 @@ from stages.programs.schema import Values
 
 
 def build(values: Values) -> Sequence[Part]:
-    """The parts of the chair at `values`."""
+    """Build the parts of the chair at `values`."""
     chair = ChairDimensions(values)
     return [*seat_parts(chair), *base_parts(chair), *back_parts(chair), *arm_parts(chair)]
 
 
-OPEN = "not is_back_rest"
-CROSS = "not is_back_rest and (not is_top_rail or not is_vertical_rail)"
-VERTICAL = "not is_back_rest and is_top_rail and is_vertical_rail"
-LEGS = "(is_monoleg and is_monoleg_tent) or not is_monoleg"
-TENT = "is_monoleg and is_monoleg_tent"
-SUPPORT = "handles_state == 1 and is_handles_support"
+WITHOUT_PANEL = "not is_back_rest"
+WITH_CROSS_RAILS = "not is_back_rest and (not is_top_rail or not is_vertical_rail)"
+WITH_VERTICAL_RAILS = "not is_back_rest and is_top_rail and is_vertical_rail"
+WITH_LEGS = "(is_monoleg and is_monoleg_tent) or not is_monoleg"
+WITH_STAR = "is_monoleg and is_monoleg_tent"
+WITH_SUPPORTS = "handles_state == 1 and is_handles_support"
 
 PARAMETERS = (
     continuous("scale x", 0.5, 2.0, 10, 1.0, "size", "Width of the seat, in half metres."),
@@ -43,7 +43,7 @@ PARAMETERS = (
         0.0,
         "back",
         "Section of the rails, from square to round and turned.",
-        OPEN,
+        WITHOUT_PANEL,
     ),
     discrete("pillow_state", 0, 2, 1, "seat", "No cushion, a flat one or a puffed one."),
     discrete(
@@ -51,13 +51,22 @@ PARAMETERS = (
     ),
     continuous("seat_shape", 0.0, 1.0, 5, 0.423308789730072, "seat", "The seat from above, from square to round."),
     continuous("seat_pos", 0.2, 1.0, 9, 0.5646687746047974, "seat", "Height of the seat."),
-    discrete("cr_count", 3, 8, 5, "back", "Number of cross rails.", CROSS),
-    continuous("cr_scale_y", 0.5, 1.2, 4, 0.7333, "back", "Thickness of the cross rails.", CROSS),
-    continuous("cr_scale_z", 0.3, 2.0, 6, 0.98, "back", "Height of each cross rail.", CROSS),
-    continuous("cr_offset_bottom", 0.15, 0.75, 8, 0.4071, "back", "Where the lowest cross rail begins.", CROSS),
-    continuous("cr_offset_top", 0.35, 0.95, 8, 0.7786, "back", "Where the highest cross rail ends.", CROSS),
+    discrete("cr_count", 3, 8, 5, "back", "Number of cross rails.", WITH_CROSS_RAILS),
+    continuous("cr_scale_y", 0.5, 1.2, 4, 0.7333, "back", "Thickness of the cross rails.", WITH_CROSS_RAILS),
+    continuous("cr_scale_z", 0.3, 2.0, 6, 0.98, "back", "Height of each cross rail.", WITH_CROSS_RAILS),
     continuous(
-        "cr_shape_1", 0.0, 2.0, 7, 0.0, "back", "How far cross rails are arched, and narrow at their ends.", CROSS
+        "cr_offset_bottom", 0.15, 0.75, 8, 0.4071, "back", "Where the lowest cross rail begins.", WITH_CROSS_RAILS
+    ),
+    continuous("cr_offset_top", 0.35, 0.95, 8, 0.7786, "back", "Where the highest cross rail ends.", WITH_CROSS_RAILS),
+    continuous(
+        "cr_shape_1",
+        0.0,
+        2.0,
+        7,
+        0.0,
+        "back",
+        "How far cross rails are arched, and narrow at their ends.",
+        WITH_CROSS_RAILS,
     ),
     continuous("curvature", 0.0, 1.0, 5, 0.25, "back", "How far the back bows backwards between its posts."),
     binary("is_top_rail", True, "back", "Whether a rail joins the tops of the posts."),
@@ -72,9 +81,13 @@ PARAMETERS = (
         "Whether rails stand on the seat, instead of cross rails.",
         "not is_back_rest and is_top_rail",
     ),
-    discrete("vr_count", 3, 8, 4, "back", "Number of vertical rails.", VERTICAL),
-    continuous("vr_scale_x", 0.3, 2.0, 6, 0.7799999713897705, "back", "Width of each vertical rail.", VERTICAL),
-    continuous("vr_scale_y", 0.2, 1.0, 4, 0.3499999940395355, "back", "Thickness of the vertical rails.", VERTICAL),
+    discrete("vr_count", 3, 8, 4, "back", "Number of vertical rails.", WITH_VERTICAL_RAILS),
+    continuous(
+        "vr_scale_x", 0.3, 2.0, 6, 0.7799999713897705, "back", "Width of each vertical rail.", WITH_VERTICAL_RAILS
+    ),
+    continuous(
+        "vr_scale_y", 0.2, 1.0, 4, 0.3499999940395355, "back", "Thickness of the vertical rails.", WITH_VERTICAL_RAILS
+    ),
     continuous(
         "vr_shape_1",
         0.0,
@@ -83,16 +96,18 @@ PARAMETERS = (
         0.0,
         "back",
         "How far vertical rails bow to the front, and thin at their ends.",
-        VERTICAL,
+        WITH_VERTICAL_RAILS,
     ),
     binary("is_back_rest", False, "back", "Whether an upholstered panel fills the back, instead of rails."),
-    continuous("legs_shape_1", 0.0, 1.0, 3, 1.0, "legs", "Thickness of the legs at the ground.", LEGS),
-    continuous("legs_shape_2", 0.0, 1.0, 3, 1.0, "legs", "Thickness of the legs at half their height.", LEGS),
+    continuous("legs_shape_1", 0.0, 1.0, 3, 1.0, "legs", "Thickness of the legs at the ground.", WITH_LEGS),
+    continuous("legs_shape_2", 0.0, 1.0, 3, 1.0, "legs", "Thickness of the legs at half their height.", WITH_LEGS),
     continuous("legs_bevel", 0.0, 1.0, 3, 0.5, "legs", "Section of legs, foot and posts, from square to round."),
     binary("is_monoleg", False, "legs", "Whether the chair stands on one foot in its middle."),
     binary("is_monoleg_tent", False, "legs", "Whether that foot is a column on a star of legs.", "is_monoleg"),
-    continuous("monoleg_tent_pct", 0.2, 0.8, 7, 0.4, "legs", "Height of the star, as a share of the seat's.", TENT),
-    discrete("monoleg_tent_count", 3, 8, 4, "legs", "Number of legs of the star.", TENT),
+    continuous(
+        "monoleg_tent_pct", 0.2, 0.8, 7, 0.4, "legs", "Height of the star, as a share of the seat's.", WITH_STAR
+    ),
+    discrete("monoleg_tent_count", 3, 8, 4, "legs", "Number of legs of the star.", WITH_STAR),
     continuous(
         "monoleg_bezier_start_x_offset", 0.0, 1.0, 6, 0.0, "legs", "Reach of the foot at its top.", "is_monoleg"
     ),
@@ -211,11 +226,18 @@ PARAMETERS = (
         "handles_state == 2 or (handles_state == 1 and is_handles_support == 1)",
     ),
     continuous(
-        "handles_support_mid_x", 0.0, 1.0, 6, 0.5800000429153442, "arms", "How far supports bow to the sides.", SUPPORT
+        "handles_support_mid_x",
+        0.0,
+        1.0,
+        6,
+        0.5800000429153442,
+        "arms",
+        "How far supports bow to the sides.",
+        WITH_SUPPORTS,
     ),
-    continuous("handles_support_mid_y", 0.0, 1.0, 6, 0.0, "arms", "How far supports bow to the front.", SUPPORT),
-    continuous("handles_support_top_pos", 0.3, 0.9, 7, 0.5, "arms", "Where supports meet the arms.", SUPPORT),
-    continuous("handles_support_thickness", 0.4, 0.9, 7, 0.8167, "arms", "Thickness of the supports.", SUPPORT),
+    continuous("handles_support_mid_y", 0.0, 1.0, 6, 0.0, "arms", "How far supports bow to the front.", WITH_SUPPORTS),
+    continuous("handles_support_top_pos", 0.3, 0.9, 7, 0.5, "arms", "Where supports meet the arms.", WITH_SUPPORTS),
+    continuous("handles_support_thickness", 0.4, 0.9, 7, 0.8167, "arms", "Thickness of the supports.", WITH_SUPPORTS),
     continuous(
         "handles_cusion_cover_pct",
         0.0,

@@ -1,4 +1,4 @@
-"""The arms of a chair: free or held up by a support, or one curve from the back down to the seat; and their pads."""
+"""The arms of a chair: free, on a support, or in one curve from the back down to the seat; and their pads."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from stages.programs.library.chair_dimensions import LEATHER, WOOD, ChairDimensi
 from stages.programs.library.rails import cubic, eased
 from stages.shape.arrays import FloatArray
 
-UP = np.array([0.0, 1.0, 0.0])
+UP_DIRECTION = np.array([0.0, 1.0, 0.0])
 
 
 def arm_parts(chair: ChairDimensions) -> list[Part]:
-    """Both arms with all that belongs to them, attached to the posts of the back and to the seat's sides."""
+    """Both arms with their supports and pads, attached to the posts of the back and to the sides of the seat."""
     values = chair.values
     state = int(values["handles_state"])
     if not state:
@@ -22,7 +22,7 @@ def arm_parts(chair: ChairDimensions) -> list[Part]:
     height = chair.unit * (2.1 * float(values["handles_profile_height"]) - 0.6)
     arm = _arm(chair, state, width, height)
     profile = square_circle(0.4, width, height, 12)
-    parts = [Part("arm", sweep(arm, profile, up=UP, caps=("flat", "round" if state == 1 else "flat")), WOOD)]
+    parts = [Part("arm", sweep(arm, profile, up=UP_DIRECTION, caps=("flat", "round" if state == 1 else "flat")), WOOD)]
     if state == 1 and values["is_handles_support"]:
         parts.append(_support(chair, arm))
     if values["is_handles_cusion"]:
@@ -51,13 +51,13 @@ def _arm(chair: ChairDimensions, state: int, width: float, height: float) -> Cur
         points = cubic([start, middle, middle, _foot(chair, width)], 16)
         return polyline(eased(points, np.full(17, 0.5 * np.hypot(width, height))))
     end = np.array([chair.x + bow * float(values["handles_edge_pos_x_pct"]), start[1], front])
-    # Gently towards the middle, or the free end would be a hook where both are near each other.
+    # With full handles, the free end would be a hook where end and middle are near each other.
     points = cubic([start, start + (middle - start) / 1.5, end + (middle - end) / 1.5, end], 12)
     return polyline(eased(points, np.full(13, 0.5 * np.hypot(width, height))))
 
 
 def _foot(chair: ChairDimensions, width: float) -> FloatArray:
-    """Where an arm or a support of this width is sunk into the right side of the seat, beside the cushion, (3,)."""
+    """The end of an arm or a support of this width in the right side of the seat, next to the cushion, (3,)."""
     z = chair.z * (2.0 * float(chair.values["handles_bottom_pos_along_seat_pct"]) - 1.0)
     return np.array([chair.rim(z) + 0.5 * width - 0.2 * chair.unit, chair.seat_middle, z])
 
@@ -86,7 +86,7 @@ def _pad(chair: ChairDimensions, arm: Curve, state: int, width: float, height: f
     start, end = middle - half, middle + half
     profile = square_circle(0.6, 1.2 * width, 0.7 * chair.unit, 12)
     covered = arm.part(start, end)
-    above = covered.frames(covered.positions, up=arm.frames(start, up=UP)[:3, 1])[:, :3, 1]
+    above = covered.frames(covered.positions, up=arm.frames(start, up=UP_DIRECTION)[:3, 1])[:, :3, 1]
     points = covered.points + (0.5 * height + 0.1 * chair.unit) * above
     rail = polyline(eased(points, np.full(len(points), 0.5 * np.hypot(*profile.size))))
     return Part("arm pad", sweep(rail, profile, up=above[0], caps="round"), LEATHER)

@@ -20,11 +20,11 @@ from stages.programs.library.rails import eased
 from stages.shape.arrays import FloatArray
 
 ACROSS = np.linspace(-1.0, 1.0, 9)
-"""Relative distances from the middle at which a rail has rings."""
+"""Relative distances of a rail's rings from its middle."""
 
 
 def back_parts(chair: ChairDimensions) -> list[Part]:
-    """The posts and what they hold; ends of rails are sunk into the posts, feet into the seat."""
+    """The posts, and rails or panel; ends of rails are inside the posts, ends of posts inside the seat."""
     values = chair.values
     share = np.linspace(0.0, 1.0, 9)
     centers = chair.back(chair.x, share)
@@ -48,21 +48,21 @@ def _top_height(chair: ChairDimensions) -> float:
 
 
 def _top_level(chair: ChairDimensions) -> float:
-    """Relative height of the middle of the top rail's ends: above the posts if it covers them, else between them."""
+    """Relative height of the middle of the top rail at its ends: above the posts if it covers them, else between."""
     height = _top_height(chair)
     beyond = 0.35 * height if chair.values["tr_fill_edge"] else -0.5 * height - 0.1 * chair.unit
     return 1.0 + beyond / chair.back_height
 
 
 def _room(chair: ChairDimensions) -> float:
-    """The relative height up to which there is room below the top rail, or below the tops of the posts."""
+    """The relative height of the free space below the top rail, or below the tops of the posts."""
     if not chair.values["is_top_rail"]:
         return 0.99
     return _top_level(chair) - 0.5 * _top_height(chair) / chair.back_height
 
 
 def _rise(chair: ChairDimensions, x: FloatArray) -> FloatArray:
-    """How far the top rail is arched upwards at distances from the middle, (n,)."""
+    """The arch of the top rail at distances from the middle, (n,)."""
     arch = float(chair.values["tr_shape_1"]) * (0.5 * _top_height(chair) + 0.12 * chair.x)
     return arch * np.maximum(1.0 - (x / chair.x) ** 2, 0.0)
 
@@ -92,9 +92,9 @@ def _styled(rail: Curve, x: float | FloatArray, y: float | FloatArray) -> Style:
 
 
 def _turned(chair: ChairDimensions, share: FloatArray, size: tuple[float, float], room: float) -> FloatArray:
-    """The scale of a rail's section, of a `size` in both directions, at shares of its length, float64 (n, 2).
+    """The scale of a rail's section of a `size` (2,), at shares of its length, float64 (n, 2).
 
-    A round rail is turned: it swells towards its middle, in its second direction by no more than there is `room` for.
+    A round rail is turned on a lathe: it swells towards its middle, by at most `room` in the second direction.
     """
     girth = 0.95 * chair.unit * float(chair.values["bevel_rails"])
     swell = 4.0 * share * (1.0 - share)
@@ -103,18 +103,18 @@ def _turned(chair: ChairDimensions, share: FloatArray, size: tuple[float, float]
 
 
 def _cross_rails(chair: ChairDimensions) -> list[Part]:
-    """Slats from post to post; they share the room from the lowest to the highest and never touch each other."""
+    """Slats from post to post, evenly spaced without touching each other."""
     values = chair.values
     count = int(values["cr_count"])
     room = _room(chair)
     low, high = room * float(values["cr_offset_bottom"]), room * float(values["cr_offset_top"])
-    # Each has a slot, and fills so much of it.
+    # Each slat fills a share of its slot.
     slot = chair.back_height * (high - low) / count
     height = (0.525 * float(values["cr_scale_z"]) - 0.08) * slot
     size = chair.unit * (1.2 * float(values["cr_scale_y"]) - 0.32), height
     half = 0.5 * height / chair.back_height
     profile = square_circle(float(values["bevel_rails"]), *size, 12)
-    # Arched: the ends lie lower than the middle, the lowest ones still above the seat.
+    # Arched: the ends are lower than the middle, but above the seat.
     shape = float(values["cr_shape_1"])
     drop, lens = 0.045 * shape * ACROSS**2, 1.0 - 0.15 * shape * ACROSS**2
     scale = _turned(chair, (ACROSS + 1.0) / 2.0, size, 0.7 * (slot - height))
@@ -137,7 +137,7 @@ def _vertical_rails(chair: ChairDimensions) -> list[Part]:
     share = np.linspace(0.0, 1.0, 9)
     scale = _turned(chair, share, size[::-1], 0.6 * (spacing - size[0]))[:, ::-1]
     scale *= 1.0 - 1.5 * shape * (2.0 * share[:, None] - 1.0) ** 2
-    # They bow towards the sitter, and end where the back does.
+    # They bow towards the sitter, but end in the plane of the back.
     bow = 0.16 * shape * chair.back_height * (4.0 * share * (1.0 - share)) ** 2
     level = _top_level(chair)
     parts = []
@@ -150,7 +150,7 @@ def _vertical_rails(chair: ChairDimensions) -> list[Part]:
 
 
 def _panel(chair: ChairDimensions) -> Part:
-    """An upholstered panel between the posts, thin at its upper and lower edge; it follows the arch of a top rail."""
+    """An upholstered panel between the posts, thin at its upper and lower edge; it follows the arch of the top rail."""
     low, high = 0.13, np.full(len(ACROSS), _room(chair))
     if chair.values["is_top_rail"]:
         high += (0.4 * _top_height(chair) + 0.8 * _rise(chair, chair.x * ACROSS)) / chair.back_height

@@ -1,4 +1,4 @@
-"""What a chair stands on: four legs, a pedestal, or a swivel base with a star of legs."""
+"""The base of a chair: four legs, a pedestal, or a swivel base with a star of legs."""
 
 from __future__ import annotations
 
@@ -23,12 +23,11 @@ from stages.programs.library.chair_dimensions import METAL, WOOD, ChairDimension
 from stages.programs.library.rails import cubic, eased
 from stages.shape.arrays import FloatArray
 
-RINGS = 9
-"""Rings of a leg."""
+LEG_RINGS = 9
 
 
 def base_parts(chair: ChairDimensions) -> list[Part]:
-    """All that carries the seat; its upper ends are sunk into it."""
+    """The parts that carry the seat; their upper ends are inside it."""
     if not chair.values["is_monoleg"]:
         return _four_legs(chair)
     return _star(chair) if chair.values["is_monoleg_tent"] else [_pedestal(chair)]
@@ -37,19 +36,19 @@ def base_parts(chair: ChairDimensions) -> list[Part]:
 def _four_legs(chair: ChairDimensions) -> list[Part]:
     """Straight legs in front, bent ones behind."""
     top = chair.seat_middle
-    share = np.linspace(1.0, 0.0, RINGS)
+    share = np.linspace(1.0, 0.0, LEG_RINGS)
     middle = 0.22 * top * float(chair.values["back_leg_mid_y_offset_pct"])
     foot = 0.35 * top * float(chair.values["back_leg_bottom_y_offset_pct"])
-    centers = np.stack([np.full(RINGS, chair.x), top * (1.0 - share), np.full(RINGS, chair.z)], axis=1)
+    centers = np.stack([np.full(LEG_RINGS, chair.x), top * (1.0 - share), np.full(LEG_RINGS, chair.z)], axis=1)
     behind = centers * [1.0, 1.0, -1.0]
     behind[:, 2] -= 3.0 * share * (1.0 - share) * middle + share**2 * foot
     profile = section(chair, 1.2)
     width = _width(chair, share)
-    return symmetric([Part("leg", post(each, profile, width), WOOD) for each in (centers, behind)], "x")
+    return symmetric([Part("leg", post(leg, profile, width), WOOD) for leg in (centers, behind)], "x")
 
 
 def _width(chair: ChairDimensions, share: FloatArray) -> FloatArray:
-    """Relative width of a leg at shares of the way from its top down to its foot."""
+    """Relative width of a leg at shares of its length, from the top."""
     foot = 0.38 + 0.74 * float(chair.values["legs_shape_1"])
     waist = (0.36 + 0.74 * float(chair.values["legs_shape_2"])) * (1.0 + foot) / 2.0
     width: FloatArray = (1.0 - share) * (1.0 - 2.0 * share) + 4.0 * share * (1.0 - share) * waist
@@ -58,7 +57,7 @@ def _width(chair: ChairDimensions, share: FloatArray) -> FloatArray:
 
 
 def _handles(chair: ChairDimensions) -> FloatArray:
-    """The handles of the curve of a single foot, float64 (2, 2): relative reach, and share of the way down."""
+    """The handles of the curve of a single foot, float64 (2, 2): relative reach, and share of the height."""
     return np.array(
         [
             [
@@ -71,8 +70,8 @@ def _handles(chair: ChairDimensions) -> FloatArray:
 
 
 def _pedestal(chair: ChairDimensions) -> Part:
-    """A turned foot whose outline is the Bezier curve; its section goes from square to round and is long where the
-    seat is."""
+    """A turned foot with the Bezier curve as outline; its section is square to round, with the proportions of the
+    seat."""
     lip = 0.5 * chair.unit
     top = 0.12 + 0.58 * float(chair.values["monoleg_bezier_start_x_offset"])
     ground = 0.4 + 0.6 * float(chair.values["monoleg_bezier_end_x_offset"])
@@ -85,7 +84,7 @@ def _pedestal(chair: ChairDimensions) -> Part:
         0.94 * (narrow * chair.depth) ** 0.5,
         count=24,
     )
-    # The lip stands upright on the ground: a foot that runs out flat has no sharp edge.
+    # A vertical lip on the ground, or a flat foot would have a sharp edge.
     radii = np.concatenate([outline[:1, 0], outline[:, 0]])
     return Part("pedestal", _upright(profile, np.concatenate([[0.0], heights]), radii), WOOD)
 
@@ -97,7 +96,7 @@ def _star(chair: ChairDimensions) -> list[Part]:
     level = chair.seat_middle * float(values["monoleg_tent_pct"])
     hub = 0.6 * unit + 0.45 * reach * float(values["monoleg_bezier_start_x_offset"])
     end, foot = reach * (0.55 + 0.55 * float(values["monoleg_bezier_end_x_offset"])), 0.6 * unit
-    # The upper handle stays in the upper part and the lower one in the lower, or thick legs would cut themselves.
+    # The upper handle stays above, the lower one below, or thick legs would intersect themselves.
     handles = _handles(chair) * [reach, 0.75] + [[0.0, 0.0], [0.0, 0.25]]
     controls = [[0.0, level + (foot - level) * down, out] for out, down in [(hub, 0.0), *handles.tolist(), (end, 1.0)]]
     profile = section(chair, 0.92)

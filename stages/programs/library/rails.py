@@ -1,4 +1,4 @@
-"""Rails that bend no tighter than what is swept along them can follow."""
+"""Rails whose bends are wide enough for the profile swept along them."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy.typing as npt
 
 from stages.shape.arrays import FloatArray
 
-ROUNDS, PATIENCE = 400, 40
-"""So many times points are moved at most; from the second of them on all are, not only those beside a tight bend."""
+MAX_EASING_ROUNDS = 400
+LOCAL_EASING_ROUNDS = 40
+"""After these, all points are moved, not only those next to a tight bend."""
 
 
 def cubic(controls: npt.ArrayLike, count: int) -> FloatArray:
-    """Points of a cubic Bezier piece, float64 (count + 1, k), of controls (4, k). It may have a cusp, which a curve may
-    not, before it is eased."""
+    """Points of a cubic Bezier piece, float64 (count + 1, k), from controls (4, k). It may have a cusp."""
     t = np.linspace(0.0, 1.0, count + 1)
     s = 1.0 - t
     weights = np.stack([s**3, 3.0 * s * s * t, 3.0 * s * t * t, t**3], axis=1)
@@ -22,12 +22,13 @@ def cubic(controls: npt.ArrayLike, count: int) -> FloatArray:
 
 
 def eased(points: FloatArray, girth: FloatArray) -> FloatArray:
-    """The points of a rail, float64 (n, 3), moved towards their neighbours wherever the inner side of its bends would
-    fold over itself. Both ends stay.
+    """Move points of a rail, float64 (n, 3), towards their neighbours where a bend would fold the swept mesh.
 
-    girth: float64 (n,), how far the profile reaches from the rail at each of the points.
+    Both ends stay.
+
+    girth: float64 (n,), radius of the profile at the points
     """
     from stages.programs.curves.kernels import ease
 
-    moved: FloatArray = ease(points, girth, ROUNDS, PATIENCE)
+    moved: FloatArray = ease(points, girth, MAX_EASING_ROUNDS, LOCAL_EASING_ROUNDS)
     return moved

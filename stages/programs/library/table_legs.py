@@ -8,15 +8,12 @@ from stages.programs.curves import Part, Profile, QuadMesh, loft_rings, rounded_
 from stages.programs.library.table_dimensions import WALNUT, TableDimensions, upright
 from stages.shape.arrays import FloatArray
 
-RINGS = 9
-"""Rings of a leg."""
-
-SPANS = 12
-"""Pieces of a rail."""
+LEG_RINGS = 9
+RAIL_SEGMENTS = 12
 
 
 def leg_width(table: TableDimensions, share: FloatArray) -> FloatArray:
-    """Relative width of a leg at shares (n,) of the way from its top down to its foot."""
+    """Relative width of a leg at shares (n,) of its length, from the top."""
     foot = 0.4 + 0.7 * table.values["legs_shape_1"]
     waist = (0.38 + 0.74 * table.values["legs_shape_2"]) * (1.0 + foot) / 2.0
     width: FloatArray = (1.0 - share) * (1.0 - 2.0 * share) + 4.0 * share * (1.0 - share) * waist
@@ -25,9 +22,9 @@ def leg_width(table: TableDimensions, share: FloatArray) -> FloatArray:
 
 
 def leg_parts(table: TableDimensions) -> list[Part]:
-    """The four legs and, where there are, the rails along x and along z."""
+    """The four legs, and the rails along x and along z."""
     frame = _Frame(table)
-    share = np.linspace(0.0, 1.0, RINGS)
+    share = np.linspace(0.0, 1.0, LEG_RINGS)
     heights = table.under * (1.0 - share)
     centers = np.column_stack([frame.at(heights), heights])[:, [0, 2, 1]]
     tip = centers[:1] * [1.0, 0.0, 1.0] + [0.0, table.sunk, 0.0]
@@ -42,22 +39,22 @@ def leg_parts(table: TableDimensions) -> list[Part]:
 
 
 class _Frame:
-    """Where the leg at +x and +z runs, and its section."""
+    """The course of the leg at +x and +z, and its section."""
 
     def __init__(self, table: TableDimensions) -> None:
         values = table.values
         angle = 90.0 * values["std_legs_rotation"]
-        # A sharp square, or an ellipse that fits well within it.
+        # A sharp square to a smaller ellipse.
         size = (1.08 - 0.12 * values["legs_bevel"]) * table.stick
         self.section = square_circle(values["legs_bevel"], 0.94 * size, 1.14 * size).rotated(-angle)
         self.table = table
         sine, cosine = np.sin(np.radians(angle)), np.cos(np.radians(angle))
-        self.way = np.array([sine, cosine])
+        self.direction = np.array([sine, cosine])
         extent = self.section.size / 2.0
         offset = np.array([values["std_legs_top_offset_x"], values["std_legs_top_offset_y"]])
         self.top = (table.corner - extent) * (1.0 - 0.5 * offset)
-        # How far the leg may go inwards before it comes near the middle, and outwards before it trips people.
-        safe = np.maximum(self.way, 1e-9)
+        # Limits of the leg: inwards the middle of the table, outwards the edge of the top and a little more.
+        safe = np.maximum(self.direction, 1e-9)
         room = float(((self.top - 1.2 * extent) / safe).min())
         beyond = float(((table.half - extent - self.top) / safe).min()) + 0.12 * table.under
         inmost, outmost = min(0.45 * room, 0.4 * table.under), min(beyond, 0.4 * table.under)
@@ -68,14 +65,16 @@ class _Frame:
         """The leg's middle at `heights`, any shape (...), as x and z, (..., 2)."""
         down = 1.0 - heights / self.table.under
         out = self.foot * down - 4.0 * self.waist * down * (1.0 - down)
-        place: FloatArray = self.top + out[..., None] * self.way
-        return place
+        middle: FloatArray = self.top + out[..., None] * self.direction
+        return middle
 
 
 def _rail(table: TableDimensions, frame: _Frame, name: str, axis: int) -> Part:
-    """The rail along x (axis 0) at +z, or along z (axis 1) at +x. Its ends lie in the middle of the legs at every
-    height, so that it leans with them; it may arch, and its highest place lets it carry the top. As thick there
-    as legs allow, it is as thick as asked in its middle."""
+    """The rail along x (axis 0) at +z, or along z (axis 1) at +x.
+
+    Its ends are in the middle of the legs at every height, so it leans with them. It may arch, and at its highest it
+    touches the top. Its ends are as thick as the legs allow, its middle as its parameter says.
+    """
     values, prefix = table.values, f"std_legs_support_{name}"
     tall = (0.05 + 0.12 * values[f"{prefix}_profile_height"]) * table.under
     lowest, highest = 0.1 * table.under + tall / 2.0, table.under + 0.3 * table.thickness - tall / 2.0
@@ -83,7 +82,7 @@ def _rail(table: TableDimensions, frame: _Frame, name: str, axis: int) -> Part:
     span = float(frame.at(np.array(level))[axis])
     arch = min(0.75 * (level - tall / 2.0 - 0.03 * table.under), 0.25 * table.under, 0.5 * span)
     arch *= values[f"{prefix}_curvature"]
-    thinnest = float(leg_width(table, np.linspace(0.0, 1.0, RINGS)).min())
+    thinnest = float(leg_width(table, np.linspace(0.0, 1.0, LEG_RINGS)).min())
     wide = (0.25 + 1.1 * values[f"{prefix}_profile_width"]) * table.stick
     end = min(wide, 0.7 * thinnest * table.stick)
     profile = rounded_rectangle(end, tall, 0.15 * min(end, tall), steps=1)
@@ -91,8 +90,8 @@ def _rail(table: TableDimensions, frame: _Frame, name: str, axis: int) -> Part:
 
 
 def _between_legs(frame: _Frame, profile: Profile, swell: float, axis: int, level: float, arch: float) -> QuadMesh:
-    """The rail at `level`, its ends lower by `arch`, its middle so many times as thick."""
-    along = np.linspace(-1.0, 1.0, SPANS + 1)
+    """The rail at `level`, its ends lower by `arch`, its middle thicker by the factor `swell`."""
+    along = np.linspace(-1.0, 1.0, RAIL_SEGMENTS + 1)
     across, rise = profile.points.T
     ends = frame.at(level - arch + rise)
     rings = np.empty((len(along), len(profile), 3))
@@ -100,5 +99,5 @@ def _between_legs(frame: _Frame, profile: Profile, swell: float, axis: int, leve
     rings[..., 0 if axis == 0 else 2] = along[:, None] * ends[:, axis]
     thick = 1.0 + (swell - 1.0) * (1.0 - along**4)
     rings[..., 2 if axis == 0 else 0] = ends[:, 1 - axis] + thick[:, None] * across
-    # Seen from +x, z runs to the left; seen from +z, x runs to the right.
+    # Rings along x and along z have opposite orientations.
     return loft_rings(rings[:, ::-1] if axis == 0 else rings)

@@ -9,8 +9,7 @@ from stages.programs.library.table_dimensions import METAL, WALNUT, TableDimensi
 from stages.programs.library.table_legs import leg_width
 from stages.shape.arrays import FloatArray
 
-SPOKE = 10
-"""Pieces of a leg of the tent."""
+TENT_LEG_SEGMENTS = 10
 
 
 def pedestal_parts(table: TableDimensions) -> list[Part]:
@@ -23,19 +22,21 @@ def pedestal_parts(table: TableDimensions) -> list[Part]:
 
 
 def _turned(table: TableDimensions, spread: FloatArray, base: float) -> Part:
-    """A body whose outline is the Bezier curve from its neck under the top to `base`; `spread` (2,) is what its widest
-    could fill."""
+    """A turned body with the Bezier curve as outline, from its neck under the top to `base`.
+
+    spread: float64 (2,), its greatest half axes
+    """
     start, end = (
         (
-            0.06 + 0.8 * table.values[f"monoleg_bezier_{each}_handle_x_offset"],
-            table.values[f"monoleg_bezier_{each}_handle_z_pct"],
+            0.06 + 0.8 * table.values[f"monoleg_bezier_{name}_handle_x_offset"],
+            table.values[f"monoleg_bezier_{name}_handle_z_pct"],
         )
-        for each in ("start", "end")
+        for name in ("start", "end")
     )
     neck = 0.1 + 0.5 * table.values["monoleg_bezier_start_x_offset"]
     ground = 0.3 + 0.5 * table.values["monoleg_bezier_end_x_offset"]
     outline = bezier([(neck, 0.0), start, end, (ground, 1.0)], count=16).points
-    # It stands on an upright lip, or it would run out flat in a sharp edge.
+    # A vertical lip on the ground, or a flat foot would have a sharp edge.
     lip = 0.05 * (table.under - base)
     heights = table.under + (base + lip - table.under) * outline[:, 1]
     levels = np.concatenate([[table.sunk], heights, [base]])
@@ -44,7 +45,7 @@ def _turned(table: TableDimensions, spread: FloatArray, base: float) -> Part:
 
 
 def _column(table: TableDimensions, level: float, thick: float) -> list[Part]:
-    """What stands on the tent: a turned body where the tent is low, else a plain column under a plate."""
+    """The parts above the tent: a turned body where the tent is low, else a column under a plate."""
     if table.values["monoleg_tent_pct"] < 0.4:
         return [_turned(table, np.maximum(0.45 * table.spread, 4.0 * thick), level - 0.6 * thick)]
     section = square_circle(table.values["legs_bevel"], 1.5 * thick).points
@@ -62,14 +63,14 @@ def _tent(table: TableDimensions, level: float, thick: float) -> list[Part]:
     reach = 0.42 + 0.53 * table.values["monoleg_tent_base_radius"]
     section = square_circle(table.values["legs_bevel"], thick, 1.1 * thick)
     foot = 0.6 * thick
-    # An even number of legs stands astride of both axes, an odd one has a leg in front.
+    # An even number of legs is symmetric to both axes; with an odd one, a leg is in front.
     turns = np.arange(count) / count + (0.5 / count if count % 2 == 0 else 0.0)
     parts = []
     for angle in (2.0 * np.pi * turns).tolist():
         end = reach * table.spread * [np.sin(angle), np.cos(angle)]
         out = [0.0, 0.45, 0.85, 1.0]
         rise = np.array([level, level, foot + 0.45 * (level - foot), foot])
-        rail = bezier(np.column_stack([np.outer(out, end), rise])[:, [0, 2, 1]], count=SPOKE)
+        rail = bezier(np.column_stack([np.outer(out, end), rise])[:, [0, 2, 1]], count=TENT_LEG_SEGMENTS)
         width = leg_width(table, rail.positions)
         style = Style(rail.positions, np.column_stack([width, width]), np.zeros(len(width)))
         parts.append(Part("leg", sweep(rail, section, style, caps=("flat", "round")), METAL))

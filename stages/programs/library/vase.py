@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.programs.curves import Part, bezier, ellipsoid
 from stages.programs.library.vase_handles import handles
-from stages.programs.library.vessel import CrossSection, Wall
+from stages.programs.library.vessel import VesselSection, Wall
 from stages.programs.parameters import binary, continuous, discrete
 from stages.programs.program import Program
 from stages.programs.schema import Values
@@ -17,19 +17,19 @@ from stages.shape.arrays import FloatArray
 CLAY, SAND, EARTH, IRON = (196, 134, 96), (214, 170, 128), (128, 78, 56), (98, 70, 58)
 GLAZE, KNOB = (120, 146, 148), (72, 92, 104)
 
-THIN = 0.008
-"""The wall of a vase without body thickness."""
+MIN_WALL_THICKNESS = 0.008
+"""Of a vase without body thickness."""
 
-ROOM = 1.5
-"""How much higher a neck is for its thickness above the least."""
+NECK_HEIGHT_PER_THICKNESS = 1.5
+"""Additional height of a neck for additional thickness of its wall."""
 
-FIRST, SECOND = "handle_count > 0 and hndl_type == 1", "handle_count > 0 and hndl_type == 2"
+WITH_CLOSED_HANDLES, WITH_FREE_HANDLES = "handle_count > 0 and hndl_type == 1", "handle_count > 0 and hndl_type == 2"
 
 
 def build(values: Values) -> Sequence[Part]:
-    """The parts of a vase that stands on y = 0 around the y axis; its first handle points to +x."""
-    section = CrossSection(values["body_profile_blend"])
-    thickness = values["body_thickness_val"] if values["has_body_thickness"] else THIN
+    """Build the parts of a vase on the plane y = 0 around the y axis; its first handle points to +x."""
+    section = VesselSection(values["body_profile_blend"])
+    thickness = values["body_thickness_val"] if values["has_body_thickness"] else MIN_WALL_THICKNESS
     lift = _base_height(values)
     body = _body(values, lift)
     neck = _neck(values, body, thickness) if values["has_neck"] else body[:0]
@@ -37,7 +37,7 @@ def build(values: Values) -> Sequence[Part]:
     body_top = float(body[-1, 1])
     parts = []
     if values["has_neck"]:
-        above, below = wall.parted(len(body) - 1)
+        above, below = wall.split(len(body) - 1)
         parts.append(Part("body", section.around(below), CLAY))
         parts.append(Part("neck", section.around(above, ring=True), SAND))
     else:
@@ -63,15 +63,17 @@ def _body(values: Values, lift: float) -> FloatArray:
 
 
 def _neck(values: Values, body: FloatArray, thickness: float) -> FloatArray:
-    """Inner outline of the neck above the mouth of the body, float64 (n, 2). A thicker one is higher, so that the
-    outside of its waist has room between body and rim."""
+    """Inner outline of the neck above the mouth of the body, float64 (n, 2).
+
+    A thicker neck is higher, so that the outside of its waist fits between body and rim.
+    """
     mouth, top = body[-1]
-    height = 0.08 + ROOM * (thickness - THIN) + 0.37 * values["neck_end_z"]
+    height = 0.08 + NECK_HEIGHT_PER_THICKNESS * (thickness - MIN_WALL_THICKNESS) + 0.37 * values["neck_end_z"]
     end = 0.55 * mouth + (values["neck_end_x"] - 0.1) / 0.9 * (0.45 * mouth + 0.4 * values["body_width"])
     slope = (body[-1, 0] - body[-2, 0]) / (body[-1, 1] - body[-2, 1])
     narrow, wide = 0.55 * min(mouth, end), 1.15 * max(mouth, end)
     waist = narrow + (wide - narrow) * values["neck_end_bezier_handle_x"]
-    # It passes upright through its waist or bulge, and leaves the mouth as the body arrives there.
+    # It is vertical at its waist or bulge, and continues the slope of the body at the mouth.
     level = 0.8 - 0.6 * values["neck_end_bezier_handle_z"]
     on = np.clip(0.33 * level * height * slope, -0.3 * mouth, 0.3 * mouth)
     rest = 1.0 - level
@@ -94,7 +96,7 @@ def _base_height(values: Values) -> float:
 
 
 def _base(values: Values, wall: Wall, height: float) -> FloatArray:
-    """Outline of the foot, from pole to pole; its top ends within the floor of the body, float64 (n, 2)."""
+    """Outline of the foot, from pole to pole, float64 (n, 2); its top is inside the floor of the body."""
     body = float(wall.outer[0, 0])
     foot, middle, top = (
         body * share for share in (0.6 + 1.1 * values["base_start_x"], 0.3 + 0.95 * values["base_mid_x"], 0.92)
@@ -112,7 +114,7 @@ def _base(values: Values, wall: Wall, height: float) -> FloatArray:
     return np.concatenate([start, lower, upper, tongue])
 
 
-def _lid(values: Values, wall: Wall, section: CrossSection) -> list[Part]:
+def _lid(values: Values, wall: Wall, section: VesselSection) -> list[Part]:
     """The lid on the rim, and its knob; a small lid has a smaller knob."""
     radius, level = wall.seat()
     radius, level = radius + 0.35 * wall.thickness, level - 0.1 * wall.thickness
@@ -205,7 +207,14 @@ PROGRAM = Program(
             "handle_count > 0",
         ),
         continuous(
-            "hndl1_top_z", 0.2, 0.8, 7, 0.5, "handles", "How high above its start a handle of type 1 ends.", FIRST
+            "hndl1_top_z",
+            0.2,
+            0.8,
+            7,
+            0.5,
+            "handles",
+            "How high above its start a handle of type 1 ends.",
+            WITH_CLOSED_HANDLES,
         ),
         continuous(
             "hndl1_end_bezier_handle_angle",
@@ -215,7 +224,7 @@ PROGRAM = Program(
             0.2,
             "handles",
             "Where a handle of type 1 comes from at its end: from below to above.",
-            FIRST,
+            WITH_CLOSED_HANDLES,
         ),
         continuous(
             "hndl1_end_bezier_handle_length",
@@ -225,12 +234,23 @@ PROGRAM = Program(
             0.6,
             "handles",
             "From how far a handle of type 1 comes that way.",
-            FIRST,
+            WITH_CLOSED_HANDLES,
         ),
-        continuous("hndl2_end_x", 0.0, 1.0, 11, 0.0, "handles", "How far from the wall the free end is.", SECOND),
-        continuous("hndl2_end_z", 0.0, 1.0, 11, 0.41, "handles", "How high above its start the free end is.", SECOND),
         continuous(
-            "hndl2_end_bezier_handle_x", 0.0, 1.0, 11, 0.0, "handles", "How far out it comes to the free end.", SECOND
+            "hndl2_end_x", 0.0, 1.0, 11, 0.0, "handles", "How far from the wall the free end is.", WITH_FREE_HANDLES
+        ),
+        continuous(
+            "hndl2_end_z", 0.0, 1.0, 11, 0.41, "handles", "How high above its start the free end is.", WITH_FREE_HANDLES
+        ),
+        continuous(
+            "hndl2_end_bezier_handle_x",
+            0.0,
+            1.0,
+            11,
+            0.0,
+            "handles",
+            "How far out it comes to the free end.",
+            WITH_FREE_HANDLES,
         ),
         continuous(
             "hndl2_end_bezier_handle_z",
@@ -240,9 +260,9 @@ PROGRAM = Program(
             0.2,
             "handles",
             "From how high it comes to the free end: from below to above it.",
-            SECOND,
+            WITH_FREE_HANDLES,
         ),
-        binary("has_neck", True, "neck", "Whether a neck stands on the body."),
+        binary("has_neck", True, "neck", "Whether the body has a neck."),
         continuous("neck_end_x", 0.1, 1.0, 10, 0.8, "neck", "Width of the opening of the neck.", "has_neck"),
         continuous("neck_end_z", 0.0, 1.0, 11, 0.8, "neck", "Height of the neck.", "has_neck"),
         continuous(
@@ -265,7 +285,7 @@ PROGRAM = Program(
             "How far below the lip that is: from a spread lip to an even one.",
             "has_neck",
         ),
-        binary("has_base", True, "base", "Whether the body stands on a foot."),
+        binary("has_base", True, "base", "Whether the body has a foot."),
         continuous("base_start_x", 0.0, 1.0, 11, 0.7, "base", "Width of the foot on the ground.", "has_base"),
         continuous("base_start_z", 0.0, 1.0, 6, 0.6, "base", "Height of the foot.", "has_base"),
         continuous("base_mid_x", 0.0, 1.0, 11, 0.2, "base", "Width of the foot at its waist.", "has_base"),

@@ -1,4 +1,4 @@
-"""Handles of a vase: a curve that leaves the wall, keeps clear of it, and comes back to it or ends in the air."""
+"""Handles of a vase: curves from the wall, clear of it, and back to it or to a free end."""
 
 from __future__ import annotations
 
@@ -6,18 +6,17 @@ import numpy as np
 
 from stages.programs.curves import Part, QuadMesh, Style, polyline, rotation, square_circle, sweep
 from stages.programs.library.rails import cubic, eased
-from stages.programs.library.vessel import CrossSection, Wall
+from stages.programs.library.vessel import VesselSection, Wall
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
 
-STEPS, AROUND = 16, 12
-"""Segments of a handle's curve and points of its profile."""
+HANDLE_SEGMENTS, HANDLE_OUTLINE_POINTS = 16, 12
 
 
 def handles(
-    values: Values, wall: Wall, section: CrossSection, body_top: float, color: tuple[int, int, int]
+    values: Values, wall: Wall, section: VesselSection, body_top: float, color: tuple[int, int, int]
 ) -> list[Part]:
-    """The handles of a vase whose body stands from the foot of the wall to `body_top`, evenly around it from +x."""
+    """The handles of a vase, evenly around it from +x. body_top: height of the top of the body."""
     size = min(values["body_width"], 0.4 * (body_top - wall.inner[0, 1]))
     path = _path(values, wall, body_top, size)
     angles = 360.0 / max(values["handle_count"], 1) * np.arange(values["handle_count"])
@@ -33,7 +32,7 @@ def handles(
 
 
 def _path(values: Values, wall: Wall, body_top: float, size: float) -> FloatArray:
-    """Distance from the wall and height along the handle, float64 (STEPS + 1, 2)."""
+    """Distance from the wall and height along the handle, float64 (segments + 1, 2)."""
     foot = float(wall.inner[0, 1])
     start = foot + values["hndl_base_z"] * (body_top - foot)
     room = body_top - start
@@ -47,15 +46,15 @@ def _path(values: Values, wall: Wall, body_top: float, size: float) -> FloatArra
         second, last = [length * np.cos(arrive), end + length * np.sin(arrive)], [0.0, end]
     else:
         end = start + room * (0.35 + 0.6 * values["hndl2_end_z"])
-        # A free end stands clear of the wall by its own thickness.
+        # The distance of a free end from the wall is about its own thickness.
         away = 0.8 * _girth(values, size)[0] + 0.9 * size * values["hndl2_end_x"]
         lift = size * (1.3 * values["hndl2_end_bezier_handle_z"] - 0.5)
         second, last = [away + size * (0.25 + 1.1 * values["hndl2_end_bezier_handle_x"]), end + lift], [away, end]
-    return cubic([[0.0, start], first, second, last], STEPS)
+    return cubic([[0.0, start], first, second, last], HANDLE_SEGMENTS)
 
 
 def _girth(values: Values, size: float) -> tuple[float, float]:
-    """How thick and how wide a handle is at its start."""
+    """Thickness and width of a handle at its start."""
     # A square handle is a strap, a round one a cord.
     strap = 1.45 - 0.8 * values["hndl_profile_blend"]
     thick, wide = 0.07 + 0.17 * values["hndl_profile_height"], 0.08 + 0.22 * values["hndl_profile_width"]
@@ -63,12 +62,12 @@ def _girth(values: Values, size: float) -> tuple[float, float]:
 
 
 def _bounded(rise: float, room: float) -> float:
-    """A rise, or a fall that never uses up the room below."""
+    """A rise, or a fall that is less than the room below."""
     return rise if rise >= 0.0 else -room * (1.0 - float(np.exp(rise / room)))
 
 
 def _leaving(path: FloatArray, distance: float, free: bool) -> FloatArray:
-    """The path without what is nearer to the wall than `distance` next to its ends on the wall."""
+    """The path without the points nearer to the wall than `distance` next to its ends on the wall."""
     away = np.flatnonzero(path[:, 0] > distance)
     if len(away) == 0:
         away = np.array([path[:, 0].argmax()])
@@ -76,8 +75,10 @@ def _leaving(path: FloatArray, distance: float, free: bool) -> FloatArray:
     return np.concatenate([path[:1], path[max(away[0], 1) : last], path[-1:]])
 
 
-def _handle(values: Values, wall: Wall, section: CrossSection, path: FloatArray, size: float, angle: float) -> QuadMesh:
-    """The handle towards +x, shaped to the wall as it is at `angle`."""
+def _handle(
+    values: Values, wall: Wall, section: VesselSection, path: FloatArray, size: float, angle: float
+) -> QuadMesh:
+    """The handle towards +x, for the shape of the wall at `angle`."""
     free = values["hndl_type"] == 2
     thick, wide = _girth(values, size)
     path = _leaving(path, 0.75 * thick, free)
@@ -93,36 +94,39 @@ def _handle(values: Values, wall: Wall, section: CrossSection, path: FloatArray,
     out = section.reach(angle) * clear + path[:, 0]
     rail = polyline(eased(np.column_stack([out, heights, np.zeros_like(t)]), 0.5 * thick * scale))
     style = Style(rail.positions, np.stack([scale, scale], axis=1), np.zeros_like(t))
-    profile = square_circle(0.16 + 0.84 * values["hndl_profile_blend"], thick, wide, count=AROUND)
-    # The profile's y is the world's z, which stays across the curve.
+    profile = square_circle(0.16 + 0.84 * values["hndl_profile_blend"], thick, wide, count=HANDLE_OUTLINE_POINTS)
+    # The profile's y is the world's z, which is perpendicular to the curve.
     mesh = sweep(rail, profile, style, up=(0.0, 0.0, 1.0), caps=("flat", "round") if free else "flat")
     return _grown_on(mesh, wall, section, angle, free)
 
 
-def _grown_on(mesh: QuadMesh, wall: Wall, section: CrossSection, angle: float, free: bool) -> QuadMesh:
-    """The handle with its ends in the middle of the wall, all over, and nothing of it further in."""
+def _grown_on(mesh: QuadMesh, wall: Wall, section: VesselSection, angle: float, free: bool) -> QuadMesh:
+    """The handle with its ends in the middle of the wall, and no part of it further inside."""
     x, y, z = mesh.vertices.T
     depth = wall.radius(y) - 0.5 * wall.thickness
     within = x
     for _ in range(2):
         radius = depth * section.reach(angle + np.degrees(np.arctan2(-z, within)))
         within = np.sqrt(np.maximum(radius * radius - z * z, 0.09 * radius * radius))
-    # Not all the way: where the wall lies level, points of a ring one behind the other would meet.
+    # Not all the way: where the wall is horizontal, points of a ring would coincide.
     within = x + 0.9 * (within - x)
     moved = np.maximum(x, within)
     rings = len(x) - 2
-    moved[:AROUND], moved[-2] = within[:AROUND], within[-2]
+    moved[:HANDLE_OUTLINE_POINTS], moved[-2] = within[:HANDLE_OUTLINE_POINTS], within[-2]
     if not free:
-        moved[rings - AROUND : rings], moved[-1] = within[rings - AROUND : rings], within[-1]
+        moved[rings - HANDLE_OUTLINE_POINTS : rings], moved[-1] = (
+            within[rings - HANDLE_OUTLINE_POINTS : rings],
+            within[-1],
+        )
     return QuadMesh(np.column_stack([moved, y, z]), mesh.quads)
 
 
 def _cover(wall: Wall, heights: FloatArray) -> FloatArray:
-    """The radius of the tightest convex cover of the wall over the range of `heights` (n,), at each of them."""
+    """The radius of the convex hull of the wall over the range of `heights` (n,), at each of them."""
     low, high = float(heights.min()), float(heights.max())
-    every = wall.outer[(wall.outer[:, 1] > low) & (wall.outer[:, 1] < high)]
+    between = wall.outer[(wall.outer[:, 1] > low) & (wall.outer[:, 1] < high)]
     first, last = wall.radius(np.array([low, high])).tolist()
-    points = [(low, first), *((y, x) for x, y in every.tolist()), (high, last)]
+    points = [(low, first), *((y, x) for x, y in between.tolist()), (high, last)]
     cover: list[tuple[float, float]] = []
     for point in sorted(points):
         while len(cover) > 1 and _turns_left(cover[-2], cover[-1], point):

@@ -1,4 +1,4 @@
-"""The wall of a vessel: an inner outline, an outer one at equal distance, and meshes with one cross-section."""
+"""The wall of a vessel: an inner outline, an outer one at constant distance, and meshes with one cross-section."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy.typing as npt
 from stages.programs.curves import QuadMesh, loft_rings
 from stages.shape.arrays import FloatArray
 
-EIGHTH = 6
-"""Segments of an eighth of a ring, from the middle of a side to a corner."""
+SEGMENTS_PER_EIGHTH = 6
+"""From the middle of a side to a corner."""
 
 
 @dataclass(frozen=True)
-class CrossSection:
-    """What a vessel looks like from above: from a square with soft corners (roundness 0) to a circle (1)."""
+class VesselSection:
+    """A vessel from above: from a square with soft corners (roundness 0) to a circle (1)."""
 
     roundness: float
 
@@ -26,8 +26,10 @@ class CrossSection:
         return 0.16 + 0.84 * self.roundness
 
     def around(self, outline: npt.ArrayLike, ring: bool = False) -> QuadMesh:
-        """The mesh of an outline (n, 2) of radius and height around the y axis: a solid, from its foot to its top over
-        the outer side, with poles or flat ends; or, for a closed outline, a `ring`."""
+        """The mesh of an outline (n, 2), radius and height, around the y axis.
+
+        A solid, from its foot up the outer side, with poles or flat ends; or, for a closed outline, a `ring`.
+        """
         points = np.asarray(outline, dtype=np.float64)
         rings = points[:, None, :1] * _directions(self._shape)
         rings[..., 1] = points[:, 1:]
@@ -40,28 +42,32 @@ class CrossSection:
 
 @lru_cache(maxsize=64)
 def _directions(shape: float) -> FloatArray:
-    """A ring of half-width 1, counter-clockwise seen from above, float64 (8 * EIGHTH, 3): a superellipse whose points
-    stand as close to each other as its length and its turning, half and half, ask for."""
+    """A ring of half-width 1, counter-clockwise seen from above, float64 (k, 3).
+
+    A superellipse with points spaced evenly, half by length and half by turning.
+    """
     exponent = 2.0 / shape
     angles = np.linspace(0.0, np.pi / 4.0, 65)
     points = _superellipse(angles, exponent)
     length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     turning = np.arctan2(np.sin(angles) ** (exponent - 1.0), np.cos(angles) ** (exponent - 1.0))
-    eighth = np.interp(np.linspace(0.0, 2.0, EIGHTH + 1), length / length[-1] + turning / turning[-1], angles)
+    eighth = np.interp(
+        np.linspace(0.0, 2.0, SEGMENTS_PER_EIGHTH + 1), length / length[-1] + turning / turning[-1], angles
+    )
     quarter = np.concatenate([eighth, np.pi / 2.0 - eighth[-2:0:-1]])
     x, y = _superellipse((quarter + np.pi / 2.0 * np.arange(4)[:, None]).ravel(), exponent).T
     return np.stack([x, np.zeros_like(x), -y], axis=1)
 
 
 def _reach(radians: FloatArray, exponent: float) -> FloatArray:
-    """How far a superellipse of half-width 1 reaches in directions."""
+    """The radius of a superellipse of half-width 1 in directions."""
     powers = np.abs(np.cos(radians)) ** exponent + np.abs(np.sin(radians)) ** exponent
-    found: FloatArray = powers ** (-1.0 / exponent)
-    return found
+    radii: FloatArray = powers ** (-1.0 / exponent)
+    return radii
 
 
 def _superellipse(radians: FloatArray, exponent: float) -> FloatArray:
-    """Its points in directions (n,), float64 (n, 2)."""
+    """Points of a superellipse in directions (n,), float64 (n, 2)."""
     rays = np.stack([np.cos(radians), np.sin(radians)], axis=1)
     points: FloatArray = _reach(radians, exponent)[:, None] * rays
     return points
@@ -69,10 +75,11 @@ def _superellipse(radians: FloatArray, exponent: float) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """A wall of even thickness outside an inner outline.
+    """A wall of constant thickness outside an inner outline, cut horizontally at the foot.
 
-    inner: float64 (n, 2), radius and height, rising from the foot to the rim; thickness above 0. The vessel is cut
-    level at the height of the foot, and its floor lies `floor` above it.
+    inner: float64 (n, 2), radius and height, rising from the foot to the rim
+    thickness: above 0
+    floor: thickness of the floor
     """
 
     inner: FloatArray
@@ -90,7 +97,8 @@ class Wall:
 
     @cached_property
     def _offset(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """The outer points that lie nowhere nearer to the inner outline than the wall is thick, and whose they are."""
+        """The outer points at least a wall's thickness from the inner outline, float64 (m, 2), and their inner points'
+        indices."""
         normals = np.stack([self.tangents[:, 1], -self.tangents[:, 0]], axis=1)
         points = self.inner + self.thickness * normals
         starts, steps = self.inner[:-1], np.diff(self.inner, axis=0)
@@ -108,7 +116,7 @@ class Wall:
         foot = self.inner[0, 1]
         first = points[0]
         if kept[0] > 0:
-            # What bulges out at once is cut off where it passes the level of the foot.
+            # A bulge directly at the foot is cut off at the level of the foot.
             ahead = self.inner[kept[0] - 1] + self.thickness * np.array(
                 [self.tangents[kept[0] - 1, 1], -self.tangents[kept[0] - 1, 0]]
             )
@@ -118,12 +126,15 @@ class Wall:
             radius = first[0]
         return np.concatenate([[[radius, foot]], points])
 
-    def parted(self, shoulder: int) -> tuple[FloatArray, FloatArray]:
-        """The closed outline of the wall above the inner point `shoulder`, with a tongue in the wall below, (a, 2);
-        and the outline of the vessel below it, from pole to pole, (b, 2)."""
+    def split(self, shoulder: int) -> tuple[FloatArray, FloatArray]:
+        """Split the vessel at the inner point `shoulder`.
+
+        Returns the closed outline of the wall above, with a tongue in the wall below, float64 (a, 2); and the outline
+        of the vessel below, from pole to pole, float64 (b, 2).
+        """
         _, kept = self._offset
-        place = int(np.searchsorted(kept, shoulder))
-        upper, lower = self.outer[place + 1 :], self.outer[: place + 2]
+        index = int(np.searchsorted(kept, shoulder))
+        upper, lower = self.outer[index + 1 :], self.outer[: index + 2]
         inside, outside = self.inner[shoulder], upper[0]
         down = self.tangents[shoulder] * 0.5 * self.thickness
         tongue = outside + np.array([[0.7], [0.3]]) * (inside - outside)
@@ -145,7 +156,7 @@ class Wall:
         return rounded
 
     def seat(self) -> FloatArray:
-        """The highest point of the rim, on which a lid lies, float64 (2,)."""
+        """The highest point of the rim, where a lid is placed, float64 (2,)."""
         rim = np.concatenate([self.outer[-1:], self._rim(), self.inner[-1:]])
         highest: FloatArray = rim[rim[:, 1].argmax()]
         return highest
@@ -158,7 +169,7 @@ class Wall:
         return np.concatenate([[[0.0, self.inner[0, 1]]], outer])
 
     def _cavity(self, top: int) -> FloatArray:
-        """Down the inner side from its point `top` to the floor, and to the middle."""
+        """The outline down the inner side from its point `top` to the floor, and to the middle."""
         level = self.inner[0, 1] + self.floor
         inner = self.inner[: top + 1]
         above = inner[inner[:, 1] > level + 1e-4][::-1]
@@ -166,7 +177,7 @@ class Wall:
         return np.concatenate([above, [[radius, level], [0.0, level]]])
 
     def radius(self, height: FloatArray) -> FloatArray:
-        """Outer radius at heights; that of the foot below it, that of the rim above it."""
+        """Outer radius at heights; constant below the foot and above the rim."""
         rising = np.maximum.accumulate(self.outer[:, 1])
-        found: FloatArray = np.interp(height, rising, self.outer[:, 0])
-        return found
+        radii: FloatArray = np.interp(height, rising, self.outer[:, 0])
+        return radii

@@ -114,7 +114,7 @@ def test_profile_stands_as_up_says() -> None:
     assert (leg.bounds[1] - leg.bounds[0]).tolist() == pytest.approx([0.1, 1, 0.3])
     turned = sweep(line((0, 0, 0), (0, 1, 0)), rectangle(0.1, 0.3), up=(1, 0, 0))
     assert (turned.bounds[1] - turned.bounds[0]).tolist() == pytest.approx([0.3, 1, 0.1])
-    with pytest.raises(ValueError, match="runs along"):
+    with pytest.raises(ValueError, match="is parallel to"):
         sweep(line((0, 0, 0), (0, 1, 0)), rectangle(0.1), up=(0, 2, 0))
 
 

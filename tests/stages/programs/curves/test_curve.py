@@ -36,7 +36,7 @@ def test_tangents_halve_a_corner_and_follow_the_piece_beside_it() -> None:
 
 
 def test_a_position_outside_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"position 1\.2 lies outside"):
+    with pytest.raises(ValueError, match=r"position 1\.2 is outside"):
         polyline(UNEVEN).at(1.2)
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from stages.programs.curves import Part
 from stages.programs.draws import draw
-from stages.programs.library.vase import PROGRAM, THIN
-from stages.programs.library.vessel import CrossSection, Wall
+from stages.programs.library.vase import MIN_WALL_THICKNESS, PROGRAM
+from stages.programs.library.vessel import VesselSection, Wall
 
 
 def random_vases(count: int) -> list[dict[str, Any]]:
@@ -72,7 +72,7 @@ def test_the_wall_is_as_thick_as_asked_and_lies_outside_the_opening(thickness: f
         for flag in (False, True)
     )
     wider = (thick.bounds - thin.bounds)[:, [0, 2]]
-    np.testing.assert_allclose(np.abs(wider), thickness - THIN, atol=0.003)
+    np.testing.assert_allclose(np.abs(wider), thickness - MIN_WALL_THICKNESS, atol=0.003)
 
 
 @pytest.mark.parametrize("thickness", [0.005, 0.03, 0.2])
@@ -109,7 +109,7 @@ def test_a_lid_is_wider_than_the_opening_and_lies_on_the_rim() -> None:
 
 
 def test_a_cross_section_reaches_from_a_square_to_a_circle() -> None:
-    corner = [CrossSection(roundness).reach(45.0) for roundness in (0.0, 0.5, 1.0)]
+    corner = [VesselSection(roundness).reach(45.0) for roundness in (0.0, 0.5, 1.0)]
     assert 1.414 > corner[0] > 1.3 > corner[1] > corner[2] == pytest.approx(1.0)
     for roundness in (0.0, 0.3, 1.0):
-        assert CrossSection(roundness).reach(90.0) == pytest.approx(1.0)
+        assert VesselSection(roundness).reach(90.0) == pytest.approx(1.0)
