@@ -39,7 +39,7 @@ PRODUCER = Producer(
     splits="There are no duplicates, within a split or across splits. In mode random, samples that differ in "
     "continuous parameters alone are in one split if their `lineage` has `split_by: structure`. With `split_by: "
     "values`, the program has fewer structures than splits, and shapes of one structure are in all of them. In mode "
-    "each_value, all splits have all values, as published.",
+    "all_values, all splits have all values, as published.",
     graphs_share_split=False,
     lineage=_lineage,
     limits=("All shapes have the same parameters; shapes that the program cannot build are missing.",),

@@ -11,7 +11,7 @@ from stages.shape.collection.assignment import ShardConfig
 from stages.shape.physics.settings import Requirements
 
 
-class EachValueConfig(StrictModel):
+class AllValuesConfig(StrictModel):
     """Shapes with each value of each parameter fixed and all others random (geocode §4)."""
 
     train: int = Field(30, ge=1, le=1_000_000, description="Shapes of each value in the training split.")
@@ -36,14 +36,14 @@ class ProgramsConfig(StrictModel):
         description="Name of the program, such as chair, or the dotted module of your own, such as furniture.bench; "
         "empty for a dataset made from exemplars.",
     )
-    mode: Literal["each_value", "random"] = Field(
-        "each_value",
-        description="What is sampled. each_value: every value of every parameter a number of times, where it "
+    mode: Literal["all_values", "random"] = Field(
+        "all_values",
+        description="What is sampled. all_values: every value of every parameter a number of times, where it "
         "is visible and takes effect. random: random shapes, with continuous values anywhere in their range.",
     )
-    each_value: EachValueConfig = Field(
-        default_factory=EachValueConfig,
-        description="Shapes of each value, for mode each_value. There are no duplicates; structures recur in splits.",
+    all_values: AllValuesConfig = Field(
+        default_factory=AllValuesConfig,
+        description="Shapes of each value, for mode all_values. There are no duplicates; structures recur in splits.",
     )
     random: RandomSamplingConfig = Field(
         default_factory=RandomSamplingConfig,

@@ -45,14 +45,14 @@ def _shards(dataset: Config) -> list[Shard]:
         return []
     code = (program_module(config.program),)
     split_plan = plan_splits(config.program, config.random) if config.mode == "random" else None
-    sizes = split_plan.sizes if split_plan else _each_value_sizes(config)
+    sizes = split_plan.sizes if split_plan else _all_values_sizes(config)
     shards: list[Shard] = []
     first = 0
     for split, size in sizes.items():
         count = min(max(config.splits.shards, -(-size // config.splits.samples_per_shard)), size)
         for number in range(count):
             start, end = number * size // count, (number + 1) * size // count
-            owned = split_plan.owned(split, start, end) if split_plan else _each_value_share(sizes, first, start, end)
+            owned = split_plan.owned(split, start, end) if split_plan else _all_values_share(sizes, first, start, end)
             params = {"split": split, "start": start, "samples": end - start, "first_key": first + start, **owned}
             shards.append(Shard(f"{dataset.name}-{split}-{number:06d}", params, code=code))
         first += size
@@ -70,7 +70,7 @@ def run_shard(task: Task) -> Outcome:
     structures, shapes = params.get("share", ((0.0, 1.0), (0.0, 1.0)))
     share = Share((structures[0], structures[1]), (shapes[0], shapes[1]), params.get("weight", 1.0))
     sampler = Sampler(program, share, off_grid=config.mode == "random", require=config.require)
-    shapes_found = _random(task, sampler) if config.mode == "random" else _each_value(task, sampler)
+    shapes_found = _random(task, sampler) if config.mode == "random" else _all_values(task, sampler)
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for values, lineage in shapes_found:
             key = f"{program.name}-{params['first_key'] + writer.samples:06d}"
@@ -82,13 +82,13 @@ def run_shard(task: Task) -> Outcome:
     return Outcome(writer.samples, {**summary, "failure": sampler.failure} if sampler.failure else summary)
 
 
-def _each_value(task: Task, sampler: Sampler) -> Iterator[SampledValues]:
+def _all_values(task: Task, sampler: Sampler) -> Iterator[SampledValues]:
     """Yield shapes with every value of every parameter in turn, in random order."""
     params, indices = task.shard.params, all_value_indices(sampler.program)
     for number in task.rng("order").permutation(params["samples"]).tolist():
         name, index = indices[(params["start"] + number) % len(indices)]
         values = sampler.find((name, index), task.rng("shape", number))
-        yield values, {"method": "each_value", "parameter": name, "class": index}
+        yield values, {"method": "all_values", "parameter": name, "class": index}
 
 
 def _random(task: Task, sampler: Sampler) -> Iterator[SampledValues]:
@@ -132,15 +132,15 @@ def _sample(
     )
 
 
-def _each_value_sizes(config: ProgramsConfig) -> dict[str, int]:
+def _all_values_sizes(config: ProgramsConfig) -> dict[str, int]:
     """The number of samples of each split. Raises ConfigError for a program without parameters."""
     count = len(all_value_indices(find_program(config.program)))
     if not count:
         raise ConfigError(f"programs.mode: {config.program} has no parameters, and so no values; set it to random")
-    return {split: getattr(config.each_value, split) * count for split in SPLITS}
+    return {split: getattr(config.all_values, split) * count for split in SPLITS}
 
 
-def _each_value_share(sizes: dict[str, int], first: int, start: int, end: int) -> dict[str, list[Interval]]:
+def _all_values_share(sizes: dict[str, int], first: int, start: int, end: int) -> dict[str, list[Interval]]:
     """The same share of all shapes as of all samples; structures recur."""
     total = sum(sizes.values())
     return {"share": [(0.0, 1.0), ((first + start) / total, (first + end) / total)]}
@@ -183,14 +183,14 @@ def trial_config(config: Config) -> ProgramsConfig:
     """
     section = config.section(ProgramsConfig)
     scale = min(TRIAL_SHARD_SAMPLES / section.splits.samples_per_shard, 1.0)
-    requested, each_value = section.random.samples, section.each_value
+    requested, all_values = section.random.samples, section.all_values
     samples = max(round(scale * requested), min(requested, MIN_TRIAL_SAMPLES))
-    fewer = {split: max(round(scale * getattr(each_value, split)), 1) for split in SPLITS}
+    fewer = {split: max(round(scale * getattr(all_values, split)), 1) for split in SPLITS}
     return section.model_copy(
         update={
             "splits": section.splits.model_copy(update={"samples_per_shard": TRIAL_SHARD_SAMPLES}),
             "random": section.random.model_copy(update={"samples": samples}),
-            "each_value": each_value.model_copy(update=fewer),
+            "all_values": all_values.model_copy(update=fewer),
         }
     )
 

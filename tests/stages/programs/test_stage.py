@@ -18,7 +18,7 @@ from tests.command import shapemill
 from tests.stages.programs.stool import PROGRAM as STOOL_PROGRAM
 
 STOOL, RACK = "tests.stages.programs.stool", "tests.stages.programs.rack"
-EACH_VALUE = {"program": STOOL, "each_value": {"train": 2, "val": 1, "test": 1}, "splits": {"shards": 2}}
+EACH_VALUE = {"program": STOOL, "all_values": {"train": 2, "val": 1, "test": 1}, "splits": {"shards": 2}}
 RANDOM = {
     "program": RACK,
     "mode": "random",

@@ -37,7 +37,7 @@ STAGES = (
 STOOLS = {
     "programs": {
         "program": "tests.stages.programs.stool",
-        "each_value": {"train": 1, "val": 1, "test": 1},
+        "all_values": {"train": 1, "val": 1, "test": 1},
         "splits": {"shards": 2},
     },
     "abstraction": {"programs": True},
