@@ -106,14 +106,14 @@ def _unvaried(resolved: ResolvedKit) -> Resolution:
 def _different(lattice: Lattice, config: ProportionsConfig, exemplar: int, wanted: int) -> int:
     """Return how many different shapes of an exemplar a run finds that wants `wanted`, if all hold together."""
     rng = decision_rng(0, "choices", "different", exemplar)
-    drawn = DistinctWarps(lattice, config.min_difference)
+    distinct = DistinctWarps(lattice, config.min_difference)
     for _ in range(config.oversample * CANDIDATES_PER_SAMPLE * wanted):
         warp = lattice.draw(rng, config.log_std, config.max_factor)
-        if drawn.is_new(warp):
-            drawn.add(warp)
-        if len(drawn) == CANDIDATES_PER_SAMPLE * wanted:
+        if distinct.is_new(warp):
+            distinct.add(warp)
+        if len(distinct) == CANDIDATES_PER_SAMPLE * wanted:
             break
-    return len(drawn.farthest_first(wanted))
+    return len(distinct.farthest_first(wanted))
 
 
 def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
@@ -128,7 +128,7 @@ def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
     for number, exemplar in enumerate(kit.exemplars):
         lattice = lattice_of(kit, exemplar.whole)
         kept: list[Shape] = []
-        drawn = DistinctWarps(lattice, config.min_difference)
+        distinct = DistinctWarps(lattice, config.min_difference)
         for draw in range(-(-TRIAL_DRAWS // count)):
             rng = decision_rng(0, "choices", "proportions", number, draw)
             warp = lattice.draw(rng, config.log_std, config.max_factor)
@@ -136,9 +136,9 @@ def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
             tried += 1
             if warp_fault(kit, exemplar.whole, shape) is None and unmet_requirement(require, shape) is None:
                 kept.append(shape)
-                drawn.add(warp)
+                distinct.add(warp)
         held += len(kept)
-        shapes += [kept[index] for index in drawn.farthest_first(len(range(number, max_shapes, count)))]
+        shapes += [kept[index] for index in distinct.farthest_first(len(range(number, max_shapes, count)))]
         different += _different(lattice, config, number, len(range(number, MAX_SAMPLES_REQUESTED, count)))
     closed = all(is_closed_box(kit_shape(kit, exemplar.whole)) for exemplar in kit.exemplars)
     return ResizeEstimate(held / max(tried, 1), different, shapes, stable, closed)

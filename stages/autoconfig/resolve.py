@@ -109,13 +109,13 @@ def resolve_settings(
     hubs = tuple(analysis.types[index].name for index in setting.hubs)
     bare = sum(int((~np.isin(assembly.types, setting.hubs)).sum()) for assembly in analysis.counted(setting))
     dropped = bare - sum(map(len, analysis.kept_parts(setting)))
-    found = {
+    searched = {
         "contact.kinds": setting.kinds,
         "grammar": setting.grammar,
         "hubs.types": hubs or "none",
         "disconnected": "largest" if dropped else "error",
     }
-    for key, value in found.items():
+    for key, value in searched.items():
         if key in auto_keys:
             values[key], reasons[key] = value, _reason(key, chosen, candidates)
     if "hubs.types" in auto_keys and one_surface:

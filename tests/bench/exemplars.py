@@ -1,12 +1,11 @@
-"""What each of many models gives by itself: through `make inspect` and its config untouched, or through the README's.
+"""Benchmark many models one by one: with the config that `shapemill inspect` writes, or with the README's.
 
 python -m tests.bench.exemplars [--out FOLDER] [--minutes 10] [--template] MODEL...
 
 A MODEL is a file, some files of one kit with spaces between them, as in MESH="a.glb b.glb", or a folder of models.
 Each goes through inspect, then through autoconfig, exemplars, variations and proportions, with one worker, as users do.
-Prints a row of a Markdown table for each, as soon as it has ended, and leaves in a folder of FOLDER for each the
-config, what inspect drew, and a sheet of the most different variants, which somebody has to look at: no figure tells a
-good shape.
+Prints a row of a Markdown table for each as soon as it has ended. A folder in FOLDER holds its config, its pictures and
+a sheet of the most different variants, to be judged by eye.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from pipeline.records import read_record
 from stages.inspection.config_text import dataset_name
 
 HEADER = (
-    "| model | parts / types | up, tolerance, kinds, grammar, hubs | forecast | chosen of pool | histograms | E "
+    "| model | parts / types | up, tolerance, kinds, grammar, hubs | yield estimate | chosen of pool | histograms | E "
     "| copied | mixed | inspect, CPU s | making, CPU s | MB |\n"
     "|---|---:|---|---|---|---:|---:|---:|---:|---:|---:|---:|"
 )
@@ -51,57 +50,64 @@ variations:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended. seconds: of CPU, all its processes'; megabytes: the most that one of these held; said: what
-    it printed to stdout, and complained: to stderr; late: whether it was stopped."""
+    """How a command ended.
+
+    seconds: CPU seconds of all its processes.
+    megabytes: largest memory of one process.
+    stdout, stderr: what it printed.
+    late: whether it was stopped.
+    """
 
     seconds: float
     megabytes: float
-    said: str
-    complained: str
+    stdout: str
+    stderr: str
     late: bool
 
 
 def run(arguments: Sequence[str], minutes: float) -> Ended:
-    """`python -m` with some arguments, as long as it takes no longer than so many minutes."""
+    """Run `python -m` with arguments for at most `minutes`."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with subprocess.Popen(
         [sys.executable, "-m", *arguments], stdout=-1, stderr=-1, text=True, start_new_session=True
-    ) as made:
+    ) as process:
         late = False
         try:
-            said, complained = made.communicate(timeout=60 * minutes)
+            stdout, stderr = process.communicate(timeout=60 * minutes)
         except subprocess.TimeoutExpired:
-            os.killpg(made.pid, signal.SIGTERM)
-            said, complained = made.communicate()
+            os.killpg(process.pid, signal.SIGTERM)
+            stdout, stderr = process.communicate()
             late = True
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return Ended(seconds, after.ru_maxrss / 1024, said, complained, late)
+    return Ended(seconds, after.ru_maxrss / 1024, stdout, stderr, late)
 
 
 def measured(models: Sequence[Path], folder: Path, minutes: float, template: bool) -> str:
-    """The row of one kit of models."""
-    name = "-".join(dict.fromkeys(dataset_name([each]) for each in models))[:60]
-    folder /= name  # a family is called as its first model is, and must not take its place
+    """Return the row of one kit of models."""
+    name = "-".join(dict.fromkeys(dataset_name([path]) for path in models))[:60]
+    folder /= name  # the name of a kit must differ from that of its first model
     inspected = run(["pipeline", "inspect", "--json", "--out", str(folder / "inspect"), *map(str, models)], minutes)
-    if not inspected.said:
-        why = "took too long" if inspected.late else inspected.complained.strip().splitlines()[-1]
+    if not inspected.stdout:
+        why = "took too long" if inspected.late else inspected.stderr.strip().splitlines()[-1]
         return f"| {name} | | | {why} | | | | | | {inspected.seconds:.0f} | | {inspected.megabytes:.0f} |"
-    seen = json.loads(inspected.said)
-    config = Path(seen["files"]["config"])
+    inspection = json.loads(inspected.stdout)
+    config = Path(inspection["files"]["config"])
     if template:
         config = folder / "template" / config.name
         config.parent.mkdir(parents=True, exist_ok=True)
-        config.write_text(TEMPLATE.format(name=config.stem, shapes=json.dumps([str(each) for each in models])))
-    made, ends = _made(config, folder, minutes)
-    chosen, foreseen = seen["autoconfig"]["resolved"], seen["yield_estimate"]
-    decided = {key: each for key, each in chosen.items() if key != "disconnected" and not key.startswith("require.")}
-    parts = sum(len(each["parts"]) for each in seen.get("models", [seen]))
+        config.write_text(TEMPLATE.format(name=config.stem, shapes=json.dumps(list(map(str, models)))))
+    made, ends = _make(config, folder, minutes)
+    resolved, estimate = inspection["autoconfig"]["resolved"], inspection["yield_estimate"]
+    settings = {
+        key: value for key, value in resolved.items() if key != "disconnected" and not key.startswith("require.")
+    }
+    parts = sum(len(model["parts"]) for model in inspection.get("models", [inspection]))
     row = [
         name,
-        f"{parts} / {len(seen['types'])}",
-        ", ".join(map(_setting, decided.values())),
-        foreseen["sentence"],
+        f"{parts} / {len(inspection['types'])}",
+        ", ".join(map(_setting, settings.values())),
+        estimate["sentence"],
         *ends,
         f"{inspected.seconds:.0f}",
         f"{made.seconds:.0f}",
@@ -114,49 +120,49 @@ def _setting(value: Any) -> str:
     return "+".join(value) if isinstance(value, list) else str(value)
 
 
-def _made(config: Path, folder: Path, minutes: float) -> tuple[Ended, list[str]]:
-    """How the making of a config's variants ended, all its stages together, and what a row says of them."""
+def _make(config: Path, folder: Path, minutes: float) -> tuple[Ended, list[str]]:
+    """Make the variants of a config; return how all its stages ended together, and the cells of a row."""
     spent, peak, left = 0.0, 0.0, minutes
     for stage in STAGES:
         ended = run(["pipeline", "run", stage, "--config", str(config), "--out", str(folder), "--workers", "1"], left)
         spent, peak = spent + ended.seconds, max(peak, ended.megabytes)
         if ended.late:
             break
-    whole = Ended(spent, peak, ended.said, ended.complained, ended.late)
-    chosen = read_record(DatasetPaths(folder, config.stem).stage("proportions").records / f"{config.stem}-choice.json")
-    if chosen is not None:
-        return whole, [f"{sum(chosen.summary['shapes'].values()):,} in other proportions", *[""] * 4]
+    whole = Ended(spent, peak, ended.stdout, ended.stderr, ended.late)
+    resized = read_record(DatasetPaths(folder, config.stem).stage("proportions").records / f"{config.stem}-choice.json")
+    if resized is not None:
+        return whole, [f"{sum(resized.summary['shapes'].values()):,} in other proportions", *[""] * 4]
     record = read_record(
         DatasetPaths(folder, config.stem).stage("variations").records / f"{config.stem}-assignment.json"
     )
     if record is None:
         return whole, ["stopped at the limit" if ended.late else _why(ended), *[""] * 4]
-    (found,) = record.summary["kits"].values()
+    (summary,) = record.summary["kits"].values()
     run(["stages.variations.report.sheet", "--config", str(config), "--out", str(folder)], minutes)
-    return whole, list(_cells(found))
+    return whole, list(_cells(summary))
 
 
 def _why(ended: Ended) -> str:
-    """Why a run ended without variants, by its own words: the lines before the last, which names what is set aside."""
-    said = [each for each in (ended.said + ended.complained).splitlines() if each.strip()]
-    found = [each for each in said if "found no variant" in each]
-    return (found or said or ["nothing"])[-1]
+    """Return the line that says why a run ended without variants."""
+    lines = [line for line in (ended.stdout + ended.stderr).splitlines() if line.strip()]
+    reasons = [line for line in lines if "found no variant" in line]
+    return (reasons or lines or ["nothing"])[-1]
 
 
-def _cells(found: Mapping[str, Any]) -> Iterator[str]:
-    yield f"{found['variants']:,} of {found['pool']:,}{', ' + found['dull'] if found['dull'] else ''}"
-    yield f"{found['histograms']:,}"
-    yield f"{found['distance']:.2f}"
-    yield f"{found['copied']:.0%}"
-    yield f"{found['mixed']:.0%}"
+def _cells(summary: Mapping[str, Any]) -> Iterator[str]:
+    yield f"{summary['variants']:,} of {summary['pool']:,}{', ' + summary['dull'] if summary['dull'] else ''}"
+    yield f"{summary['histograms']:,}"
+    yield f"{summary['distance']:.2f}"
+    yield f"{summary['copied']:.0%}"
+    yield f"{summary['mixed']:.0%}"
 
 
 def kits(text: str) -> Iterator[list[Path]]:
-    """The kits that one argument names."""
+    """Yield the kits that one argument names."""
     if Path(text).is_dir():
-        yield from ([each] for each in sorted(Path(text).rglob("*.glb")))
+        yield from ([path] for path in sorted(Path(text).rglob("*.glb")))
     else:
-        yield [Path(text)] if Path(text).exists() else [Path(each) for each in text.split()]
+        yield [Path(text)] if Path(text).exists() else [Path(word) for word in text.split()]
 
 
 def main() -> None:
@@ -166,12 +172,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("datasets/exemplars-bench"))
     parser.add_argument("--minutes", type=float, default=10.0, help="as long as inspecting or making may take")
     parser.add_argument("--template", action="store_true", help="the README's config instead of the one of inspect")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     print(HEADER, flush=True)
-    # a process for each, for the peak of memory is that of all children that a process has ever had
+    # one process for each, since the peak of memory is that of all children of a process
     with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as one_by_one:
-        for models in [each for text in asked.models for each in kits(text)]:
-            row = one_by_one.submit(measured, models, asked.out, asked.minutes, asked.template)
+        for models in [kit for text in options.models for kit in kits(text)]:
+            row = one_by_one.submit(measured, models, options.out, options.minutes, options.template)
             print(row.result(), flush=True)
 
 

@@ -1,8 +1,8 @@
-"""Replaceable substructures of families of real models beside exchange, in the same CPU time (substructures §6).
+"""Compare replaceable substructures with exchange on families of real models, in equal CPU time (substructures §6).
 
 python -m tests.bench.families [--seconds 8] [--sheets DIR] [FAMILY...]
 
-Models are read from ../shared, where they lie beside the project; ten chairs are made by the program. Prints two
+Models are read from ../shared, next to the project; a program makes ten chairs. Prints two
 Markdown tables: what can be replaced between the exemplars, and what searches find of it. CPU seconds of one process.
 """
 
@@ -60,13 +60,12 @@ REASONS = {
 }
 """Words of the search's reasons for a reject, by column."""
 
-STOOD = 300
-"""So many shapes are asked whether all of their parts stand on something that stood so in the exemplars, and whether
-they stand themselves."""
+MAX_SHAPES_TESTED = 300
+"""Shapes that are tested for supported parts and for stability."""
 
 
 def _real(*folders: str, grammar: str = "multiset", up: str = "y") -> Family:
-    paths = tuple(ShapeFile(path=REAL / each / "model.glb") for each in folders)
+    paths = tuple(ShapeFile(path=REAL / folder / "model.glb") for folder in folders)
     chosen = {**STRICTEST, "grammar": grammar, "up": up}
     return read_kit(KitConfig(name="family", shapes=paths).resolve(chosen)), SearchConfig(duplicates="graph")
 
@@ -80,8 +79,8 @@ def _vault() -> Family:
 
 
 def _furniture() -> Family:
-    """As coarse as meanings may be: what is stretched by four at most and stands about as it stood."""
-    paths = [REAL / each / "model.glb" for each in FURNITURE]
+    """Return a kit with types by meaning, stretched at most fourfold."""
+    paths = [REAL / folder / "model.glb" for folder in FURNITURE]
     config = KitConfig(
         name="furniture", shapes=tuple(ShapeFile(path=path) for path in paths), types="meaning", label_map=MEANINGS
     )
@@ -140,36 +139,37 @@ def main() -> None:
         for method in ("substructures", "exchange"):
             way = config.model_copy(update={"method": method})
             finds = explore(kit, way, asked.seconds, 0, shown=True)
-            standing = _standing(kit, finds.kept[:STOOD])
-            rows.append(_found(name, method, kit, finds, len(standing)))
-            if asked.sheets and standing:
-                lists = (type_counts(kit, [each.types for each in of]) for of in (standing, _exemplars(kit)))
-                chosen = farthest_first(*lists, min(MAX_SHAPES_SHOWN, len(standing))).tolist()
-                shapes = [kit_shape(kit, standing[place]) for place in chosen]
+            stable = _stable(kit, finds.kept[:MAX_SHAPES_TESTED])
+            rows.append(_found(name, method, kit, finds, len(stable)))
+            if asked.sheets and stable:
+                lists = (
+                    type_counts(kit, [assembly.types for assembly in shapes]) for shapes in (stable, _exemplars(kit))
+                )
+                chosen = farthest_first(*lists, min(MAX_SHAPES_SHOWN, len(stable))).tolist()
+                shapes = [kit_shape(kit, stable[index]) for index in chosen]
                 path = asked.sheets / f"{name.replace(' ', '-')}-{method}.png"
                 write_file(path, sample_figure(kit, shapes, "Most different finds", name, method))
     print("\n".join(["", FOUND, *rows]))
 
 
 def _exemplars(kit: Kit) -> list[Assembly]:
-    return [each.assembly for each in kit.exemplars]
+    return [exemplar.assembly for exemplar in kit.exemplars]
 
 
-def _standing(kit: Kit, found: Sequence[Assembly]) -> list[Assembly]:
-    """Those that stand and bear small pushes, where the exemplars do: what `variations.require.stable` keeps by itself
-    of a kit that leaves it open; of other kits all."""
+def _stable(kit: Kit, shapes: Sequence[Assembly]) -> list[Assembly]:
+    """Return the stable shapes if the exemplars are stable, as `variations.require.stable: auto` does; else all."""
     physical = VariantRequirements().physical(stable=True)
-    if any(unmet_requirement(physical, kit_shape(kit, each)) for each in _exemplars(kit)):
-        return list(found)
-    return [each for each in found if unmet_requirement(physical, kit_shape(kit, each)) is None]
+    if any(unmet_requirement(physical, kit_shape(kit, exemplar)) for exemplar in _exemplars(kit)):
+        return list(shapes)
+    return [shape for shape in shapes if unmet_requirement(physical, kit_shape(kit, shape)) is None]
 
 
 def _listed(name: str, kit: Kit, config: SearchConfig) -> str:
-    """What can be replaced between the exemplars, each with itself too."""
+    """Return the row of replacements between the exemplars, pairs of one exemplar included."""
     up, dockings = {"y": 1, "z": 2}[kit.up] if config.upright else -1, ContactOracle(kit).dockings
     sides = [
-        (each, docking_graph(kit, each, dockings.label_edges(each.types, each.poses, each.edges)))
-        for each in _exemplars(kit)
+        (exemplar, docking_graph(kit, exemplar, dockings.label_edges(exemplar.types, exemplar.poses, exemplar.edges)))
+        for exemplar in _exemplars(kit)
     ]
     moves = (
         [] if kit.by_meaning else [find_region_swaps(kit, up, base, giver) for base, giver in product(sides, repeat=2)]
@@ -178,12 +178,12 @@ def _listed(name: str, kit: Kit, config: SearchConfig) -> str:
         find_operations(a, b, config.dummy_edges, by_docking=not kit.by_meaning)
         for (_, a), (_, b) in combinations_with_replacement(sides, 2)
     ]
-    plain = sum(each.plain for each in operations)
-    cut = "" if all(each.is_whole for each in operations) else " and more"
+    plain = sum(found.plain for found in operations)
+    cut = "" if all(found.is_whole for found in operations) else " and more"
     return (
-        f"| {name} | {' + '.join(str(len(each)) for each, _ in sides)} | {sum(map(len, moves)):,} | "
-        f"{_share(sum(map(len, moves)), sum(each.meetings for each in moves))} | {plain:,} | "
-        f"{_share(plain, sum(each.meetings for each in operations))} | {sum(map(len, operations)) - plain:,}{cut} |"
+        f"| {name} | {' + '.join(str(len(exemplar)) for exemplar, _ in sides)} | {sum(map(len, moves)):,} | "
+        f"{_share(sum(map(len, moves)), sum(found.meetings for found in moves))} | {plain:,} | "
+        f"{_share(plain, sum(found.meetings for found in operations))} | {sum(map(len, operations)) - plain:,}{cut} |"
     )
 
 
@@ -191,25 +191,25 @@ def _share(part: int, whole: int) -> str:
     return f"{part / whole:.1%}" if whole else "-"
 
 
-def _found(name: str, how: str, kit: Kit, finds: Finds, standing: int) -> str:
-    """What a search has found, so many of the first STOOD `standing`, and how its other tries ended."""
+def _found(name: str, how: str, kit: Kit, finds: Finds, stable: int) -> str:
+    """Return the row of a search: its hits, how many of the tested ones are `stable`, and how other tries ended."""
     counts = dict.fromkeys(REASONS, 0)
     other = 0
     for reason, count in finds.rejects.items():
-        column = next((each for each, words in REASONS.items() if any(word in reason for word in words)), None)
+        column = next((title for title, words in REASONS.items() if any(word in reason for word in words)), None)
         if column is None:
             other += count
         else:
             counts[column] += count
-    fault, asked = build_test(kit, {"support": {}}), finds.kept[:STOOD]
-    held = np.mean([fault(each) is None for each in asked]) if asked else 0.0
+    fault, tested = build_test(kit, {"support": {}}), finds.kept[:MAX_SHAPES_TESTED]
+    held = np.mean([fault(shape) is None for shape in tested]) if tested else 0.0
     features = np.array(finds.features).reshape(-1, len(AXES))
     mixed = np.mean(features[:, AXES.index("mixture")] >= MIN_MIXTURE) if len(features) else 0.0
     copied = np.median(features[:, AXES.index("copied_share")]) if len(features) else 0.0
     found, tried = len(finds.keys), sum(finds.rejects.values()) + len(finds.keys)
     cells = [f"{count:,}" for count in (tried, *counts.values(), other, found)]
-    graphs, histograms = ({key[place] for key in finds.keys} for place in (0, 1))
-    cells += [f"{held:.0%}", f"{standing / max(len(asked), 1):.0%}", f"{len(graphs):,}", f"{len(histograms):,}"]
+    graphs, histograms = ({key[index] for key in finds.keys} for index in (0, 1))
+    cells += [f"{held:.0%}", f"{stable / max(len(tested), 1):.0%}", f"{len(graphs):,}", f"{len(histograms):,}"]
     return f"| {name} | {how} | {' | '.join(cells)} | {mixed:.0%} | {copied:.0%} |"
 
 

@@ -123,7 +123,7 @@ def write_obj(path: Path, boxes: dict[str, np.ndarray], head: str = "", before: 
 
 
 def textured_glb(image: str) -> Glb:
-    """Two boxes beside each other with a texture, the file `image`."""
+    """Write two adjacent boxes with a texture, the file `image`."""
     glb = Glb()
     glb.header["images"] = [{"uri": image}]
     glb.header["textures"] = [{"source": 0}]

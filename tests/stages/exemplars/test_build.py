@@ -55,7 +55,7 @@ class TestTypes:
     def test_parts_that_a_surface_was_cut_into_are_one_surface(self, cut_by: Any, one_surface: bool) -> None:
         assert block_kit(replace(ring(), segmentation=cut_by)).one_surface is one_surface
 
-    def test_the_origin_of_a_type_is_its_centroid(self) -> None:
+    def test_origin_of_a_type_is_its_centroid(self) -> None:
         kit = block_kit(model({"a": (SCREW, (0, 0, 0)), "b": (SCREW, (2, 0, 0))}))
         np.testing.assert_allclose(kit.types[0].centroid, 0, atol=1e-12)
 
@@ -84,14 +84,14 @@ class TestTypes:
         kit = block_kit(model({name: (body, (float(k), 0.0, 0.0)) for k, (name, body) in enumerate(bodies)}))
         assert kit.type_names() == ("wall_1", "wall_1_2", "part", "part_2")
 
-    def test_a_type_is_shared_by_the_shapes_of_a_kit(self) -> None:
+    def test_type_is_shared_by_the_shapes_of_a_kit(self) -> None:
         kit = block_kit(ring(), model({"x": (SLAB, (0, 0, 0)), "y": (CUBE, (1, 0, 0.5))}, "other"))
-        assert [each.assembly.types.tolist() for each in kit.exemplars] == [[0, 0, 0, 0], [1, 0]]
-        assert [each.name for each in kit.exemplars] == ["ring", "other"]
+        assert [exemplar.assembly.types.tolist() for exemplar in kit.exemplars] == [[0, 0, 0, 0], [1, 0]]
+        assert [exemplar.name for exemplar in kit.exemplars] == ["ring", "other"]
 
     def test_shapes_in_files_of_one_name_are_called_by_their_folders(self) -> None:
         models = [Model(Path(folder, "model.glb"), ring().parts, "nodes", "", ()) for folder in ("tower", "wall")]
-        assert [each.name for each in block_kit(*models).exemplars] == ["tower", "wall"]
+        assert [exemplar.name for exemplar in block_kit(*models).exemplars] == ["tower", "wall"]
 
 
 class TestRepairs:
@@ -114,13 +114,13 @@ class TestRefusals:
         assert "parts: auto" not in message
         assert "set `parts: auto`" in refusal(replace(alone, why=STATED_IN_CONFIG))
 
-    def test_an_exemplar_in_pieces_is_refused_with_what_is_apart(self) -> None:
+    def test_exemplar_in_pieces_is_refused_with_what_is_apart(self) -> None:
         apart = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 0, 0)), "c": (CUBE, (2, 0, 0)), "moon": (CUBE, FAR)})
         message = refusal(apart)
         assert "2 pieces of 3, 1 parts (apart: moon)" in message
         assert "disconnected: largest" in message
 
-    def test_the_largest_piece_is_kept_if_the_config_says_so(self) -> None:
+    def test_largest_piece_is_kept_if_the_config_says_so(self) -> None:
         apart = model({"moon": (CUBE, FAR), "a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 0, 0)), "c": (CUBE, (2, 0, 0))})
         kit, report = build_kit(block_config(disconnected="largest"), [apart])
         assert kit.exemplars[0].part_names == ("a", "b", "c")
@@ -128,11 +128,11 @@ class TestRefusals:
         assert kit.grammar.neighbourhoods == {0: {((0, 1),): 2, ((0, 2),): 1}}
         assert any("moon" in warning for warning in report.warnings)
 
-    def test_pieces_of_one_part_each_are_no_exemplar_even_so(self) -> None:
+    def test_pieces_of_single_parts_are_no_exemplar(self) -> None:
         apart = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (3, 0, 0))})
         assert "needs at least 2" in refusal(apart, disconnected="largest")
 
-    def test_shapes_without_a_common_type_are_refused_each_by_name(self) -> None:
+    def test_shapes_without_a_common_type_are_refused_by_name(self) -> None:
         cubes, slabs = (
             model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 0, 0))}, "cubes"),
             model({"a": (SLAB, (0, 0, 0)), "b": (SLAB, (1, 0, 0))}, "slabs"),
@@ -142,44 +142,46 @@ class TestRefusals:
         assert "slabs.glb: shares no part type" in message
         build_kit(block_config(), [cubes, slabs, model({"a": (SLAB, (0, 0, 0)), "b": (CUBE, (1, 0, 0))}, "both")])
 
-    def test_a_model_of_nothing_but_triangles_without_area_is_refused(self) -> None:
+    def test_model_of_nothing_but_triangles_without_area_is_refused(self) -> None:
         line = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0.0]]), np.array([[0, 1, 2]], dtype=np.int32)
         assert "no part has a triangle with area" in refusal(model({"a": (line, (0, 0, 0)), "b": (line, (1, 0, 0))}))
 
-    def test_what_is_refused_can_be_looked_at(self) -> None:
+    def test_refused_models_can_be_observed(self) -> None:
         seen = observe_models(block_config(), [model({"only": (CUBE, (0, 0, 0))})])
         assert len(seen.refusals) == 1
         assert len(seen.kit.types[0].symmetries) == 24
 
 
 class TestLeftOut:
-    def test_parts_in_the_place_of_another_are_left_out_and_named(self) -> None:
+    def test_coincident_parts_are_left_out_and_named(self) -> None:
         quarter = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
         again = [raw_part(name, CUBE, placed(1, 0, 0, quarter)) for name in ("again", "and again")]
         made = Model(Path("thrice.glb"), (again[0], *ring().parts, again[1]), "nodes", "", ())
         kit, report = build_kit(block_config(), [made])
         assert kit.exemplars[0].part_names == ("again", "cube.0", "cube.2", "cube.3")
         assert len(kit.exemplars[0].assembly.edges) == len(block_kit(ring()).exemplars[0].assembly.edges)
-        (warning,) = (each for each in report.warnings if "left out" in each)
+        (warning,) = (warning for warning in report.warnings if "left out" in warning)
         assert "thrice.glb: 2 parts are left out of the model: " in warning
         assert "cube.1 (it coincides with again), and again (it coincides with" in warning
 
-    def test_parts_that_only_stand_inside_each_other_stay(self) -> None:
+    def test_nested_parts_are_kept(self) -> None:
         eighth = np.array([[1, -1, 0], [1, 1, 0], [0, 0, np.sqrt(2)]]) / np.sqrt(2)
         parts = (*ring().parts, raw_part("turned", CUBE, placed(1, 0, 0, eighth)))
         seen = observe_models(block_config(), [Model(Path("turned.glb"), parts, "nodes", "", ())])
         assert len(seen.kit.exemplars[0].assembly) == len(ring().parts) + 1
 
-    def test_a_part_without_area_is_left_out_and_named(self) -> None:
+    def test_part_without_area_is_left_out_and_named(self) -> None:
         flat = CUBE[0], np.array([[0, 1, 1], [2, 2, 2]], dtype=np.int32)
         parts = model({"a": (CUBE, (0, 0, 0)), "ghost": (flat, (2, 0, 0)), "b": (CUBE, (1, 0, 0))})
         kit, report = build_kit(block_config(), [parts])
         assert kit.exemplars[0].part_names == ("a", "b")
-        assert [each for each in report.warnings if "1 part is left out of the model: ghost (it has no tri" in each]
+        assert [
+            warning for warning in report.warnings if "1 part is left out of the model: ghost (it has no tri" in warning
+        ]
 
 
 class TestWarnings:
-    def test_a_kit_in_which_nothing_repeats_says_that_nothing_can_be_exchanged(self) -> None:
+    def test_kit_in_which_nothing_repeats_says_that_nothing_can_be_exchanged(self) -> None:
         _, report = build_kit(block_config(), [model({"a": (CUBE, (0, 0, 0)), "b": (SLAB, (1, 0, 0))})])
         assert any("little or nothing can be exchanged" in warning for warning in report.warnings)
         _, report = build_kit(block_config(), [ring()])
@@ -198,7 +200,7 @@ class TestWarnings:
         assert len(kit.exemplars[0].assembly.edges) == 301
         assert any("300 part types" in warning for warning in report.warnings)
 
-    def test_a_part_that_touches_very_many_is_a_hub(self) -> None:
+    def test_part_with_many_contacts_is_a_hub(self) -> None:
         floor = {"floor": (box(30, 2, 1), (15, 0, -1))}
         posts = {f"post.{k}": (CUBE, (1 + 1.3 * k, 0.0, 0.0)) for k in range(20)}
         kit, report = build_kit(block_config(), [model(floor | posts)])
@@ -215,32 +217,32 @@ class TestWarnings:
 
 
 class TestPieces:
-    def test_they_are_numbered_from_the_largest_on(self) -> None:
+    def test_pieces_are_numbered_from_the_largest(self) -> None:
         edges = np.array([[1, 2], [3, 4], [4, 5]], dtype=np.int32)
         assembly = Assembly(np.zeros(6, np.int16), np.tile(np.eye(4), (6, 1, 1)), edges)
         assert connected_pieces(assembly).tolist() == [2, 1, 1, 0, 0, 0]
 
     @pytest.mark.parametrize(("stated", "named"), [(1e-3, "0.005"), (2e-3, "0.004"), (3e-3, "0.006")])
-    def test_the_tolerance_that_is_named_joins_them(self, stated: float, named: str) -> None:
+    def test_proposed_tolerance_joins_the_pieces(self, stated: float, named: str) -> None:
         apart = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1 + 0.0038 * np.sqrt(3), 0, 0))})
         assert f"set `contact.tolerance: {named}`" in refusal(apart, contact=ContactConfig(tolerance=stated))
         joined = block_kit(apart, contact=ContactConfig(tolerance=float(named)))
         assert joined.exemplars[0].assembly.edges.tolist() == [[0, 1]]
 
-    def test_no_tolerance_is_named_that_a_config_may_not_have(self) -> None:
+    def test_proposed_tolerance_is_allowed_in_a_config(self) -> None:
         apart = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1 + 0.045 * np.sqrt(3), 0, 0))})
         assert "set `contact.tolerance: 0.05`" in refusal(apart, contact=ContactConfig(tolerance=0.04))
         far = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1 + 0.06 * np.sqrt(3), 0, 0))})
         message = refusal(far, contact=ContactConfig(tolerance=0.04))
         assert "no contact tolerance joins them, so move the parts together in the model" in message
 
-    def test_contacts_that_do_not_count_are_thought_of(self) -> None:
+    def test_mend_considers_contacts_that_do_not_count(self) -> None:
         corner = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 1, 1))})
         message = refusal(corner, contact=ContactConfig(kinds=("face",)))
         assert "set `contact.kinds: [point, line, face]`" in message
         block_kit(corner, contact=ContactConfig(kinds=("point", "line", "face")))
 
-    def test_pieces_are_kept_or_made_exemplars_only_where_they_are_some_parts(self) -> None:
+    def test_mends_depend_on_the_sizes_of_pieces(self) -> None:
         scattered = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, FAR)})
         assert "disconnected: largest" not in refusal(scattered)
         assert "model of its own" not in refusal(scattered)
@@ -250,7 +252,7 @@ class TestPieces:
         block_kit(*map(model, halves))
 
 
-def test_a_model_a_million_units_away_has_the_same_contacts(tmp_path: Path) -> None:
+def test_model_a_million_units_away_has_the_same_contacts(tmp_path: Path) -> None:
     found = []
     for shift in (0.0, 1e6):
         glb = Glb()
@@ -263,7 +265,7 @@ def test_a_model_a_million_units_away_has_the_same_contacts(tmp_path: Path) -> N
     (near, quiet), (away, warned) = found
     assert away.exemplars[0].assembly.edges.tolist() == near.exemplars[0].assembly.edges.tolist()
     assert len(near.exemplars[0].assembly.edges) == 6
-    assert [each.kind for each in away.grammar.dockings] == [each.kind for each in near.grammar.dockings]
+    assert [docking.kind for docking in away.grammar.dockings] == [docking.kind for docking in near.grammar.dockings]
     assert quiet == ()
     assert "units from the origin" in warned[0]
 

@@ -10,7 +10,7 @@ from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import transform_points
 from tests.stages.shape.geometry.bodies import Body, box, hull, joined, placed, prism, random_rotation, sheet, sphere
 
-TOLERANCE = 1e-3
+SHARE_TOLERANCE = 1e-3
 TETRAHEDRON: Body = (
     np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]]),
     np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]], dtype=np.int32),
@@ -22,7 +22,7 @@ HELIX = joined(box(), box(at=(1, 0, 0)), box(at=(1, 1, 0)), box(at=(1, 1, 1)))
 
 def group(body: Body, reflections: bool = False) -> FloatArray:
     shape = comparable_mesh(*body)
-    return congruences(shape, shape, TOLERANCE, reflections)
+    return congruences(shape, shape, SHARE_TOLERANCE, reflections)
 
 
 def mirrored(body: Body) -> Body:
@@ -64,7 +64,7 @@ ORDERS = {
 
 
 @pytest.mark.parametrize("name", ORDERS)
-def test_the_rotations_of_a_solid_are_those_of_its_group(name: str) -> None:
+def test_rotations_of_a_solid_are_those_of_its_group(name: str) -> None:
     body, order = ORDERS[name]
     motions = group(body)
     assert len(motions) == order
@@ -86,10 +86,10 @@ def test_reflections_double_the_group_of_a_solid_that_has_any(name: str, order: 
     assert (np.linalg.det(motions[:, :3, :3]) < 0).sum() == order // 2
 
 
-def test_the_triangulation_makes_no_difference() -> None:
+def test_triangulation_makes_no_difference() -> None:
     for body, order in (ORDERS["cube"], ORDERS["pentagonal prism"], ORDERS["cube without its lid"]):
         assert len(group(split(body))) == order
-        assert len(congruences(comparable_mesh(*body), comparable_mesh(*split(body)), TOLERANCE, False)) == order
+        assert len(congruences(comparable_mesh(*body), comparable_mesh(*split(body)), SHARE_TOLERANCE, False)) == order
 
 
 def test_triangles_without_area_make_no_difference() -> None:
@@ -100,36 +100,36 @@ def test_triangles_without_area_make_no_difference() -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_a_random_motion_of_a_random_mesh_is_found_and_no_other(seed: int) -> None:
+def test_only_the_applied_rigid_transform_of_a_random_mesh_is_found(seed: int) -> None:
     rng = np.random.default_rng(seed)
     body = hull(rng)
     pose = placed(*rng.uniform(-100, 100, 3), random_rotation(rng))
     order = rng.permutation(len(body[0]))
     renamed = body[0][order], np.argsort(order)[body[1]][rng.permutation(len(body[1]))].astype(np.int32)
-    motions = congruences(comparable_mesh(*body), comparable_mesh(*moved(renamed, pose)), TOLERANCE, False)
+    motions = congruences(comparable_mesh(*body), comparable_mesh(*moved(renamed, pose)), SHARE_TOLERANCE, False)
     assert len(motions) == 1
     np.testing.assert_allclose(motions[0], pose, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ORDERS)
-def test_every_motion_between_two_placements_of_a_solid_is_found(name: str) -> None:
+def test_every_rigid_transform_between_two_placements_is_found(name: str) -> None:
     body, order = ORDERS[name]
     pose = placed(3, -2, 7, random_rotation(np.random.default_rng(4)))
     source, target = comparable_mesh(*body), comparable_mesh(*moved(body, pose))
-    motions = congruences(source, target, TOLERANCE, False)
+    motions = congruences(source, target, SHARE_TOLERANCE, False)
     assert len(motions) == order
-    assert min(np.abs(each - pose).max() for each in motions) < 1e-6
+    assert min(np.abs(motion - pose).max() for motion in motions) < 1e-6
 
 
-def test_a_screw_and_its_mirror_image_are_two_types_unless_reflections_count() -> None:
+def test_screw_and_its_mirror_image_are_two_types_unless_reflections_count() -> None:
     left, right = comparable_mesh(*HELIX), comparable_mesh(*mirrored(HELIX))
-    assert len(congruences(left, right, TOLERANCE, reflections=False)) == 0
-    motions = congruences(left, right, TOLERANCE, reflections=True)
+    assert len(congruences(left, right, SHARE_TOLERANCE, reflections=False)) == 0
+    motions = congruences(left, right, SHARE_TOLERANCE, reflections=True)
     assert len(motions) == 2
     assert (np.linalg.det(motions[:, :3, :3]) < 0).all()
 
 
-def test_a_small_turn_of_a_long_part_about_itself_is_none_of_its_motions() -> None:
+def test_small_rotation_of_a_long_part_is_no_symmetry() -> None:
     """It moves all of the part by less than the tolerance, whatever the part looks like."""
     vertices, faces = prism(6, 1.0, 60.0)
     turn = np.array([0.0, 0.01, 2.0, 2.01, 4.0, 4.01])
@@ -139,32 +139,34 @@ def test_a_small_turn_of_a_long_part_about_itself_is_none_of_its_motions() -> No
     assert len(group((vertices, faces))) == 1
     pose = placed(3, -2, 7, random_rotation(np.random.default_rng(4)))
     other = comparable_mesh(*moved((vertices, faces), pose))
-    motions = congruences(comparable_mesh(vertices, faces), other, TOLERANCE, False)
+    motions = congruences(comparable_mesh(vertices, faces), other, SHARE_TOLERANCE, False)
     assert len(motions) == 1
 
 
-def test_a_random_mesh_is_no_mirror_image_of_itself() -> None:
+def test_random_mesh_is_no_mirror_image_of_itself() -> None:
     for seed in range(5):
         body = hull(np.random.default_rng(seed))
-        assert len(congruences(comparable_mesh(*body), comparable_mesh(*mirrored(body)), TOLERANCE, False)) == 0
-        assert len(congruences(comparable_mesh(*body), comparable_mesh(*mirrored(body)), TOLERANCE, True)) == 1
+        assert len(congruences(comparable_mesh(*body), comparable_mesh(*mirrored(body)), SHARE_TOLERANCE, False)) == 0
+        assert len(congruences(comparable_mesh(*body), comparable_mesh(*mirrored(body)), SHARE_TOLERANCE, True)) == 1
 
 
-def test_a_lid_tells_a_box_from_an_open_box() -> None:
-    assert len(congruences(comparable_mesh(*box()), comparable_mesh(*box(sides=5)), TOLERANCE, False)) == 0
-    assert len(congruences(comparable_mesh(*box(sides=5)), comparable_mesh(*box()), TOLERANCE, False)) == 0
+def test_closed_and_open_boxes_are_not_congruent() -> None:
+    assert len(congruences(comparable_mesh(*box()), comparable_mesh(*box(sides=5)), SHARE_TOLERANCE, False)) == 0
+    assert len(congruences(comparable_mesh(*box(sides=5)), comparable_mesh(*box()), SHARE_TOLERANCE, False)) == 0
 
 
 def test_balls_of_other_tessellations_are_other_surfaces() -> None:
-    assert len(congruences(comparable_mesh(*sphere(16, 8)), comparable_mesh(*sphere(18, 8)), TOLERANCE, False)) == 0
+    assert (
+        len(congruences(comparable_mesh(*sphere(16, 8)), comparable_mesh(*sphere(18, 8)), SHARE_TOLERANCE, False)) == 0
+    )
 
 
 def test_tolerance_is_a_share_of_the_diagonal() -> None:
     brick = comparable_mesh(*box(1, 2, 3))
-    assert len(congruences(brick, comparable_mesh(*box(1, 2, 3.003)), TOLERANCE, False)) == 4
-    assert len(congruences(brick, comparable_mesh(*box(1, 2, 3.03)), TOLERANCE, False)) == 0
+    assert len(congruences(brick, comparable_mesh(*box(1, 2, 3.003)), SHARE_TOLERANCE, False)) == 4
+    assert len(congruences(brick, comparable_mesh(*box(1, 2, 3.03)), SHARE_TOLERANCE, False)) == 0
     tiny = comparable_mesh(*box(1e-4, 2e-4, 3e-4))
-    assert len(congruences(tiny, comparable_mesh(*box(1e-4, 2e-4, 3.0003e-4)), TOLERANCE, False)) == 4
+    assert len(congruences(tiny, comparable_mesh(*box(1e-4, 2e-4, 3.0003e-4)), SHARE_TOLERANCE, False)) == 4
 
 
 def test_noise_below_the_tolerance_changes_nothing() -> None:
@@ -174,10 +176,10 @@ def test_noise_below_the_tolerance_changes_nothing() -> None:
         noisy = vertices + rng.uniform(-1, 1, vertices.shape) * 1e-4
         assert len(group((noisy, faces))) == order
         exact, shaken = comparable_mesh(vertices, faces), comparable_mesh(noisy, faces)
-        assert len(congruences(exact, shaken, TOLERANCE, False)) == order
+        assert len(congruences(exact, shaken, SHARE_TOLERANCE, False)) == order
 
 
-def test_a_surface_says_what_it_compares() -> None:
+def test_comparable_mesh_holds_corners_and_edge_middles() -> None:
     shape = comparable_mesh(*moved(box(1, 2, 3), placed(10, 20, 30)))
     np.testing.assert_allclose(shape.centroid, [10, 20, 30])
     assert shape.area == pytest.approx(22.0)

@@ -15,7 +15,7 @@ def is_pose(frame: np.ndarray) -> bool:
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_the_frame_of_a_part_moves_with_it(seed: int) -> None:
+def test_frame_of_a_part_moves_with_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
     vertices = hull(rng)[0]
     centroid = vertices.mean(axis=0)
@@ -27,7 +27,7 @@ def test_the_frame_of_a_part_moves_with_it(seed: int) -> None:
     np.testing.assert_allclose(moved, pose @ frame, atol=1e-6)
 
 
-def test_the_axes_are_the_diagonal_and_what_stands_farthest_off_it() -> None:
+def test_axes_are_the_diagonal_and_the_direction_of_the_farthest_vertex() -> None:
     vertices = np.array([[0, 0, 0], [10, 0, 0], [3, 2, 0], [6, -1, 0.5]])
     frame = extremal_frame(vertices, np.array([4.0, 0.0, 0.0]))
     np.testing.assert_allclose(frame[:3, 0], [-1, 0, 0], atol=1e-12)

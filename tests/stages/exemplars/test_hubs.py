@@ -38,10 +38,10 @@ def test_dropped_hubs_are_neither_in_the_exemplars_nor_among_the_types() -> None
     np.testing.assert_array_equal(seen.kit.exemplars[0].assembly.edges, plain.kit.exemplars[0].assembly.edges)
     assert seen.kit.grammar.neighbourhoods == plain.kit.grammar.neighbourhoods
     assert seen.kit.grammar.hubs == ()
-    assert any("1 hubs are left out of the graph: plate" in each for each in seen.warnings)
+    assert any("1 hubs are left out of the graph: plate" in warning for warning in seen.warnings)
 
 
-def test_a_backdrop_hub_is_a_type_whose_dockings_are_known_and_that_no_neighbourhood_counts() -> None:
+def test_restored_hub_is_a_type_with_dockings_that_no_neighbourhood_counts() -> None:
     seen = observe([on_plate(3)], hubs=HubConfig(types=("plate",), restore=True))
     kit = seen.kit
     cap, link, plate = (kit.type_names().index(name) for name in ("cap", "link", "plate"))
@@ -49,11 +49,11 @@ def test_a_backdrop_hub_is_a_type_whose_dockings_are_known_and_that_no_neighbour
     assert plate not in kit.exemplars[0].assembly.types
     assert kit.grammar.neighbourhoods[cap] == {((link, 1),): 2}
     assert kit.grammar.neighbourhoods[plate] == {((cap, 2),): 1}
-    assert {(each.a, each.b) for each in kit.grammar.dockings} >= {(cap, plate)}
+    assert {(docking.a, docking.b) for docking in kit.grammar.dockings} >= {(cap, plate)}
     assert len(seen.kinds[0]) == len(seen.contacts[0]) == len(kit.exemplars[0].assembly.edges)
 
 
-def test_a_kit_with_hubs_and_a_loose_grammar_is_the_same_after_a_round_through_files(tmp_path: Any) -> None:
+def test_kit_with_hubs_and_a_loose_grammar_survives_files(tmp_path: Any) -> None:
     kit = observe([on_plate(3)], hubs=HubConfig(types=("plate",), restore=True), grammar="count_and_pairs").kit
     with (tmp_path / "k.json").open("wb") as text, (tmp_path / "k.tar").open("wb") as arrays:
         write_kit(kit, text, arrays)
@@ -62,7 +62,7 @@ def test_a_kit_with_hubs_and_a_loose_grammar_is_the_same_after_a_round_through_f
     assert read.neighbourhoods == kit.grammar.neighbourhoods
 
 
-def test_without_its_hub_an_exemplar_may_fall_apart_and_the_message_says_so() -> None:
+def test_exemplar_that_falls_apart_without_its_hub_is_refused() -> None:
     legs = [("cap", pose(-2, 0, 0)), ("cap", pose(2, 0, 0)), ("link", pose(-1.25, 0, 0))]
     legs.append(("plate", pose(0, -0.55, 0)))
     hubs = HubConfig(types=("plate",), restore=False)
@@ -76,19 +76,19 @@ def test_without_its_hub_an_exemplar_may_fall_apart_and_the_message_says_so() ->
     assert behind.kit.grammar.neighbourhoods[behind.kit.type_names().index("plate")] == {((0, 1),): 1}
 
 
-def test_nothing_is_built_while_hubs_are_undecided() -> None:
+def test_kit_with_hubs_at_auto_is_not_built() -> None:
     with pytest.raises(ConfigError, match=r"kit toy: hubs\.types must be resolved"):
         observe([on_plate(3)], hubs=HubConfig())
 
 
-def test_a_hub_that_is_no_type_is_refused_with_the_nearest_name() -> None:
+def test_unknown_hub_is_refused_with_the_nearest_name() -> None:
     with pytest.raises(ConfigError, match="'plat', which is no part type of it; did you mean 'plate'"):
         observe([on_plate(3)], hubs=HubConfig(types=("plat",)))
     with pytest.raises(ConfigError, match="every part of it is of a hub type"):
         observe([on_plate(3)], hubs=HubConfig(types=("plate", "cap", "link")))
 
 
-def test_a_loose_grammar_of_parts_that_touch_very_many_others_is_no_reason_to_refuse() -> None:
+def test_loose_grammar_of_parts_with_many_contacts_is_accepted() -> None:
     sizes = np.linspace(0.4, 0.9, 14)
     meshes = {"floor": box(40.0, 0.1, 2.0), **{f"t{index}": box(size, size, size) for index, size in enumerate(sizes)}}
     shape: list[Placed] = [("floor", pose(0, -0.05, 0))]
@@ -109,7 +109,7 @@ def renamed(model: Model, turn: np.ndarray) -> Model:
     return Model(model.path.with_name("renamed.glb"), tuple(parts), "nodes", "", ())
 
 
-def test_a_renamed_and_turned_copy_has_the_same_types_and_its_names_are_told() -> None:
+def test_renamed_and_rotated_copy_has_the_same_types_and_aliases() -> None:
     shapes = [chain(3)]
     model = models_of(CHAIN, shapes)[0]
     turn = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3])
@@ -119,7 +119,7 @@ def test_a_renamed_and_turned_copy_has_the_same_types_and_its_names_are_told() -
     assert seen.kit.type_names() == ("cap", "link")
     assert seen.aliases == {"cap": ("pac",), "link": ("knil",)}
     assert alone.aliases == {}
-    first, second = (each.assembly for each in seen.kit.exemplars)
+    first, second = (exemplar.assembly for exemplar in seen.kit.exemplars)
     np.testing.assert_array_equal(first.types, second.types)
     np.testing.assert_array_equal(first.edges, second.edges)
     assert len(seen.kit.grammar.dockings) == len(alone.kit.grammar.dockings)

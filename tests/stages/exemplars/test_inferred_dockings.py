@@ -21,8 +21,8 @@ def kit() -> Kit:
 
 
 def fits(kit: Kit) -> dict[tuple[str, str], Docking]:
-    found = [each for each in kit.grammar.dockings if each.slack]
-    by_names = {(kit.types[each.a].name, kit.types[each.b].name): each for each in found}
+    found = [docking for docking in kit.grammar.dockings if docking.slack]
+    by_names = {(kit.types[part_type.a].name, kit.types[part_type.b].name): part_type for part_type in found}
     assert len(by_names) == len(found)
     return by_names
 
@@ -35,10 +35,10 @@ def test_every_leg_fits_under_every_corner_of_every_top(kit: Kit) -> None:
     assert np.abs(under_thin) == pytest.approx([0.8, 0.1 + 0.5, 0.8])
     over_square = found["leg", "top_2"].pose[:3, 3]
     assert np.abs(over_square) == pytest.approx([0.8, 0.15 + 0.5, 0.8])
-    assert all(each.count == 0 and each.kind == "face" and each.depth == 0 for each in found.values())
+    assert all(docking.count == 0 and docking.kind == "face" and docking.depth == 0 for docking in found.values())
 
 
-def test_a_shorter_leg_hangs_from_the_top() -> None:
+def test_shorter_leg_hangs_from_the_top() -> None:
     kit = table_kit(table(THIN, SQUARE), table(THICK, SHORT))
     assert np.abs(fits(kit)["top", "leg_2"].pose[:3, 3]) == pytest.approx([0.8, 0.1 + 0.25, 0.8])
 
@@ -46,27 +46,27 @@ def test_a_shorter_leg_hangs_from_the_top() -> None:
 def test_slack_is_a_share_of_the_median_part_and_no_more_than_a_quarter_of_the_contact() -> None:
     tables = table(THIN, SQUARE), table(THICK, ROUND)
     small = table_kit(*tables, fit_tolerance=0.01)
-    diagonals = [small.types[index].diagonal for each in small.exemplars for index in each.assembly.types]
-    assert [each.slack for each in fits(small).values()] == pytest.approx([0.01 * np.median(diagonals)] * 4)
+    diagonals = [small.types[index].diagonal for exemplar in small.exemplars for index in exemplar.assembly.types]
+    assert [docking.slack for docking in fits(small).values()] == pytest.approx([0.01 * np.median(diagonals)] * 4)
     large = fits(table_kit(*tables, fit_tolerance=0.2))
     assert large["top", "leg"].slack == pytest.approx(0.25 * np.hypot(0.2, 0.2), rel=0.05)
 
 
-def test_labels_of_one_surface_and_labels_that_never_met_have_no_fits() -> None:
+def test_labels_of_one_surface_or_without_contact_infer_nothing() -> None:
     assert not fits(table_kit(table(THIN, SQUARE), table(THIN, SQUARE, reach=0.7)))
     kit = table_kit(table(THIN, SQUARE), table(THICK, ROUND))
-    assert not any(kit.types[each.a].label == kit.types[each.b].label for each in fits(kit).values())
+    assert not any(kit.types[part_type.a].label == kit.types[part_type.b].label for part_type in fits(kit).values())
 
 
-def test_parts_touch_where_they_fit(kit: Kit) -> None:
+def test_parts_touch_at_inferred_dockings(kit: Kit) -> None:
     contact = ContactTest(kit.types, kit.contact_tolerance)
-    for each in fits(kit).values():
-        assert contact.touches(each.a, each.b, each.pose)
+    for docking in fits(kit).values():
+        assert contact.touches(docking.a, docking.b, docking.pose)
 
 
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 3), st.floats(0, 2), st.tuples(*[st.floats(-1, 1)] * 3), st.booleans())
-def test_a_fit_holds_within_its_slack_at_every_image_and_from_both_sides(
+def test_inferred_docking_holds_within_its_slack_at_every_image_and_from_both_sides(
     quarter_turns: int, share: float, direction: tuple[float, float, float], is_back: bool
 ) -> None:
     kit = table_kit_of_both()
@@ -94,7 +94,7 @@ def table_kit_of_both() -> Kit:
     return _KITS[0]
 
 
-def test_the_poses_of_a_pair_are_those_seen_and_those_that_fit(kit: Kit) -> None:
+def test_poses_of_a_pair_are_observed_and_inferred_ones(kit: Kit) -> None:
     table = DockingTable.of(kit)
     corners = {(x, z) for x in (-0.8, 0.8) for z in (-0.8, 0.8)}
     for top in (0, 2):

@@ -16,7 +16,7 @@ from stages.exemplars.settings import KitConfig
 from tests.toy_kits.chains_and_rings import config_of
 from tests.toy_kits.tables import ROUND, SQUARE, THICK, THIN, table, table_kit
 
-MEANINGS = {"top": ("p0",), "leg": ("p[1-4]",)}
+LABEL_MAP = {"top": ("p0",), "leg": ("p[1-4]",)}
 
 
 def numbered(model: Model, folder: str) -> Model:
@@ -31,38 +31,38 @@ def numbered(model: Model, folder: str) -> Model:
 ONE, TWO = numbered(table(THIN, SQUARE), "low"), numbered(table(THICK, ROUND), "high")
 
 
-def named(meanings: dict[str, tuple[str, ...]], *models: Model) -> list[list[str | None]]:
-    config = config_of([[] for _ in models]).model_copy(update={"types": "meaning", "label_map": meanings})
+def named(label_map: dict[str, tuple[str, ...]], *models: Model) -> list[list[str | None]]:
+    config = config_of([[] for _ in models]).model_copy(update={"types": "meaning", "label_map": label_map})
     return [[part.label for part in parts] for parts in apply_label_map(models, config)]
 
 
-def test_numbered_parts_make_the_kit_that_named_ones_make() -> None:
-    said, told = table_kit(ONE, TWO, label_map=MEANINGS), table_kit(table(THIN, SQUARE), table(THICK, ROUND))
-    assert said.labels == told.labels == ("top", "leg")
-    assert said.grammar.neighbourhoods == told.grammar.neighbourhoods
-    assert np.array_equal(*([each.pose for each in kit.grammar.dockings] for kit in (said, told)))
+def test_labelled_numbered_parts_make_the_same_kit_as_named_ones() -> None:
+    numbered, named_kit = table_kit(ONE, TWO, label_map=LABEL_MAP), table_kit(table(THIN, SQUARE), table(THICK, ROUND))
+    assert numbered.labels == named_kit.labels == ("top", "leg")
+    assert numbered.grammar.neighbourhoods == named_kit.grammar.neighbourhoods
+    assert np.array_equal(*([docking.pose for docking in kit.grammar.dockings] for kit in (numbered, named_kit)))
 
 
-def test_the_first_meaning_that_fits_counts_and_what_none_fits_keeps_its_label() -> None:
+def test_first_fitting_label_counts_and_other_parts_keep_theirs() -> None:
     assert named({"top": ("p0",), "leg": ("p*",)}, ONE) == [["top", "leg", "leg", "leg", "leg"]]
     assert named({"front": ("p1", "p2")}, table(THIN, SQUARE), ONE)[0] == ["top", "leg", "leg", "leg", "leg"]
 
 
-def test_a_pattern_with_a_stroke_speaks_of_one_model_by_its_file_or_folder() -> None:
+def test_pattern_with_a_slash_is_limited_to_one_file_or_folder() -> None:
     assert named({"x": ("low/p0",)}, ONE, TWO) == [["x", *[None] * 4], [None] * 5]
     assert named({"x": ("model/p0",)}, ONE, TWO) == [["x", *[None] * 4], ["x", *[None] * 4]]
 
 
-def test_meshes_and_labels_are_names_too() -> None:
+def test_patterns_match_meshes_and_labels_too() -> None:
     assert named({"x": ("mleg*",)}, ONE) == [[None, *["x"] * 4]]
     assert named({"x": ("leg",)}, table(THIN, SQUARE)) == [["top", *["x"] * 4]]
 
 
-def test_a_pattern_that_fits_nothing_is_refused_with_the_names_that_there_are() -> None:
+def test_pattern_without_a_match_is_refused_with_the_part_names() -> None:
     with pytest.raises(ConfigError, match=r"kit toy: label_map\.leg: .* called 'q\*'; parts are called p0, p1, .*p4$"):
         named({"top": ("p0",), "leg": ("p1", "q*")}, ONE)
 
 
-def test_meanings_are_refused_where_types_go_by_congruence() -> None:
+def test_label_map_is_refused_if_types_go_by_congruence() -> None:
     with pytest.raises(ValidationError, match="set `types: meaning`"):
-        KitConfig.model_validate({"name": "toy", "shapes": (Path(__file__),), "label_map": MEANINGS})
+        KitConfig.model_validate({"name": "toy", "shapes": (Path(__file__),), "label_map": LABEL_MAP})

@@ -33,12 +33,12 @@ def test_surfaces_of_one_label_are_types_of_their_own_with_one_meaning(kit: Kit)
     assert kit.type_names() == ("top", "leg", "top_2", "leg_2")
     assert kit.labels == ("top", "leg")
     assert kit.label_of.tolist() == [0, 1, 0, 1]
-    assert {len(each.symmetries) for each in kit.types if each.label == "leg"} == {8, 16}
+    assert {len(part_type.symmetries) for part_type in kit.types if part_type.label == "leg"} == {8, 16}
 
 
 def test_neighbourhoods_are_those_of_labels_and_dockings_those_of_surfaces(kit: Kit) -> None:
     assert kit.grammar.neighbourhoods == {0: {((1, 4),): 2}, 1: {((0, 1),): 8}}
-    seen = [(each.a, each.b, each.count) for each in kit.grammar.dockings if each.count]
+    seen = [(docking.a, docking.b, docking.count) for docking in kit.grammar.dockings if docking.count]
     assert seen == [(0, 1, 4), (2, 3, 4)]
 
 
@@ -51,17 +51,17 @@ def test_neighbourhoods_are_those_of_labels_also_where_parts_stand_apart_and_are
     assert kit.grammar.neighbourhoods == {0: {((1, 4),): 2}, 1: {((0, 1),): 8}}
 
 
-def test_a_kit_by_congruence_or_labels_says_nothing_of_meanings() -> None:
+def test_kit_by_congruence_or_labels_has_no_labels_by_meaning_in_its_file() -> None:
     for types in ("congruence", "labels"):
         kit = table_kit(table(THIN, SQUARE), table(THIN, SHORT), types=types)
         assert kit.labels == kit.type_names()
         assert kit.label_of.tolist() == list(range(len(kit.types)))
         described = kit_json(kit)
-        assert all("meaning" not in each for each in described["types"])
-        assert all(each["seen"] and "slack" not in each for each in described["dockings"])
+        assert all("meaning" not in part_type for part_type in described["types"])
+        assert all(docking["seen"] and "slack" not in docking for docking in described["dockings"])
 
 
-def test_a_part_is_called_by_its_meaning_and_its_name_tells_its_surface(kit: Kit) -> None:
+def test_part_label_is_its_meaning_and_part_name_its_surface(kit: Kit) -> None:
     shape = kit_shape(kit, kit.exemplars[1].assembly)
     assert shape.labels == ("top", "leg")
     assert shape.part_labels.tolist() == [0, 1, 1, 1, 1]
@@ -89,13 +89,13 @@ def faults(kit: Kit, assembly: Assembly) -> list[str]:
     return geometry_faults(kit, members)
 
 
-def test_the_independent_look_takes_labels_for_neighbourhoods_and_surfaces_for_contacts(kit: Kit) -> None:
+def test_geometry_check_uses_labels_for_neighbourhoods_and_surfaces_for_contacts(kit: Kit) -> None:
     assembly = mixed(kit)
     assert faults(kit, assembly) == []
     three = Assembly(assembly.types[:4], assembly.poses[:4], assembly.edges[:3])
     assert faults(kit, three) == ["top.000 has a neighbourhood that the grammar does not admit: 3 leg"]
     assembly.poses[1, 1, 3] += 0.05
-    assert any("reach" in each and "into each other" in each for each in faults(kit, assembly))
+    assert any("reach" in fault and "into fault other" in fault for fault in faults(kit, assembly))
 
 
 def test_hubs_cannot_be_left_out_by_meaning() -> None:

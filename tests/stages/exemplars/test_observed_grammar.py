@@ -25,7 +25,7 @@ def row(count: int) -> dict[str, tuple[tuple[np.ndarray, np.ndarray], tuple[floa
 
 
 class TestNeighbourhoods:
-    def test_a_ring_of_four_has_one_for_all(self) -> None:
+    def test_ring_of_four_has_one_for_all(self) -> None:
         kit = block_kit(ring())
         assert kit.grammar.neighbourhoods == {0: {((0, 3),): 4}}
         assert kit.exemplars[0].assembly.edges.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
@@ -34,9 +34,9 @@ class TestNeighbourhoods:
         kit = block_kit(ring(), contact=FACES)
         assert kit.grammar.neighbourhoods == {0: {((0, 2),): 4}}
         assert kit.exemplars[0].assembly.edges.tolist() == [[0, 1], [0, 3], [1, 2], [2, 3]]
-        assert {each.kind for each in kit.grammar.dockings} == {"face"}
+        assert {docking.kind for docking in kit.grammar.dockings} == {"face"}
 
-    def test_a_row_has_ends_and_a_middle(self) -> None:
+    def test_row_has_ends_and_a_middle(self) -> None:
         assert block_kit(model(row(5))).grammar.neighbourhoods == {0: {((0, 1),): 2, ((0, 2),): 3}}
 
     def test_several_shapes_and_types_count_together(self) -> None:
@@ -52,9 +52,9 @@ class TestNeighbourhoods:
 
 class TestDockings:
     def test_cubes_in_a_ring_dock_in_two_ways_whichever_side_they_show(self) -> None:
-        found = {each.kind: each for each in block_kit(ring()).grammar.dockings}
-        assert {kind: each.count for kind, each in found.items()} == {"face": 4, "line": 2}
-        assert all(each.depth == pytest.approx(0.0, abs=1e-5) for each in found.values())
+        found = {docking.kind: docking for docking in block_kit(ring()).grammar.dockings}
+        assert {kind: docking.count for kind, docking in found.items()} == {"face": 4, "line": 2}
+        assert all(docking.depth == pytest.approx(0.0, abs=1e-5) for docking in found.values())
         assert np.linalg.norm(found["line"].pose[:3, 3]) == pytest.approx(np.sqrt(2))
 
     def test_turning_a_cube_in_itself_makes_no_docking_of_its_own(self) -> None:
@@ -64,7 +64,7 @@ class TestDockings:
         turned.parts[1].pose[:3, :3] = quarter
         assert len(block_kit(straight).grammar.dockings) == len(block_kit(turned).grammar.dockings) == 1
 
-    def test_a_slab_docks_with_its_end_and_with_its_side(self) -> None:
+    def test_slab_docks_with_its_end_and_with_its_side(self) -> None:
         parts = {
             "slab": (SLAB, (0, 0, 0)),
             "end": (CUBE, (0, 0, 1.5)),
@@ -72,8 +72,8 @@ class TestDockings:
             "far": (CUBE, (0, 1, -0.5)),
         }
         dockings = block_kit(model(parts), contact=FACES).grammar.dockings
-        slab_and_cube = [each for each in dockings if each.a != each.b]
-        assert sorted(each.count for each in slab_and_cube) == [1, 2]
+        slab_and_cube = [docking for docking in dockings if docking.a != docking.b]
+        assert sorted(docking.count for docking in slab_and_cube) == [1, 2]
 
     def test_both_ends_of_a_docking_of_two_alike_parts_are_one(self) -> None:
         rng = np.random.default_rng(2)
@@ -94,7 +94,7 @@ class TestDockings:
             poses += [placed(0, 9.0 * index), placed(1.0, 9.0 * index + shift * 1e-3)]
         edges = np.arange(8, dtype=np.int32).reshape(-1, 2)
         found = observe_dockings(types, [Assembly(np.zeros(8, np.int16), np.array(poses), edges)], 1e-3)
-        assert [each.count for each in found] == [3, 1]
+        assert [docking.count for docking in found] == [3, 1]
 
     def test_every_contact_of_an_exemplar_is_found_again_in_the_table(self) -> None:
         rng = np.random.default_rng(4)
@@ -110,17 +110,17 @@ class TestDockings:
         labels = DockingTable(types, grammar.dockings, 0.01).label_edges(kinds, poses, assembly.edges)
         assert len(labels) > 5
         assert labels.min() >= 0
-        assert sum(each.count for each in grammar.dockings) == len(assembly.edges) == len(found)
+        assert sum(docking.count for docking in grammar.dockings) == len(assembly.edges) == len(found)
         assert [grammar.dockings[label].kind for label in (labels[:, 0] // 2).tolist()] == list(found)
 
-    def test_depth_is_how_far_parts_reach_into_each_other(self) -> None:
+    def test_depth_is_the_penetration_of_two_parts(self) -> None:
         parts = {"a": (CUBE, (0, 0, 0)), "b": (CUBE, (0.75, 0, 0)), "c": (CUBE, (1.5, 0, 0))}
         (docking,) = block_kit(model(parts)).grammar.dockings
         assert docking.depth == pytest.approx(0.25, abs=1e-3)
 
 
 class TestNested:
-    def test_parts_inside_each_other_without_contact_are_noted_with_their_depth(self) -> None:
+    def test_nested_parts_without_contact_have_their_depth(self) -> None:
         types: list[PartType] = [part(box(2, 2, 2), "big"), part(box(0.5, 0.5, 0.5), "small")]
         contact = ContactTest(types, 1e-3)
         poses = np.array([placed(), placed(0, 0, 0), placed(5, 0, 0)])

@@ -1,4 +1,4 @@
-"""Whose the exemplars are: said in the config, asked for where it is not, and no reason to make shapes anew."""
+"""Credits of exemplars: stated in the config, requested if missing, and no reason to rebuild shapes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def files(tmp_path: Path) -> list[str]:
     return [str(path) for path in paths]
 
 
-def test_a_file_has_the_credit_of_its_kit_unless_it_has_its_own(files: list[str], tmp_path: Path) -> None:
+def test_file_has_the_credit_of_its_kit_unless_it_has_its_own(files: list[str], tmp_path: Path) -> None:
     own = {"path": files[1], "credit": {"author": "B", "license": "CC0-1.0"}}
     kit = {"author": "A", "license": "MIT", "source": "https://example.org", "notice": "Copyright A"}
     one, two = exemplar_origins(config_of(tmp_path, {"name": "k", "shapes": [files[0], own], "credit": kit}))
@@ -44,20 +44,20 @@ def test_a_file_has_the_credit_of_its_kit_unless_it_has_its_own(files: list[str]
     assert missing_licenses([one, two]) == []
 
 
-def test_a_licence_that_nobody_states_is_asked_for_by_name(files: list[str], tmp_path: Path) -> None:
+def test_licence_that_nobody_states_is_asked_for_by_name(files: list[str], tmp_path: Path) -> None:
     origins = exemplar_origins(config_of(tmp_path, {"name": "k", "shapes": files[:1], "credit": {"author": "A"}}))
     (sentence,) = missing_licenses(origins)
     assert sentence.startswith("licence of models/one.glb: not stated; say it with exemplars.kits[k].credit")
 
 
-def test_a_credit_changes_nothing_that_shapes_are_made_by(files: list[str], tmp_path: Path) -> None:
+def test_credit_changes_nothing_that_shapes_are_made_by(files: list[str], tmp_path: Path) -> None:
     bare = config_of(tmp_path, {"name": "k", "shapes": files}).section(ExemplarsConfig)
-    said = [{"path": each, "credit": {"author": "B"}} for each in files]
-    full = config_of(tmp_path, {"name": "k", "shapes": said, "credit": {"license": "MIT"}}).section(ExemplarsConfig)
+    stated = [{"path": file, "credit": {"author": "B"}} for file in files]
+    full = config_of(tmp_path, {"name": "k", "shapes": stated, "credit": {"license": "MIT"}}).section(ExemplarsConfig)
     assert bare.model_dump(mode="json") == full.model_dump(mode="json")
 
 
-def test_a_mistake_in_a_shape_is_named_with_its_place(files: list[str], tmp_path: Path) -> None:
+def test_mistake_in_a_shape_is_named_with_its_place(files: list[str], tmp_path: Path) -> None:
     wrong = [files[0] + "b", {"path": files[0], "autor": "A"}]
     with pytest.raises(ConfigError) as error:
         config_of(tmp_path, {"name": "k", "shapes": wrong})

@@ -62,7 +62,7 @@ def check_boxes(model: Model) -> None:
 def merged() -> Any:
     import trimesh
 
-    return trimesh.util.concatenate([trimesh.Trimesh(each, BOX_FACES, process=False) for each in BOXES.values()])
+    return trimesh.util.concatenate([trimesh.Trimesh(box, BOX_FACES, process=False) for box in BOXES.values()])
 
 
 class TestFormats:
@@ -73,7 +73,7 @@ class TestFormats:
         assert model.segmentation == "nodes"
         assert model.warnings == ()
 
-    def test_gltf_with_a_buffer_beside_it_gives_its_nodes(self, tmp_path: Path) -> None:
+    def test_gltf_with_an_external_buffer_gives_its_nodes(self, tmp_path: Path) -> None:
         glb = boxes_glb()
         (tmp_path / "all parts.bin").write_bytes(glb.chunk)
         glb.header["buffers"] = [{"byteLength": len(glb.chunk), "uri": "all%20parts.bin"}]
@@ -98,22 +98,22 @@ class TestFormats:
         assert model.segmentation == "objects"
 
     @pytest.mark.parametrize("suffix", ["ply", "stl", "off"])
-    def test_a_single_mesh_gives_its_components(self, tmp_path: Path, suffix: str) -> None:
+    def test_single_mesh_gives_its_components(self, tmp_path: Path, suffix: str) -> None:
         merged().export(tmp_path / f"m.{suffix}")
         model = read_model(tmp_path / f"m.{suffix}")
         check_boxes(model)
         assert model.segmentation == "components"
         assert "3 connected components" in model.why
 
-    def test_an_ascii_ply_gives_its_components(self, tmp_path: Path) -> None:
+    def test_ascii_ply_gives_its_components(self, tmp_path: Path) -> None:
         (tmp_path / "m.ply").write_bytes(merged().export(file_type="ply", encoding="ascii"))
         check_boxes(read_model(tmp_path / "m.ply"))
 
-    def test_an_ascii_stl_gives_its_solids(self, tmp_path: Path) -> None:
+    def test_ascii_stl_gives_its_solids(self, tmp_path: Path) -> None:
         import trimesh
 
         solids = [
-            trimesh.Trimesh(each, BOX_FACES, process=False).export(file_type="stl_ascii") for each in BOXES.values()
+            trimesh.Trimesh(box, BOX_FACES, process=False).export(file_type="stl_ascii") for box in BOXES.values()
         ]
         named = [text.replace("solid", f"solid {name}", 1) for name, text in zip(BOXES, solids, strict=True)]
         (tmp_path / "m.stl").write_text("\n".join(named))
@@ -125,7 +125,7 @@ class TestFormats:
         import trimesh
         from trimesh.exchange.dae import export_collada
 
-        meshes = [trimesh.Trimesh(each, BOX_FACES, process=False) for each in BOXES.values()]
+        meshes = [trimesh.Trimesh(box, BOX_FACES, process=False) for box in BOXES.values()]
         (tmp_path / "m.dae").write_bytes(export_collada(meshes))
         model = read_model(tmp_path / "m.dae")
         check_boxes(model)
@@ -286,7 +286,7 @@ class TestColors:
         assert len(np.unique(plain.face_colors)) == 1
 
     @pytest.mark.parametrize("embedded", [True, False])
-    def test_textures_are_sampled_under_the_centroid_of_each_face(self, tmp_path: Path, embedded: bool) -> None:
+    def test_textures_are_sampled_under_the_centroid_of_faces(self, tmp_path: Path, embedded: bool) -> None:
         glb = Glb()
         pixels = np.array([[[200, 0, 0], [0, 200, 0]], [[0, 0, 200], [90, 90, 90]]])
         if embedded:
@@ -306,7 +306,7 @@ class TestColors:
         part = read_model(glb.write(tmp_path / "m.glb"), "nodes").parts[0]
         assert part.face_colors.tolist() == [[200, 0, 0], [0, 200, 0], [0, 0, 200], [90, 90, 90]]
 
-    def test_a_texture_that_is_no_image_is_a_warning(self, tmp_path: Path) -> None:
+    def test_texture_that_is_no_image_is_a_warning(self, tmp_path: Path) -> None:
         glb = Glb()
         glb.header["images"] = [{"uri": "gone.png"}, {"bufferView": glb.view(b"no image")}]
         glb.header["textures"] = [{"source": 0}, {"source": 1}]
@@ -429,7 +429,7 @@ f 1 2 \\
         colors = [part.face_colors[0].tolist() for part in read_model(tmp_path / "m.obj").parts]
         assert colors == [[0, 255, 0], [255, 0, 0], [255, 0, 0]]
 
-    def test_a_missing_library_is_a_warning(self, tmp_path: Path) -> None:
+    def test_missing_library_is_a_warning(self, tmp_path: Path) -> None:
         model = read_model(write_obj(tmp_path / "m.obj", BOXES, "mtllib gone.mtl"))
         check_boxes(model)
         assert "gone.mtl" in model.warnings[0]
@@ -439,7 +439,7 @@ f 1 2 \\
         path.write_text("o everything\n" + path.read_text().replace("\no ", "\ng "))
         assert [part.name for part in read_model(path).parts] == list(BOXES)
 
-    def test_an_object_that_is_taken_up_again_is_one_part(self, tmp_path: Path) -> None:
+    def test_object_that_is_taken_up_again_is_one_part(self, tmp_path: Path) -> None:
         path = write_obj(tmp_path / "m.obj", BOXES)
         path.write_text(path.read_text() + "o base\nf 1 2 3\n")
         model = read_model(path)
@@ -461,7 +461,7 @@ f 1 2 \\
         assert areas.sum() == pytest.approx(-(5 + 2 + 2 + 1) - 1)
 
     @pytest.mark.parametrize("line", ["f 1 2 99", "f 1 2 0", "v 1 2", "v a b c", "f 1 2 x"])
-    def test_a_broken_line_is_named(self, tmp_path: Path, line: str) -> None:
+    def test_broken_line_is_named(self, tmp_path: Path, line: str) -> None:
         path = write_obj(tmp_path / "m.obj", BOXES)
         count = len(path.read_text().splitlines())
         path.write_text(path.read_text() + line + "\n")
@@ -504,7 +504,7 @@ class TestDae:
 
 
 class TestBadFiles:
-    def test_a_glb_that_is_cut_off_anywhere_is_refused(self, tmp_path: Path) -> None:
+    def test_glb_that_is_cut_off_anywhere_is_refused(self, tmp_path: Path) -> None:
         content = boxes_glb().content()
         for length in [1, 3, 11, 13, 19, 21, *range(30, len(content), 97), len(content) - 1]:
             (tmp_path / "m.glb").write_bytes(content[:length])
@@ -520,7 +520,7 @@ class TestBadFiles:
             with pytest.raises(ConfigError, match=f"m.{suffix}: (not a whole|holds no triangles)"):
                 read_model(tmp_path / f"m.{suffix}")
 
-    def test_a_cut_off_ascii_stl_is_refused(self, tmp_path: Path) -> None:
+    def test_cut_off_ascii_stl_is_refused(self, tmp_path: Path) -> None:
         text = merged().export(file_type="stl_ascii")
         (tmp_path / "m.stl").write_text(text[: len(text) // 2])
         with pytest.raises(ConfigError, match="does not end"):
@@ -528,7 +528,7 @@ class TestBadFiles:
 
     @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
     @given(st.lists(st.tuples(st.integers(0, 10_000), st.integers(0, 255)), min_size=1, max_size=6))
-    def test_a_damaged_glb_is_read_or_refused_but_never_breaks(
+    def test_damaged_glb_is_read_or_refused_but_never_breaks(
         self, tmp_path: Path, damage: list[tuple[int, int]]
     ) -> None:
         content = bytearray(boxes_glb().content())
@@ -540,7 +540,7 @@ class TestBadFiles:
             parts = parse_model(tmp_path / "m.glb", "nodes", ReadLimits()).parts
         assert all(np.isfinite(part.vertices).all() for part in parts)
 
-    def test_an_external_buffer_that_is_too_short_is_refused(self, tmp_path: Path) -> None:
+    def test_external_buffer_that_is_too_short_is_refused(self, tmp_path: Path) -> None:
         glb = boxes_glb()
         (tmp_path / "m.bin").write_bytes(glb.chunk[:-40])
         glb.header["buffers"] = [{"byteLength": len(glb.chunk), "uri": "m.bin"}]
@@ -551,7 +551,7 @@ class TestBadFiles:
         with pytest.raises(ConfigError, match=r"'m.bin', which is missing"):
             read_model(tmp_path / "m.gltf")
 
-    def test_a_mesh_without_triangles_is_refused(self, tmp_path: Path) -> None:
+    def test_mesh_without_triangles_is_refused(self, tmp_path: Path) -> None:
         glb = Glb()
         glb.node(name="nothing", mesh=glb.mesh(glb.primitive(box(), np.empty((0, 3)))))
         glb.write(tmp_path / "m.glb")
@@ -580,12 +580,12 @@ class TestBadFiles:
         with pytest.raises(ConfigError, match="part 'bad' has 1 vertices that are not finite"):
             read_model(write_obj(tmp_path / "m.obj", {**BOXES, "bad": broken}))
 
-    def test_a_vertex_that_no_face_uses_may_be_anything(self, tmp_path: Path) -> None:
+    def test_vertex_that_no_face_uses_may_be_anything(self, tmp_path: Path) -> None:
         glb = Glb()
         glb.node(mesh=glb.mesh(glb.primitive(np.vstack([box(), [[np.nan] * 3]]), BOX_FACES)))
         assert np.isfinite(read_model(glb.write(tmp_path / "m.glb"), "nodes").parts[0].vertices).all()
 
-    def test_a_face_on_a_missing_vertex_is_refused(self, tmp_path: Path) -> None:
+    def test_face_on_a_missing_vertex_is_refused(self, tmp_path: Path) -> None:
         glb = Glb()
         glb.node(mesh=glb.mesh(glb.primitive(box(), BOX_FACES + 5), name="cube"))
         with pytest.raises(ConfigError, match=r"'cube'.*vertex 12 of 8"):
@@ -641,7 +641,7 @@ class TestBadFiles:
                 read_model(tmp_path / name)
 
     @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-    def test_a_file_without_permission_is_refused(self, tmp_path: Path) -> None:
+    def test_file_without_permission_is_refused(self, tmp_path: Path) -> None:
         path = boxes_glb().write(tmp_path / "m.glb")
         path.chmod(0)
         with pytest.raises(ConfigError, match="permission"):
@@ -650,7 +650,7 @@ class TestBadFiles:
 
 class TestSize:
     @pytest.mark.parametrize(("scale", "said"), [(1e-12, "e-12 units across"), (1e12, "e+12 units across")])
-    def test_a_model_that_numbers_cannot_carry_is_refused_with_its_size(
+    def test_model_that_numbers_cannot_carry_is_refused_with_its_size(
         self, scale: float, said: str, tmp_path: Path
     ) -> None:
         scaled = boxes_glb()
@@ -662,7 +662,7 @@ class TestSize:
         assert "scaled.glb: the model is" in str(caught.value)
 
     @pytest.mark.parametrize("scale", [2.0**-26, 2.0**26])
-    def test_a_model_of_any_size_in_use_has_the_same_parts(self, scale: float, tmp_path: Path) -> None:
+    def test_model_of_any_size_in_use_has_the_same_parts(self, scale: float, tmp_path: Path) -> None:
         scaled = boxes_glb()
         scaled.header["scenes"] = [{"nodes": [3]}]
         scaled.node(root=False, children=[0, 1, 2], scale=[scale] * 3)
@@ -673,7 +673,7 @@ class TestSize:
 
 
 class TestFarFromTheOrigin:
-    def test_a_million_unit_offset_changes_no_relative_pose(self, tmp_path: Path) -> None:
+    def test_million_unit_offset_changes_no_relative_pose(self, tmp_path: Path) -> None:
         # halves and whole numbers are exact in 32 bits a million units away
         at_home = boxes_glb()
         away = boxes_glb()
@@ -689,7 +689,7 @@ class TestFarFromTheOrigin:
             np.testing.assert_allclose(moved, one.pose[:3, 3] - home.parts[0].pose[:3, 3], atol=1e-9)
         assert np.abs([part.pose for part in far.parts]).max() < 10
 
-    def test_an_offset_in_the_vertices_is_taken_off_too(self, tmp_path: Path) -> None:
+    def test_offset_in_the_vertices_is_taken_off_too(self, tmp_path: Path) -> None:
         shift = np.array([1_000_000, 0, -4_000_000])
         write_obj(tmp_path / "far.obj", {name: corners + shift for name, corners in BOXES.items()})
         write_obj(tmp_path / "home.obj", BOXES)
@@ -794,7 +794,7 @@ class TestEnclosure:
                 assert "outside the folder" in warning
         assert str(path) in opened
         assert [
-            each for each in opened if each.startswith(str(tmp_path)) and ("secret" in each or "link" in each)
+            path for path in opened if path.startswith(str(tmp_path)) and ("secret" in path or "link" in path)
         ] == []
 
     def test_files_in_folders_below_are_read(self, tmp_path: Path) -> None:
@@ -802,7 +802,7 @@ class TestEnclosure:
         (tmp_path / "maps" / "deep" / "b.bin").write_bytes(boxes_glb().chunk)
         check_boxes(read_model(gltf_buffer(tmp_path, "maps/./deep/../deep/b.bin")))
 
-    def test_a_data_uri_needs_no_file(self, tmp_path: Path) -> None:
+    def test_data_uri_needs_no_file(self, tmp_path: Path) -> None:
         import base64
 
         text = base64.b64encode(boxes_glb().chunk).decode()
@@ -813,14 +813,14 @@ class TestEnclosure:
 
 @pytest.mark.skipif(not EXEMPLARS.is_dir(), reason="the real exemplars are not here")
 def test_real_exemplars_have_the_parts_of_their_lists_in_order() -> None:
-    folders = sorted(each.parent for each in EXEMPLARS.glob("*/exemplar.json"))
+    folders = sorted(file.parent for file in EXEMPLARS.glob("*/exemplar.json"))
     assert len(folders) >= 29
     for folder in folders:
         described = json.loads((folder / "exemplar.json").read_text())
         model = read_model(folder / "model.glb", "nodes")
         if "part_list" in described:
-            assert [part.name for part in model.parts] == [each["node"] for each in described["part_list"]], folder.name
-            assert [part.label for part in model.parts] == [each["type"] for each in described["part_list"]], (
+            assert [part.name for part in model.parts] == [part["node"] for part in described["part_list"]], folder.name
+            assert [part.label for part in model.parts] == [part["type"] for part in described["part_list"]], (
                 folder.name
             )
             assert len({part.mesh_name for part in model.parts}) == described["types"], folder.name

@@ -23,13 +23,13 @@ TOLERANCES = {"h01": 5e-3, "h03": 5e-3, "h04": 1e-2, "h06": 1e-2, "h09": 1e-2, "
 ALL_KINDS: tuple[ContactKind, ...] = ("point", "line", "face")
 
 MIRRORED = {"a08": 1, "h06": 3}
-"""`types_by_geometry` takes mirror images for one type; so many pairs of these models' types are mirror images."""
+"""Pairs of types that are mirror images; `types_by_geometry` counts them as one type."""
 DOUBLED = {"a05": ["Wall3WindowGrate.002", "Wall3WindowGrate.003"], "a11": ["wall_empty.019", "roof_tile_empty.041"]}
-"""Parts of these models stand at the very place of another and are left out; the measurements have them."""
+"""Models with coincident parts, which are left out here and present in the measurements."""
 PRINTED = {"a17": 1}
 """A tile with a printed pattern is the plain tile with other triangles: one surface, one type."""
 
-pytestmark = pytest.mark.skipif(not FOLDERS, reason="the public exemplars lie beside the project; they are not here")
+pytestmark = pytest.mark.skipif(not FOLDERS, reason="the public exemplars are not next to the project")
 
 
 @cache
@@ -48,9 +48,9 @@ def measured(folder: Path) -> dict[str, Any]:
     place = {index: number for number, index in enumerate(keep)}
     described["part_list"] = [described["part_list"][index] for index in keep]
     described["edge_list"] = [
-        [place[each[0]], place[each[1]], *each[2:]]
-        for each in described["edge_list"]
-        if each[0] in place and each[1] in place
+        [place[edge[0]], place[edge[1]], *edge[2:]]
+        for edge in described["edge_list"]
+        if edge[0] in place and edge[1] in place
     ]
     return described
 
@@ -61,11 +61,11 @@ def edges(kit: Kit) -> list[list[int]]:
 
 
 def pairs(listed: list[list[Any]]) -> list[list[int]]:
-    return sorted(sorted(each[:2]) for each in listed)
+    return sorted(sorted(pair[:2]) for pair in listed)
 
 
 def folder_of(prefix: str) -> Path:
-    return next(each for each in FOLDERS if each.name.startswith(prefix))
+    return next(folder for folder in FOLDERS if folder.name.startswith(prefix))
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
@@ -92,7 +92,7 @@ def test_mirror_images_are_one_type_only_if_the_config_says_so(short: str) -> No
     assert len(build(folder, mirrored=True).types) == measured(folder)["types_by_geometry"]
 
 
-def test_the_printed_tile_of_the_temple_is_the_plain_one_in_other_triangles() -> None:
+def test_printed_tile_of_the_temple_is_the_plain_one_in_other_triangles() -> None:
     folder = folder_of("a17")
     kit = build(folder)
     types = {
@@ -112,14 +112,14 @@ def test_masonry_has_the_interfaces_of_its_authors(short: str) -> None:
     assert edges(build(folder)) == pairs(measured(folder)["author_interface_graph"])
 
 
-def test_the_cross_vault_has_the_interfaces_of_its_authors_where_faces_count() -> None:
+def test_cross_vault_has_the_interfaces_of_its_authors_where_faces_count() -> None:
     folder = folder_of("a26")
     found = edges(build(folder, kinds=("face",)))
     assert found == pairs(measured(folder)["author_interface_graph"])
     assert len(found) == 452
 
 
-def test_the_race_track_is_one_loop_where_faces_count() -> None:
+def test_race_track_is_one_loop_where_faces_count() -> None:
     kit = build(folder_of("a06"), kinds=("face",))
     degrees = Counter(part for edge in edges(kit) for part in edge)
     assert len(edges(kit)) == 16

@@ -21,9 +21,7 @@ ROOT = Path(__file__).resolve().parents[3]
 EXEMPLARS = ROOT.parent / "shared" / "exemplars"
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
 
-needs_models = pytest.mark.skipif(
-    not EXEMPLARS.is_dir(), reason="the public exemplars lie beside the project; they are not here"
-)
+needs_models = pytest.mark.skipif(not EXEMPLARS.is_dir(), reason="the public exemplars are not next to the project")
 
 
 def loaded(path: Path, monkeypatch: pytest.MonkeyPatch) -> Config:
@@ -38,7 +36,7 @@ def loaded(path: Path, monkeypatch: pytest.MonkeyPatch) -> Config:
 @pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
 def test_every_config_that_comes_with_the_project_is_valid(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if "../shared" in path.read_text() and not EXEMPLARS.is_dir():
-        pytest.skip("its models lie beside the project; they are not here")
+        pytest.skip("its models are not next to the project")
     own = {"default": "shapemill-default", "shapeassembly": "furniture-programs"}
     assert loaded(path, monkeypatch).name == own.get(path.stem, path.stem)
 
@@ -49,12 +47,12 @@ def kit_of(config: KitConfig) -> Kit:
 
 @needs_models
 @pytest.mark.parametrize(("name", "parts", "contacts"), [("bridge", 65, 201), ("temple", 186, 555)])
-def test_a_real_exemplar_gets_its_hubs_back(
+def test_real_exemplar_gets_its_hubs_back(
     name: str, parts: int, contacts: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     config = loaded(ROOT / "configs" / f"{name}.yaml", monkeypatch)
     kit = kit_of(config.section(ExemplarsConfig).kits[0])
     whole = HubRestorer(ContactOracle(kit), upright=True).fit(kit.exemplars[0].assembly)
     assert (len(whole), len(whole.edges)) == (parts, contacts)
-    anew = ContactTest(kit.types, kit.contact_tolerance).contacts(whole.types, whole.poses)
-    np.testing.assert_array_equal(whole.edges, anew)
+    contacts = ContactTest(kit.types, kit.contact_tolerance).contacts(whole.types, whole.poses)
+    np.testing.assert_array_equal(whole.edges, contacts)

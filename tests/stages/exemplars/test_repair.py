@@ -38,7 +38,7 @@ def triangle_sets(vertices: np.ndarray, faces: np.ndarray) -> set[tuple[tuple[fl
     return {tuple(sorted(map(tuple, triangle))) for triangle in vertices[faces].tolist()}
 
 
-def test_a_sound_mesh_is_left_as_it_is() -> None:
+def test_sound_mesh_is_left_as_it_is() -> None:
     vertices, faces, colors, repair = repair_mesh(box(), BOX_FACES, rainbow(BOX_FACES))
     assert repair.changes == {}
     np.testing.assert_array_equal(vertices[faces], box()[BOX_FACES])
@@ -61,7 +61,7 @@ def test_vertices_that_no_face_uses_go() -> None:
     np.testing.assert_array_equal(vertices[faces], box()[BOX_FACES])
 
 
-def test_a_face_that_stands_twice_or_reversed_goes_and_colours_stay_with_their_faces() -> None:
+def test_face_that_stands_twice_or_reversed_goes_and_colours_stay_with_their_faces() -> None:
     faces = np.vstack([BOX_FACES, BOX_FACES[3][[1, 2, 0]], BOX_FACES[5][::-1]]).astype(np.int32)
     vertices, repaired, colors, repair = repair_mesh(box(), faces, rainbow(faces))
     assert repair.changes["duplicate_faces"] == 2
@@ -71,7 +71,7 @@ def test_a_face_that_stands_twice_or_reversed_goes_and_colours_stay_with_their_f
         assert triangle_sets(triangle, np.array([[0, 1, 2]])) == triangle_sets(box(), faces[color[0]][None])
 
 
-def test_a_shell_that_was_exported_for_both_sides_becomes_one_shell() -> None:
+def test_shell_that_was_exported_for_both_sides_becomes_one_shell() -> None:
     faces = np.vstack([BOX_FACES, BOX_FACES[:, ::-1]]).astype(np.int32)
     vertices, repaired, _, repair = repair_mesh(box(), faces, rainbow(faces))
     assert repair.changes["duplicate_faces"] == 12
@@ -87,7 +87,7 @@ def test_faces_without_area_go() -> None:
     assert triangle_sets(repaired_vertices, repaired) == triangle_sets(box(), BOX_FACES)
 
 
-def test_a_mesh_of_flat_faces_only_is_empty() -> None:
+def test_mesh_of_flat_faces_only_is_empty() -> None:
     line = np.array([[0, 0, 0], [1, 1, 1], [2, 2, 2]], dtype=np.float64)
     for faces in ([[0, 1, 2]], [[0, 0, 1]], [[1, 1, 1], [0, 2, 1]]):
         chosen = np.array(faces, dtype=np.int32)
@@ -132,7 +132,7 @@ def test_any_turned_faces_of_a_closed_shell_face_outward_again(turned: list[bool
     np.testing.assert_array_equal(colors, rainbow(faces))
 
 
-def test_an_open_sheet_keeps_the_side_of_most_of_its_faces() -> None:
+def test_open_sheet_keeps_the_side_of_most_of_its_faces() -> None:
     count = 6
     vertices = np.array([[x, y, 0] for x in range(count) for y in (0, 1)], dtype=np.float64)
     faces = np.array(
@@ -146,7 +146,7 @@ def test_an_open_sheet_keeps_the_side_of_most_of_its_faces() -> None:
 
 
 @pytest.mark.parametrize("inside_out", [False, True])
-def test_a_cavity_goes_on_facing_inward(inside_out: bool) -> None:
+def test_cavity_goes_on_facing_inward(inside_out: bool) -> None:
     cavity = box((1, 1, 1), (1, 1, 1))
     vertices = np.vstack([box((3, 3, 3)), cavity])
     faces = np.vstack([BOX_FACES, BOX_FACES[:, ::-1] + 8]).astype(np.int32)
@@ -156,7 +156,7 @@ def test_a_cavity_goes_on_facing_inward(inside_out: bool) -> None:
     assert repair.changes.get("flipped_faces", 0) == (24 if inside_out else 0)
 
 
-def test_a_solid_inside_a_room_goes_on_facing_outward() -> None:
+def test_solid_inside_a_room_goes_on_facing_outward() -> None:
     vertices = np.vstack([box((3, 3, 3)), box((1, 1, 1), (1, 1, 1))])
     faces = np.vstack([BOX_FACES, BOX_FACES + 8]).astype(np.int32)
     repaired_vertices, repaired, _, repair = repair_mesh(vertices, faces, rainbow(faces))
@@ -178,7 +178,7 @@ def test_any_soup_keeps_its_surface_and_ends_manifold(rows: list[tuple[int, int,
         assert triangle_sets(triangle, np.array([[0, 1, 2]])) == triangle_sets(points, faces[color[0]][None])
 
 
-def test_an_inside_out_solid_that_touches_another_faces_outward() -> None:
+def test_inside_out_solid_that_touches_another_faces_outward() -> None:
     vertices = np.vstack([box(), box(at=(1, 1, 0))])
     faces = np.vstack([BOX_FACES, BOX_FACES[:, ::-1] + 8]).astype(np.int32)
     repaired_vertices, repaired, _, repair = repair_mesh(vertices, faces, rainbow(faces))

@@ -86,7 +86,7 @@ class TestAuto:
 
 
 class TestSources:
-    def test_a_source_that_the_model_lacks_is_refused_with_those_it_has(self, tmp_path: Path) -> None:
+    def test_source_that_the_model_lacks_is_refused_with_those_it_has(self, tmp_path: Path) -> None:
         path = write_obj(tmp_path / "m.obj", {"a": box(), "b": box(at=(2, 0, 0))})
         with pytest.raises(ConfigError, match=r"has no colors.* objects \(2\), components \(2\)"):
             read_model(path, "colors")
@@ -133,7 +133,7 @@ class TestComponents:
 
     @settings(max_examples=30, deadline=None)
     @given(st.permutations(range(8 * 12)), st.integers(0, 2**32 - 1))
-    def test_they_stay_apart_whatever_the_order_and_the_indices(self, order: list[int], seed: int) -> None:
+    def test_touching_boxes_stay_apart_for_any_order_and_indices(self, order: list[int], seed: int) -> None:
         vertices, faces = boxes(grid(2))
         turns = np.random.default_rng(seed).integers(0, 3, len(faces))
         turned = np.take_along_axis(faces, (np.arange(3) + turns[:, None]) % 3, axis=1)[order]
@@ -143,7 +143,7 @@ class TestComponents:
         assert len({(int(a), int(b)) for a, b in zip(component, owner, strict=True)}) == 8
         assert component.max() == 7
 
-    def test_each_solid_of_a_grid_is_closed(self, tmp_path: Path) -> None:
+    def test_every_solid_of_a_grid_is_closed(self, tmp_path: Path) -> None:
         import trimesh
 
         vertices, faces = boxes(grid(2))
@@ -165,7 +165,7 @@ class TestComponents:
         component = connected_faces(vertices, faces, np.zeros(len(faces), int))
         np.testing.assert_array_equal(component, np.repeat(np.arange(4), 8))
 
-    def test_a_repeated_solid_is_one_component(self) -> None:
+    def test_repeated_solid_is_one_component(self) -> None:
         vertices, faces = boxes([box(), box()])
         assert connected_faces(vertices, faces, np.zeros(24, int)).max() == 0
 

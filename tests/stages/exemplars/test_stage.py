@@ -1,4 +1,4 @@
-"""The stage in the real mill."""
+"""The stage in the real pipeline."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def write_config(folder: Path, kits: list[dict[str, Any]]) -> Config:
 
 
 def run(folder: Path, config: Config, out: str = "out") -> tuple[str, ...]:
-    """The shards that were set aside."""
+    """Return the shards that failed."""
     return tuple(run_stage("exemplars", STAGES, config, DatasetPaths(folder / out, config.name), 1).failed)
 
 
@@ -70,11 +70,11 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Config]:
     return folder, config
 
 
-def test_each_kit_is_a_shard_of_three_files(made: tuple[Path, Config]) -> None:
+def test_kit_is_a_shard_of_three_files(made: tuple[Path, Config]) -> None:
     assert list(files(made[0])) == [f"{kit}.{kind}" for kit in ("row", "short") for kind in ("json", "png", "tar")]
 
 
-def test_the_files_hold_the_kit_of_its_shapes(made: tuple[Path, Config]) -> None:
+def test_files_hold_the_kit_of_its_shapes(made: tuple[Path, Config]) -> None:
     folder, config = made
     root = folder / "out" / ".work" / "toy" / "exemplars"
     settings = config.section(ExemplarsConfig).kits[0]
@@ -83,7 +83,7 @@ def test_the_files_hold_the_kit_of_its_shapes(made: tuple[Path, Config]) -> None
     assert kit.grammar.neighbourhoods == {0: {((0, 1),): 4, ((0, 2),): 4}}
 
 
-def test_the_record_says_what_was_found(made: tuple[Path, Config]) -> None:
+def test_record_holds_counts_and_warnings(made: tuple[Path, Config]) -> None:
     summary = record(made[0], "row")["summary"]
     assert summary["parts"] == [3, 5]
     assert (summary["types"], summary["rules"], summary["dockings"]) == (1, 2, 1)
@@ -92,13 +92,13 @@ def test_the_record_says_what_was_found(made: tuple[Path, Config]) -> None:
     assert summary["warnings"] == []
 
 
-def test_people_are_told_a_line_for_each_kit(made: tuple[Path, Config]) -> None:
+def test_status_has_a_line_per_kit(made: tuple[Path, Config]) -> None:
     folder, config = made
     lines = "\n".join(status_lines(config, STAGES, DatasetPaths(folder / "out", "toy"), 1))
     assert "row: 3 + 5 parts of 1 types, 2 neighbourhoods, 1 dockings" in lines
 
 
-def test_the_picture_shows_something(made: tuple[Path, Config]) -> None:
+def test_figure_is_not_blank(made: tuple[Path, Config]) -> None:
     with Image.open(made[0] / "out" / ".work" / "toy" / "exemplars" / "row.png") as picture:
         pixels = np.asarray(picture.convert("RGB"))
     assert pixels.shape[1] > 1000
@@ -111,11 +111,11 @@ def test_another_run_gives_the_same_bytes(made: tuple[Path, Config]) -> None:
     assert files(folder, "again") == files(folder)
 
 
-def test_a_changed_model_makes_its_kit_anew_and_no_other(tmp_path: Path) -> None:
+def test_changed_model_rebuilds_its_kit_only(tmp_path: Path) -> None:
     for name in ("one", "two"):
         write_obj(tmp_path / f"{name}.obj", blocks(3))
     config = write_config(
-        tmp_path, [{"name": each, "shapes": [str(tmp_path / f"{each}.obj")]} for each in ("one", "two")]
+        tmp_path, [{"name": name, "shapes": [str(tmp_path / f"{name}.obj")]} for name in ("one", "two")]
     )
     assert run(tmp_path, config) == ()
     before = {name: record(tmp_path, name)["fingerprint"] for name in ("one", "two")}
@@ -126,11 +126,11 @@ def test_a_changed_model_makes_its_kit_anew_and_no_other(tmp_path: Path) -> None
     assert record(tmp_path, "two")["fingerprint"] == before["two"]
 
 
-def test_a_kit_that_cannot_be_made_is_set_aside_with_the_mend_and_the_rest_goes_on(tmp_path: Path) -> None:
+def test_impossible_kit_fails_with_the_mend_and_the_rest_is_built(tmp_path: Path) -> None:
     write_obj(tmp_path / "good.obj", blocks(3))
     write_obj(tmp_path / "apart.obj", blocks(3, gap=0.5))
     config = write_config(
-        tmp_path, [{"name": each, "shapes": [str(tmp_path / f"{each}.obj")]} for each in ("apart", "good")]
+        tmp_path, [{"name": name, "shapes": [str(tmp_path / f"{name}.obj")]} for name in ("apart", "good")]
     )
     assert run(tmp_path, config) == ("apart",)
     assert "good.json" in files(tmp_path)
@@ -139,7 +139,7 @@ def test_a_kit_that_cannot_be_made_is_set_aside_with_the_mend_and_the_rest_goes_
     assert "falls into 3 pieces" in "".join(path.read_text() for path in failed.iterdir())
 
 
-def test_a_config_that_names_no_file_starts_nothing(tmp_path: Path) -> None:
+def test_config_with_a_missing_file_starts_nothing(tmp_path: Path) -> None:
     write_obj(tmp_path / "here.obj", blocks(2))
     with pytest.raises(ConfigError, match=r"there is no file .*her\.obj; the nearest file there is .*here\.obj"):
         write_config(tmp_path, [{"name": "kit", "shapes": [str(tmp_path / "her.obj")]}])
