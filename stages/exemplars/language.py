@@ -19,7 +19,7 @@ from stages.shape.shape import Shape, kit_shape, mesh_name, part_count
 from stages.shape.stretch import bake, split
 
 
-class Kits:
+class KitDecoder:
     """Decode samples with the kits that a shard reads."""
 
     def __init__(self, kits: Mapping[str, Kit]) -> None:
@@ -102,7 +102,7 @@ def _rebuild(paths: DatasetPaths) -> RebuildShape:
 LANGUAGE = Language(
     name="kit",
     reads=_reads,
-    decoder=lambda task: Kits(input_kits(task)),
+    decoder=lambda task: KitDecoder(input_kits(task)),
     graphs=True,
     text="",
     rebuild=_rebuild,

@@ -7,7 +7,7 @@ from typing import Any
 
 from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan
-from stages.exemplars.language import Kits, dataset_kits
+from stages.exemplars.language import KitDecoder, dataset_kits
 from stages.proportions.text import shape_of_text
 from stages.shape.arrays import IntArray
 from stages.shape.collection.language import Language, RebuildShape
@@ -22,7 +22,7 @@ class Proportions:
 
     def __init__(self, kits: Mapping[str, Kit]) -> None:
         self._kits = kits
-        self.sources = Kits(kits).sources
+        self.sources = KitDecoder(kits).sources
 
     def shape(self, sample: Sample) -> Shape:
         """Return the exemplar resized by the sample's text. Raises ProportionError for a text that does not fit its

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from stages.exemplars.language import Kits
+from stages.exemplars.language import KitDecoder
 from stages.exemplars.settings import KitConfig
 from stages.package.glb import glb_bytes
 from stages.package.record import describe_sample
@@ -66,7 +66,7 @@ def test_part_label_is_its_meaning_and_part_name_its_surface(kit: Kit) -> None:
     assert shape.labels == ("top", "leg")
     assert shape.part_labels.tolist() == [0, 1, 1, 1, 1]
     assert shape.part_names == ("top_2.000", "leg_2.000", "leg_2.001", "leg_2.002", "leg_2.003")
-    assert Kits({"toy": kit}).sources["toy"].labels == ("top", "leg")
+    assert KitDecoder({"toy": kit}).sources["toy"].labels == ("top", "leg")
 
 
 def mixed(kit: Kit) -> Assembly:
