@@ -1,1 +1,1 @@
-"""The mill: configuration, plans, shards, workers, provenance and progress. Knows no geometry."""
+"""The engine: configuration, plans, shards, workers, provenance and progress. Knows no geometry."""

@@ -1,4 +1,4 @@
-"""`python -m pipeline`."""
+"""`python -m pipeline`, the same as `shapemill`."""
 
 from __future__ import annotations
 

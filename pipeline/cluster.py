@@ -1,10 +1,9 @@
-"""Workers on other machines: a cluster of dask.distributed, of which the mill uses little and trusts less.
+"""Workers on other machines: a cluster of dask.distributed, of which the engine uses little.
 
-Each shard is sent to one idle worker and to no other, so that a worker that goes takes one shard with it and no other
-is to blame. There it is made as it is here, in a process of its own with the same environment (`pipeline/workers.py`),
-so that its bytes are the same and what kills it leaves the cluster's worker alive. Workers may come and go. The output
-folder must be the same on every machine, by the same path, and so must the project: a worker with other code stops
-the run.
+Each shard is sent to one idle worker, so that a worker that disappears fails one shard. The shard is made there in a
+process of its own with the same environment as here (`pipeline/workers.py`): its bytes are the same, and a crash
+leaves the cluster's worker alive. Workers may come and go. Output folder and project must have the same paths on every
+machine; a worker with other code stops the run.
 """
 
 from __future__ import annotations
@@ -21,24 +20,22 @@ from pipeline.workers import Workers
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-_ANSWERS_WITHIN = 10.0
-"""Seconds that a scheduler has to answer."""
-
-_LOOK_EVERY = 0.5
+_ANSWER_SECONDS = 10.0
+_POLL_SECONDS = 0.5
 
 _NO_PROCESSES = (
     "the workers of the cluster may start no processes of their own: start them with --no-nanny, or with "
     "DASK_DISTRIBUTED__WORKER__DAEMON=False in their environment"
 )
 
-_crew: tuple[str, Workers] | None = None
-"""The process in which this worker of the cluster makes its shards, and for which run: another finds other code."""
+_process: tuple[str, Workers] | None = None
+"""Run and process in which this worker of the cluster makes its shards; another run may have other code."""
 
 
 class ClusterWorkers:
     """The workers of the cluster whose scheduler is at `address`, such as `tcp://10.0.0.1:8786`.
 
-    Raises ConfigError where there is none when work begins, and Fatal when it goes away.
+    Raises ConfigError where no scheduler answers at the start, and Fatal when it disappears later.
     """
 
     def __init__(self, address: str) -> None:
@@ -68,7 +65,7 @@ class ClusterWorkers:
         self._busy[future] = (address, job)
 
     def finished(self, timeout: float | None) -> Iterator[tuple[Job, Report | None]]:
-        """Jobs that end within `timeout` seconds (None: the next), with None for one whose worker has died."""
+        """Yield the jobs that end within `timeout` seconds (None: the next), with None where the worker died."""
         begun = time.monotonic()
         while not any(future.done() for future in self._busy):
             if timeout is not None and time.monotonic() - begun >= timeout:
@@ -81,16 +78,16 @@ class ClusterWorkers:
                 yield job, _report(future) if future.done() else None
 
     def end(self, job: Job) -> None:
-        """Let go of a running job: its worker ends the process that makes it."""
+        """Cancel a running job: its worker kills the process that makes it."""
         future = next(future for future, (_, running) in self._busy.items() if running is job)
         del self._busy[future]
         future.cancel()
 
     def stop(self, kill: bool) -> None:
-        """Let go of all running jobs, and of the cluster."""
+        """Cancel all running jobs and disconnect."""
         if self._client is not None:
             client, self._client = self._client, None
-            client.close(timeout=_ANSWERS_WITHIN)  # the scheduler cancels what its client has left
+            client.close(timeout=_ANSWER_SECONDS)  # the scheduler cancels the jobs of a client that left
         self._busy.clear()
 
     def _idle(self) -> list[str]:
@@ -101,7 +98,7 @@ class ClusterWorkers:
         try:
             return set(client.nthreads())
         except OSError as error:
-            raise Fatal(f"the scheduler at {self._address} does not answer any more: {error}") from error
+            raise Fatal(f"the scheduler at {self._address} no longer answers: {error}") from error
 
     def _connected(self) -> Client:
         if self._client is None:
@@ -113,14 +110,14 @@ def _client(address: str) -> Client:
     try:
         import dask
 
-        # What goes wrong is said by the mill; before the import, which sets up the logs.
+        # The engine reports errors; set before the import, which configures logging.
         dask.config.set({"distributed.logging": dict.fromkeys(("distributed", "distributed.client"), "critical")})
         from distributed import Client
     except ImportError as error:
         raise ConfigError(f"a cluster needs dask.distributed, which is not there ({error}): run make setup") from error
-    dask.config.set({"distributed.comm.timeouts.connect": _ANSWERS_WITHIN})
+    dask.config.set({"distributed.comm.timeouts.connect": _ANSWER_SECONDS})
     try:
-        return Client(address, timeout=_ANSWERS_WITHIN, set_as_default=False)
+        return Client(address, timeout=_ANSWER_SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ConfigError(
             f"no scheduler answers at {address} ({error}): start one, with `make cluster` on this machine"
@@ -128,37 +125,37 @@ def _client(address: str) -> Client:
 
 
 def _report(future: Future[Report | None]) -> Report | None:
-    """What a job that has ended reports; None where it took its worker with it."""
+    """Return the report of an ended job; None where it killed its worker."""
     from concurrent.futures import CancelledError
 
     from distributed import KilledWorker
 
     try:
-        report: Report | None = future.result(timeout=_ANSWERS_WITHIN)
+        report: Report | None = future.result(timeout=_ANSWER_SECONDS)
         return report
     except (CancelledError, KilledWorker, OSError):
         return None
-    except Exception as error:  # whatever goes wrong there before the shard begins, such as a module that is missing
+    except Exception as error:  # anything before the shard begins, such as a missing module
         return Report("", "failed", f"its worker could not begin: {type(error).__name__}: {error}", repr(error))
 
 
 def _make_here(job: Job, run: str) -> Report | None:
-    """Runs in a worker of the cluster: makes a shard as long as somebody wants it. None where its process has died."""
-    global _crew
+    """Make a shard in a worker of the cluster while the job is wanted; None where its process died."""
+    global _process
     from distributed import get_worker
     from distributed.worker import thread_state
 
     if multiprocessing.current_process().daemon:
         return Report(job.shard.name, "fatal", _NO_PROCESSES)
     worker, key = get_worker(), thread_state.key
-    if _crew is None or _crew[0] != run:
-        if _crew is not None:
-            _crew[1].stop(kill=True)
-        _crew = run, Workers(1, job.paths.worker_output)
-    workers = _crew[1]
+    if _process is None or _process[0] != run:
+        if _process is not None:
+            _process[1].stop(kill=True)
+        _process = run, Workers(1, job.paths.worker_output)
+    workers = _process[1]
     workers.submit(job)
     while True:
-        for _, report in workers.finished(_LOOK_EVERY):
+        for _, report in workers.finished(_POLL_SECONDS):
             return report
         task = worker.state.tasks.get(key)
         if task is None or task.state == "cancelled" or worker.status.name != "running":

@@ -1,9 +1,8 @@
-"""The code that bytes depend on: the project's own modules that a module reaches by its imports, as digests.
+"""Digests of the code that bytes depend on: the project's modules that a module imports, directly or not.
 
-A digest is of what a file says to Python: its syntax tree without docstrings, so that comments, docstrings and
-formatting make nothing anew. Imports are followed wherever they stand, inside functions too, but not those for types
-alone (`if TYPE_CHECKING:`). What is found at run time, by a name in a config, is reached by no import: whoever plans
-with it names it in `Shard.code`.
+A digest is of the syntax tree without docstrings, so that edits of comments, docstrings and formatting rebuild nothing.
+Imports inside functions count, those for types alone (`if TYPE_CHECKING:`) do not. Modules found at run time, by a name
+in a config, are named in `Shard.code`.
 """
 
 from __future__ import annotations
@@ -24,59 +23,58 @@ from typing import Any
 from pipeline.shards import json_bytes
 
 _DECLARATIONS = ("language",)
-"""Files beside a `stage.py` that others find at run time when they read what the stage has made."""
+"""Modules in the folder of a stage that readers of its shards find at run time."""
 
 _CONTRACT = {"pipeline.stage", "pipeline.config", "pipeline.paths", "pipeline.registry"}
-"""What stages see of the mill itself. It changes bytes through the config and the plan alone, which the fingerprint
-holds; with it the whole mill would count."""
+"""The engine as stages see it; it changes bytes only through config and plan, which the fingerprint holds."""
 
-_BEHIND_THE_TASK = "pipeline.randomness"
-"""What makes bytes of the mill without being imported by a stage: `Task.rng`."""
+_TASK_RANDOMNESS = "pipeline.randomness"
+"""Code of `Task.rng`, which changes bytes although no stage imports it."""
 
 
 def entry_points(module: str, also: Iterable[str] = ()) -> tuple[str, ...]:
-    """Where the code of a shard begins: the module of its stage, what is declared beside it, and the modules `also`."""
-    folder, house = module.rpartition(".")[0], SourceTree([module])
-    beside = [f"{folder}.{name}" for name in _DECLARATIONS] if folder else []
-    return (module, _BEHIND_THE_TASK, *(each for each in beside if house.file(each) is not None), *also)
+    """Return the modules at which a shard's code begins: its stage's, those declared in its folder, and `also`."""
+    folder, tree = module.rpartition(".")[0], SourceTree([module])
+    declared = [f"{folder}.{name}" for name in _DECLARATIONS] if folder else []
+    return (module, _TASK_RANDOMNESS, *(name for name in declared if tree.file(name) is not None), *also)
 
 
 def transitive_imports(starts: Iterable[str]) -> dict[str, str]:
-    """The modules of the project that `starts` reach, themselves among them, and the digest of each.
+    """Return the digest of each module of the project that `starts` import, directly or not, and of themselves.
 
     Raises ValueError for a start without a Python file.
     """
     waiting = list(starts)
-    house = SourceTree(waiting)
+    tree = SourceTree(waiting)
     for start in waiting:
-        if house.file(start) is None:
+        if tree.file(start) is None:
             raise ValueError(f"no Python file of module {start} is found")
-    found: dict[str, str] = {}
+    digests: dict[str, str] = {}
     seen = {""}
     while waiting:
         module = waiting.pop()
         if module in seen or module in _CONTRACT:
             continue
         seen.add(module)
-        file = house.file(module)
+        file = tree.file(module)
         if file is None:
             continue
         state = file.stat()
-        found[module], imported = _read(str(file), state.st_mtime_ns, state.st_size)
+        digests[module], imported = _read(str(file), state.st_mtime_ns, state.st_size)
         package = module if file.name == "__init__.py" else module.rpartition(".")[0]
-        waiting += [module.rpartition(".")[0], *(absolute_name(each, package) for each in imported)]
-    return dict(sorted(found.items()))
+        waiting += [module.rpartition(".")[0], *(absolute_name(name, package) for name in imported)]
+    return dict(sorted(digests.items()))
 
 
 def code_digest(modules: Mapping[str, str]) -> str:
-    """One digest of what `transitive_imports` answers."""
+    """Return one digest of the result of `transitive_imports`."""
     return hashlib.sha256(json_bytes(dict(modules))).hexdigest()
 
 
 class SourceTree:
     """Finds the files of the project's modules without importing any.
 
-    The project is what is neither Python's own nor installed, and the packages of `starts`, wherever they are.
+    The project is every module that is neither Python's own nor installed, and the packages of `starts`.
     """
 
     def __init__(self, starts: Iterable[str]) -> None:
@@ -85,7 +83,7 @@ class SourceTree:
         self._owned = {start.partition(".")[0] for start in starts}
 
     def file(self, module: str) -> Path | None:
-        """The Python file of a module of the project; None for anything else."""
+        """Return the Python file of a module of the project; None for any other module."""
         package, _, name = module.rpartition(".")
         for folder in self._within(package) if package else self._bases(module):
             listing = self._listing(folder)
@@ -96,27 +94,27 @@ class SourceTree:
         return None
 
     def _listing(self, folder: Path) -> frozenset[str]:
-        """The names in a folder; none for what is no folder."""
+        """Return the names in a folder; none if it is no folder."""
         if folder not in self._listings:
             self._listings[folder] = (
-                frozenset(each.name for each in folder.iterdir()) if folder.is_dir() else frozenset()
+                frozenset(path.name for path in folder.iterdir()) if folder.is_dir() else frozenset()
             )
         return self._listings[folder]
 
     def _within(self, package: str) -> list[Path]:
-        """The folders in which the modules of a package lie; a package may have several."""
+        """Return the folders of a package; it may have several."""
         if package not in self._folders:
             above, _, name = package.rpartition(".")
             loaded = getattr(sys.modules.get(package), "__path__", None)
             bases = self._within(above) if above else self._bases(package)
             if loaded is not None and bases:
-                self._folders[package] = [Path(each) for each in loaded]
+                self._folders[package] = [Path(folder) for folder in loaded]
             else:
                 self._folders[package] = [base / name for base in bases]
         return self._folders[package]
 
     def _bases(self, top: str) -> list[Path]:
-        """The folders that hold the package or module `top`; none if it is not the project's."""
+        """Return the folders that hold the package or module `top`; none if it is not the project's."""
         key = f".{top}"
         if key not in self._folders:
             self._folders[key] = [] if top in sys.stdlib_module_names else list(self._search(top))
@@ -129,32 +127,32 @@ class SourceTree:
             return
         if spec is None:
             return
-        for place in spec.submodule_search_locations or ([spec.origin] if spec.origin else []):
-            base = Path(place).parent
+        for location in spec.submodule_search_locations or ([spec.origin] if spec.origin else []):
+            base = Path(location).parent
             if top in self._owned or not {"site-packages", "dist-packages"} & set(base.parts):
                 yield base
 
 
-_Said = tuple[str, tuple[tuple[int, str], ...]]
-"""The digest of a file, and the modules that it may import, each with its number of leading dots."""
+_Summary = tuple[str, tuple[tuple[int, str], ...]]
+"""Digest of a file, and the modules that it may import, each with its number of leading dots."""
 
 
 @cache
-def _read(file: str, modified: int, size: int) -> _Said:
-    """What a file says in one state."""
+def _read(file: str, modified: int, size: int) -> _Summary:
+    """Return the digest and the imports of a file in one state."""
     source = Path(file).read_bytes()
     key = hashlib.sha256(_reader() + source).hexdigest()
-    note = read_note(file, "said", key)
+    note = read_note(file, "imports", key)
     with suppress(ValueError, KeyError, TypeError):
         if note is not None:
             return str(note["digest"]), tuple((int(dots), str(name)) for dots, name in note["imports"])
-    said = _parsed(source, file)
-    write_note(file, "said", key, {"digest": said[0], "imports": said[1]})
-    return said
+    digest, imports = _parsed(source, file)
+    write_note(file, "imports", key, {"digest": digest, "imports": imports})
+    return digest, imports
 
 
-def _parsed(source: bytes, file: str) -> _Said:
-    with _no_collection():
+def _parsed(source: bytes, file: str) -> _Summary:
+    with _without_garbage_collection():
         words: list[str] = []
         imported: list[tuple[int, str]] = []
         code_words(ast.parse(source, file), words.append, imported)
@@ -163,7 +161,7 @@ def _parsed(source: bytes, file: str) -> _Said:
 
 @cache
 def _reader() -> bytes:
-    """What else the answer depends on: this file, which reads. Each version of Python has notes of its own."""
+    """Return the source of this file, on which the digests depend; each version of Python has notes of its own."""
     return Path(__file__).read_bytes()
 
 
@@ -199,8 +197,8 @@ def _note_path(file: str, subject: str) -> Path:
 
 
 @contextmanager
-def _no_collection() -> Iterator[None]:
-    # A syntax tree is many small objects and no garbage: with the collector on, reading takes three times as long.
+def _without_garbage_collection() -> Iterator[None]:
+    # A syntax tree is many small objects and no garbage: the collector would triple the time.
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -211,7 +209,7 @@ def _no_collection() -> Iterator[None]:
 
 
 def code_words(node: ast.AST, add: Callable[[str], None], imported: list[tuple[int, str]]) -> None:
-    """Add the words of a syntax tree: node types and values in order, no line numbers, no docstrings."""
+    """Add the words of a syntax tree in order: node types and values, no line numbers, no docstrings."""
     if isinstance(node, ast.Import):
         imported.extend((0, alias.name) for alias in node.names)
     elif isinstance(node, ast.ImportFrom):
@@ -227,11 +225,11 @@ def code_words(node: ast.AST, add: Callable[[str], None], imported: list[tuple[i
             add(repr(value))
         elif not (name == "body" and isinstance(node, ast.If) and _for_types(node.test)):
             add("[")
-            for each in value:
-                if not isinstance(each, ast.AST):
-                    add(repr(each))
-                elif not is_prose(each):
-                    code_words(each, add, imported)
+            for item in value:
+                if not isinstance(item, ast.AST):
+                    add(repr(item))
+                elif not is_prose(item):
+                    code_words(item, add, imported)
             add("]")
 
 
@@ -241,12 +239,12 @@ def _for_types(test: ast.expr) -> bool:
 
 
 def is_prose(node: ast.AST) -> bool:
-    """Whether a statement is a text by itself: a docstring, or one that stands after what it describes."""
+    """Whether a statement is only a text: a docstring, of a function or of an attribute."""
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
 
 
 def absolute_name(imported: tuple[int, str], package: str) -> str:
-    """The full name of what a module of `package` imports after so many leading dots."""
+    """Return the full name of an import in a module of `package`: (leading dots, name)."""
     dots, name = imported
     if not dots:
         return name

@@ -1,7 +1,7 @@
-"""Configs: one YAML for each dataset, validated as a whole before any work.
+"""Configs: one YAML file for each dataset, validated as a whole before any work.
 
-A config holds the dataset's own facts (`DatasetFacts`) and one section for each stage, by the stage's name, whose
-model the stage declares. A path in a config is relative to the folder in which the command runs.
+A config holds facts of the dataset (`DatasetFacts`) and a section for each stage, whose model the stage declares. A
+path in a config is relative to the folder in which the command runs.
 """
 
 from __future__ import annotations
@@ -19,9 +19,7 @@ from pipeline.errors import ConfigError
 from pipeline.yaml_loader import KeyPath, read_yaml
 
 MAX_MISTAKES_SHOWN = 50
-"""Mistakes that are told at once."""
 MAX_CHARACTERS_SHOWN = 200
-"""Characters of a value that a message shows."""
 
 Section = TypeVar("Section", bound="StrictModel")
 
@@ -41,22 +39,22 @@ class DatasetFacts(StrictModel):
         description="name of the dataset and of its folder; lower-case letters, digits and single dashes",
     )
     version: str = Field(
-        "1.0.0", pattern=r"^(0|[1-9]\d*)\.(0|[1-9]\d*)\.(0|[1-9]\d*)$", description="version, major.minor.patch"
+        "1.0.0", pattern=r"^(0|[1-9]\d*)\.(0|[1-9]\d*)\.(0|[1-9]\d*)$", description="version, as major.minor.patch"
     )
-    seed: int = Field(0, ge=0, lt=2**63, description="where all randomness starts; another seed is another dataset")
+    seed: int = Field(0, ge=0, lt=2**63, description="seed of all randomness; another seed makes another dataset")
     title: str = Field("", description="title on the dataset's card; the name if empty")
     description: str = Field("", description="what the dataset is, in a sentence or a few, for its card")
     license: str = Field("unknown", min_length=1, description="licence of the dataset, as an SPDX id such as CC-BY-4.0")
     keep: Literal["all", "dataset"] = Field(
         "all",
-        description="what stays when the dataset is finished: all; or the dataset alone, and what lies between is "
-        "taken away, to be made again where something else is to be made of it",
+        description="what is kept when the dataset is finished: all; or the dataset alone, whose intermediates are "
+        "pruned, and rebuilt on demand",
     )
 
 
 @dataclass(frozen=True)
 class Config:
-    """A validated config: the dataset's own facts, and one section for each stage."""
+    """A validated config: facts of the dataset, and one section for each stage."""
 
     name: str
     version: str
@@ -69,25 +67,25 @@ class Config:
     keep: Literal["all", "dataset"] = "all"
 
     def section(self, model: type[Section]) -> Section:
-        """The section that a stage declared with the config class `model`."""
+        """Return the section of the stage that declares the config class `model`. Raises KeyError."""
         for section in self.sections.values():
             if isinstance(section, model):
                 return section
         raise KeyError(f"no stage declares {model.__name__}")
 
     def only(self, stages: Iterable[str]) -> Config:
-        """This config without the sections of any stage but `stages`."""
+        """Return this config with the sections of some stages only."""
         return replace(self, sections={name: self.sections[name] for name in stages})
 
 
 def nearest_word(word: str, known: Iterable[str]) -> str | None:
-    """The one of `known` that `word` is most probably meant to be, or None."""
+    """Return the known word most similar to `word`, or None."""
     matches = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
     return matches[0] if matches else None
 
 
 def existing_file(path: Path) -> Path:
-    """`path` itself. Raises ValueError, naming the nearest file that is there, when it is no readable file."""
+    """Return `path`. Raises ValueError, with the nearest existing file, when it is no readable file."""
     try:
         if "\0" not in str(path) and path.is_file():
             return path
@@ -102,24 +100,25 @@ def existing_file(path: Path) -> Path:
         while not folder.is_dir() and folder != folder.parent:
             folder = folder.parent
         raise ValueError(f"there is no file {path}; of its folders {folder.resolve()} is the last that is there")
-    there = sorted(each.name for each in folder.iterdir() if each.is_file())
-    close = nearest_word(path.name, there)
+    names = sorted(file.name for file in folder.iterdir() if file.is_file())
+    close = nearest_word(path.name, names)
     hint = f"; the nearest file there is {folder / close}" if close else ""
     raise ValueError(f"there is no file {path}{hint}")
 
 
 ExistingFile = Annotated[Path, AfterValidator(existing_file)]
-"""Type of a config key that names a file which must be there, relative to the folder where the command runs."""
+"""Type of a config key that names an existing file, relative to the folder where the command runs."""
 
 
 def load_config(
     path: Path, sections: Mapping[str, type[StrictModel]], overrides: Mapping[str, Any] | None = None
 ) -> Config:
-    """The config in the YAML file `path`, with `overrides` (such as `{"seed": 7}`) in place of its own facts.
+    """Read the config in a YAML file.
 
-    `sections` maps the name of each stage to the model of its section; a section that the file leaves out takes
-    its defaults. Raises ConfigError with one line for each mistake: file, line, key, what is wrong, what would be
-    right.
+    sections: model of each stage's section, by the stage's name; a missing section takes its defaults
+    overrides: facts of the dataset in place of the file's, such as `{"seed": 7}`
+
+    Raises ConfigError with one line for each mistake: file, line, key, what is wrong, what would be right.
     """
     values, lines = read_yaml(path)
     mistakes: list[str] = []
@@ -131,8 +130,8 @@ def load_config(
     header = _validate(path, lines, (), DatasetFacts, facts, mistakes)
     validated: dict[str, StrictModel] = {}
     for name, model in sections.items():
-        said = values.get(name)  # a section without anything in it is one that takes its defaults
-        section = _validate(path, lines, (name,), model, {} if said is None else said, mistakes)
+        given = values.get(name)
+        section = _validate(path, lines, (name,), model, {} if given is None else given, mistakes)
         if section is not None:
             validated[name] = section
     if mistakes or header is None:
@@ -155,7 +154,7 @@ def load_config(
 def _validate(
     path: Path,
     lines: Mapping[KeyPath, int],
-    place: KeyPath,
+    section_key: KeyPath,
     model: type[Section],
     values: Any,
     mistakes: list[str],
@@ -165,22 +164,22 @@ def _validate(
         return model.model_validate_json(json.dumps(values))
     except ValidationError as error:
         schema = model.model_json_schema()
-        found = error.errors(include_url=False)
-        for each in found:
-            # pydantic leaves faulty items out of a list and then finds it too short: that is no mistake of its own
-            if each["type"] == "too_short" and any(
-                other["loc"][: len(each["loc"])] == each["loc"] != other["loc"] for other in found
+        details = error.errors(include_url=False)
+        for detail in details:
+            # pydantic drops faulty items from a list and then finds it too short: not another mistake
+            if detail["type"] == "too_short" and any(
+                other["loc"][: len(detail["loc"])] == detail["loc"] != other["loc"] for other in details
             ):
                 continue
-            key = (*place, *each["loc"])
+            key = (*section_key, *detail["loc"])
             dotted = _shown(".".join(str(step) for step in key)) or "(the file)"
-            mistakes.append(f"{_where(path, lines, key)}: {dotted}: {_explain(schema, each)}")
+            mistakes.append(f"{_where(path, lines, key)}: {dotted}: {_explain(schema, detail)}")
         return None
 
 
 def _shown(text: str) -> str:
-    """`text` as it fits into a line."""
-    plain = "".join(each if each.isprintable() else "\ufffd" for each in text[:MAX_CHARACTERS_SHOWN])
+    """Shorten a text and replace characters that cannot be printed."""
+    plain = "".join(char if char.isprintable() else "\ufffd" for char in text[:MAX_CHARACTERS_SHOWN])
     return plain if len(text) <= MAX_CHARACTERS_SHOWN else f"{plain}… ({len(text):,} characters)"
 
 
@@ -199,8 +198,8 @@ def _explain(schema: Mapping[str, Any], error: Mapping[str, Any]) -> str:
     field = _schema_at(schema, loc)
     if kind in {"union_tag_not_found", "union_tag_invalid"}:
         key, kinds = field["discriminator"]["propertyName"], field["discriminator"]["mapping"]
-        said = error["input"].get(key) if isinstance(error["input"], Mapping) else None
-        return f"{key} {'is missing' if said is None else f'is {said}'}; it is one of {', '.join(kinds)}"
+        given = error["input"].get(key) if isinstance(error["input"], Mapping) else None
+        return f"{key} {'is missing' if given is None else f'is {given}'}; it is one of {', '.join(kinds)}"
     described = f" ({field['description']})" if field.get("description") else ""
     if kind == "missing":
         return f"is missing{described}"
@@ -224,7 +223,7 @@ def _range(field: Mapping[str, Any]) -> str:
 
 
 def _schema_at(schema: Mapping[str, Any], loc: tuple[str | int, ...]) -> Mapping[str, Any]:
-    """The part of a JSON schema that describes the place `loc`; empty where the schema branches on the value."""
+    """Return the part of a JSON schema that describes `loc`; empty where the schema branches on the value."""
     here: Mapping[str, Any] = schema
     for step in (*loc, None):
         while "$ref" in here:
@@ -234,7 +233,7 @@ def _schema_at(schema: Mapping[str, Any], loc: tuple[str | int, ...]) -> Mapping
             return here
         if isinstance(step, int):
             here = here.get("items", {})
-        elif "discriminator" in here:  # the step is what the entry says of itself
+        elif "discriminator" in here:  # the step is the value of the discriminator
             here = {"$ref": here["discriminator"]["mapping"][step]}
         else:
             below = here.get("properties", {}).get(step, here.get("additionalProperties", {}))

@@ -1,4 +1,4 @@
-"""The keys of a config as Markdown pages, one a section, written from the models that check them."""
+"""The keys of a config as Markdown pages, one per section, written from the models that validate them."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from pipeline.config import DatasetFacts, StrictModel
 from pipeline.stage import Stage
 
 HEADING = "\n## Keys\n"
-"""What stands between the part of a page that people write and the part that is generated."""
+"""Separates the hand-written part of a page from the generated part."""
 
 
 def write_config_pages(folder: Path, stages: Mapping[str, Stage]) -> list[Path]:
-    """Write the keys of every section into its page in `folder`; what a page says above them stays.
+    """Write the keys of every section into its page in `folder`; the text above them is kept.
 
     Returns the pages. Pages that are missing begin with their title alone.
     """
@@ -47,7 +47,7 @@ def section_table(name: str, model: type[StrictModel]) -> str:
     """Return the keys of one section as a Markdown table; those of `dataset` have no prefix."""
     prefix = "" if model is DatasetFacts else f"{name}."
     rows = [f"| `{key}` | {kind} | {default} | {text} |" for key, kind, default, text in _rows(prefix, model)]
-    return "\n".join(["| key | value | default | what it does |", "|---|---|---|---|", *rows]) + "\n"
+    return "\n".join(["| key | value | default | description |", "|---|---|---|---|", *rows]) + "\n"
 
 
 def _sections(stages: Mapping[str, Stage]) -> dict[str, type[StrictModel]]:
@@ -64,39 +64,37 @@ def _rows(prefix: str, model: type[StrictModel]) -> Iterator[tuple[str, str, str
 
 
 def _rows_of_any(prefix: str, models: Mapping[str, type[StrictModel]]) -> Iterator[tuple[str, str, str, str]]:
-    """The rows of models one of which a key holds, by what its entry says of itself: what all of them know first, then
-    what each knows besides."""
+    """Yield the rows of alternative models, by the value of their discriminator: shared keys first."""
     rows = {kind: list(_rows(prefix, model)) for kind, model in models.items()}
     shared = [row for row in next(iter(rows.values()), []) if all(row in of_kind for of_kind in rows.values())]
     yield from shared
     for kind, of_kind in rows.items():
         for key, value, default, text in (row for row in of_kind if row not in shared):
-            yield key, value, default, f"Of `{kind}`: {text[:1].lower()}{text[1:]}"
+            yield key, value, default, f"For `{kind}`: {text[:1].lower()}{text[1:]}"
 
 
 def _inner_models(annotation: Any) -> tuple[dict[str, type[StrictModel]], bool]:
-    """The section models that a key may hold, by the value of the key that tells them apart, and whether it holds a
-    list of them."""
+    """Return the section models that a key may hold, by the value of their discriminator, and whether in a list."""
     many = get_origin(annotation) in (tuple, list)
     inner = get_args(annotation)[0] if many else annotation
     metadata: Sequence[Any] = ()
     if get_origin(inner) is Annotated:
         inner, *metadata = get_args(inner)
-    models = [each for each in (inner, *get_args(inner)) if isinstance(each, type) and issubclass(each, StrictModel)]
-    told_by = next((each.discriminator for each in metadata if isinstance(each, FieldInfo)), None)
-    if not isinstance(told_by, str):
+    models = [kind for kind in (inner, *get_args(inner)) if isinstance(kind, type) and issubclass(kind, StrictModel)]
+    discriminator = next((field.discriminator for field in metadata if isinstance(field, FieldInfo)), None)
+    if not isinstance(discriminator, str):
         return ({"": models[0]}, many) if models else ({}, False)
-    return {str(get_args(each.model_fields[told_by].annotation)[0]): each for each in models}, many
+    return {str(get_args(model.model_fields[discriminator].annotation)[0]): model for model in models}, many
 
 
 def _kind(field: FieldInfo) -> str:
-    """The type of a key and its range, in words."""
+    """Return the type of a key and its range, in words."""
     return f"{_words(field.annotation)}{_bounds(field.metadata)}"
 
 
 def _bounds(metadata: Sequence[Any]) -> str:
-    """A range in words, behind a comma; empty where there is none."""
-    limits = {type(each): each for each in metadata}
+    """Return a range in words, after a comma; empty without one."""
+    limits = {type(limit): limit for limit in metadata}
     low, high = "", ""
     for kind, sign in ((annotated_types.Ge, ">= "), (annotated_types.Gt, "> ")):
         if kind in limits:
@@ -104,17 +102,17 @@ def _bounds(metadata: Sequence[Any]) -> str:
     for limit, sign in ((annotated_types.Le, "<= "), (annotated_types.Lt, "< ")):
         if limit in limits:
             high = f"{sign}{getattr(limits[limit], limit.__name__.lower())}"
-    return "".join(f", {each}" for each in (low, high) if each)
+    return "".join(f", {limit}" for limit in (low, high) if limit)
 
 
 def _words(annotation: Any) -> str:
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return _words(arguments[0]) + "".join(
-            _bounds(each.metadata) for each in arguments if isinstance(each, FieldInfo)
+            _bounds(field.metadata) for field in arguments if isinstance(field, FieldInfo)
         )
     if origin is Literal:
-        return " or ".join(f"`{each}`" for each in arguments)
+        return " or ".join(f"`{value}`" for value in arguments)
     if origin in (tuple, list):
         return f"list of {_words(arguments[0])}"
     if origin is dict:
@@ -136,7 +134,7 @@ def _default(field: FieldInfo) -> str:
     if value is PydanticUndefined:
         return ""
     if isinstance(value, tuple):
-        return ", ".join(f"`{_shown(each)}`" for each in value) or "none"
+        return ", ".join(f"`{_shown(item)}`" for item in value) or "none"
     return f"`{_shown(value)}`" if value != "" else "empty"
 
 

@@ -1,17 +1,17 @@
-"""The four ways in which work fails. Each has its own consequence, and nothing else is raised on purpose."""
+"""The four kinds of failure, each with its own consequence; nothing else is raised on purpose."""
 
 from __future__ import annotations
 
 
 class ConfigError(Exception):
-    """Nothing starts: names the file and the key that are wrong, and what would be right."""
+    """Nothing starts; the message names the file and the key that are wrong, and what would be right."""
 
 
 class Rejected(Exception):
-    """One item is refused; it is written to the shard's rejects and counted, and the run goes on.
+    """One item is refused, written to the shard's rejects and counted; the run goes on.
 
-    `reason` is a short phrase that stays the same from item to item (it is what gets counted);
-    `detail` says what was special about this one.
+    reason: short phrase that is the same for all such items, by which they are counted
+    detail: what is special about this item
     """
 
     def __init__(self, reason: str, detail: str = "") -> None:
@@ -24,8 +24,8 @@ class Rejected(Exception):
 
 
 class ShardFailed(Exception):
-    """One shard could not be made; it is tried again, then quarantined, and the rest goes on."""
+    """One shard failed; it is retried, then quarantined, and the run goes on."""
 
 
 class Fatal(Exception):
-    """Disk full, no permission: everything stops at once and only whole files are left."""
+    """Disk full or no permission: everything stops at once, and only complete files are left."""

@@ -1,7 +1,7 @@
-"""`make plan`: shards, samples, disk and time of a whole dataset before it starts, stage by stage.
+"""`make plan`: estimates of shards, samples, disk and time of a dataset, stage by stage.
 
-What is done is counted. What is not is scaled up from what a sample has cost: in this dataset, as far as it is made, or
-else in a short trial.
+Finished work is counted. The rest is extrapolated from the cost of a sample, measured in this dataset or in a short
+trial.
 """
 
 from __future__ import annotations
@@ -22,13 +22,18 @@ from pipeline.stage import Stage
 from pipeline.trial import Costs, costs_of, run_trial, short_config
 
 _HEADER = ("stage", "shards", "samples", "disk", "time")
-_TRIAL = "trial"
+_TRIAL_FOLDER = "trial"
 
 
 @dataclass(frozen=True)
 class ResourceEstimate:
-    """What a stage will have taken when it is done: shards, samples, bytes, seconds of work, and seconds in which each
-    worker gets going. grows: whether it makes more shards as it goes on, as a search does."""
+    """Resources that a stage will have used when it is done.
+
+    size: bytes on disk
+    seconds: CPU time
+    warm_up: seconds of a worker before its first shard
+    grows: whether the number of shards is a lower bound, as in a search
+    """
 
     stage: str
     shards: int
@@ -39,58 +44,58 @@ class ResourceEstimate:
     grows: bool = False
 
     def wall(self, workers: int) -> float:
-        """Seconds with so many workers."""
+        """Return the seconds by the clock with a number of workers."""
         return self.seconds / workers + self.warm_up
 
 
-def plan_lines(config: Config, stages: Mapping[str, Stage], places: DatasetPaths, workers: int) -> Iterator[str]:
-    """A table with a row for each stage that the config uses and one for all, then what to know about it.
+def plan_lines(config: Config, stages: Mapping[str, Stage], paths: DatasetPaths, workers: int) -> Iterator[str]:
+    """Yield a table with a row for each stage that the config uses and one for the total, then notes.
 
-    Raises ConfigError where the trial fails, and where no stage says how many samples it is asked for.
+    Raises ConfigError where the trial fails, and where no stage has requested samples.
     """
     producer = next((name for name, stage in stages.items() if stage.requested_samples(config)), None)
     if producer is None:
         raise ConfigError(f"{config.path}: no stage of this config says how many samples it will make")
-    survey = Inventory(config, stages, places)
-    costs = {name: known for name in stages if (known := _own_costs(survey, stages, name)) is not None}
+    inventory = Inventory(config, stages, paths)
+    costs = {name: known for name in stages if (known := _own_costs(inventory, stages, name)) is not None}
     start, short = time.monotonic(), short_config(config, stages)
     tried = len(costs) < len(stages)
     if tried:
-        yield "a short trial first: some thirty samples through all stages"
-        below = places.work / _TRIAL
+        yield "running a short trial: about thirty samples through all stages"
+        below = paths.work / _TRIAL_FOLDER
         try:
-            costs = run_trial(short, stages, DatasetPaths(below, config.name, places.out)) | costs
+            costs = run_trial(short, stages, DatasetPaths(below, config.name, paths.out)) | costs
         finally:
             shutil.rmtree(below, ignore_errors=True)
-    forecasts = [_forecast(survey, stages, name, costs[name], producer, short) for name in stages]
-    used = [each for each in forecasts if each.shards]
+    estimates = [_estimate(inventory, stages, name, costs[name], producer, short) for name in stages]
+    used = [estimate for estimate in estimates if estimate.shards]
     yield from _table(used, workers)
     if tried:
         yield (
-            f"about, by a trial of {duration_text(time.monotonic() - start)}: a machine with other work takes longer, "
+            f"estimated by a trial of {duration_text(time.monotonic() - start)}: a busy machine takes longer, "
             "and few samples may mislead"
         )
-    if any(each.grows for each in used):
-        yield "+: and as many more as it takes; a search slows down as it goes on, and ends when it ends"
-    size, free = sum(each.size for each in used), shutil.disk_usage(places.out).free
-    yield f"{byte_size(free)} are free at {places.out}" + ("" if size < free else ": that is not enough")
+    if any(estimate.grows for estimate in used):
+        yield "+: at least; a search makes more shards until it has enough, and slows down as it goes on"
+    size, free = sum(estimate.size for estimate in used), shutil.disk_usage(paths.out).free
+    yield f"{byte_size(free)} are free at {paths.out}" + ("" if size < free else ": that is not enough")
 
 
-def _own_costs(survey: Inventory, stages: Mapping[str, Stage], name: str) -> Costs | None:
-    """What the stage has cost in this dataset, or None where too little of it is made to tell."""
-    if not all(survey.complete(each) for each in stages[name].inputs):
+def _own_costs(inventory: Inventory, stages: Mapping[str, Stage], name: str) -> Costs | None:
+    """Return the cost of the stage in this dataset; None where too little of it is finished."""
+    if not all(inventory.complete(read) for read in stages[name].inputs):
         return None
-    surveyed = survey.stage(name)
-    costs = costs_of(surveyed, {shard: record.seconds for shard, record in surveyed.records.items()})
-    if not surveyed.missing:
+    state = inventory.stage(name)
+    costs = costs_of(state, {shard: record.seconds for shard, record in state.records.items()})
+    if not state.missing:
         return costs
-    return costs if costs.samples and not stages[name].requested_samples(survey.config) else None
+    return costs if costs.samples and not stages[name].requested_samples(inventory.config) else None
 
 
-def _forecast(
-    survey: Inventory, stages: Mapping[str, Stage], name: str, costs: Costs, producer: str, short: Config
+def _estimate(
+    inventory: Inventory, stages: Mapping[str, Stage], name: str, costs: Costs, producer: str, short: Config
 ) -> ResourceEstimate:
-    made = ResourceEstimate(
+    measured = ResourceEstimate(
         stage=name,
         shards=costs.shards + costs.other_shards,
         samples=costs.samples,
@@ -98,13 +103,13 @@ def _forecast(
         seconds=costs.samples * costs.seconds_each + costs.seconds_once,
         warm_up=costs.warm_up,
     )
-    if survey.complete(name) or not costs.samples or producer not in upstream(stages, name):
-        return made
-    wanted, tried = stages[producer].requested_samples(survey.config), stages[producer].requested_samples(short)
-    if survey.complete(producer):
-        wanted = [record.samples for record in survey.stage(producer).records.values() if record.samples]
+    if inventory.complete(name) or not costs.samples or producer not in upstream(stages, name):
+        return measured
+    wanted, tried = stages[producer].requested_samples(inventory.config), stages[producer].requested_samples(short)
+    if inventory.complete(producer):
+        wanted = [record.samples for record in inventory.stage(producer).records.values() if record.samples]
     samples = sum(wanted)
-    # A search for more takes longer; a contact sheet of more does not.
+    # Shards without samples take longer in a larger search, but not in later stages.
     once = samples / sum(tried) if name == producer else 1.0
     return ResourceEstimate(
         stage=name,
@@ -117,20 +122,21 @@ def _forecast(
     )
 
 
-def _table(forecasts: Sequence[ResourceEstimate], workers: int) -> Iterator[str]:
-    whole = (
-        "all",
-        f"{sum(each.shards for each in forecasts):,}",
-        f"{max(each.samples for each in forecasts):,}",
-        byte_size(sum(each.size for each in forecasts)),
-        duration_text(sum(each.wall(workers) for each in forecasts)),
+def _table(estimates: Sequence[ResourceEstimate], workers: int) -> Iterator[str]:
+    total = (
+        "total",
+        f"{sum(estimate.shards for estimate in estimates):,}",
+        f"{max(estimate.samples for estimate in estimates):,}",
+        byte_size(sum(estimate.size for estimate in estimates)),
+        duration_text(sum(estimate.wall(workers) for estimate in estimates)),
     )
-    rows = [_HEADER, *(_row(each, workers) for each in forecasts), whole]
+    rows = [_HEADER, *(_row(estimate, workers) for estimate in estimates), total]
     widths = [max(len(row[column]) for row in rows) for column in range(len(_HEADER))]
     for name, *cells in rows:
         yield "  ".join([name.ljust(widths[0]), *map(str.rjust, cells, widths[1:])])
 
 
-def _row(each: ResourceEstimate, workers: int) -> tuple[str, ...]:
-    shards = f"{each.shards:,}{'+' if each.grows else ''}"
-    return (each.stage, shards, f"{each.samples:,}", byte_size(each.size), duration_text(each.wall(workers)))
+def _row(estimate: ResourceEstimate, workers: int) -> tuple[str, ...]:
+    shards = f"{estimate.shards:,}{'+' if estimate.grows else ''}"
+    time_text = duration_text(estimate.wall(workers))
+    return (estimate.stage, shards, f"{estimate.samples:,}", byte_size(estimate.size), time_text)

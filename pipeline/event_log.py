@@ -1,5 +1,4 @@
-"""What people see of a run: one bar a stage with rate and time left, now and then a line where there is no
-terminal, and a log file beside the records."""
+"""Output of a run: a progress bar for each stage, or a line now and then without a terminal, and a log file."""
 
 from __future__ import annotations
 
@@ -14,12 +13,12 @@ from tqdm import tqdm
 
 from pipeline.time_left import TimeLeft
 
-_LINE_EVERY = 20.0
-"""Seconds between two lines where there is no terminal."""
+_LINE_SECONDS = 20.0
+"""Between two lines where there is no terminal."""
 
 
 def duration_text(seconds: float) -> str:
-    """A length of time for people: `8s`, `4m10s`, `2h05m`."""
+    """Return a duration for people: `8s`, `4m10s`, `2h05m`."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole}s"
@@ -30,11 +29,15 @@ def duration_text(seconds: float) -> str:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a stage is.
+    """Progress of a stage.
 
-    planned: shards as far as they are known; done: those that are finished, running ones by how far they are; failed:
-    those set aside. work: samples that finished and planned shards hold, where the plan says so; worked: those that are
-    made, with those of running shards. samples: those of finished shards; rejects: items that these refused.
+    planned: number of shards planned so far
+    done: number of finished shards, plus the finished fractions of running ones
+    failed: number of quarantined shards
+    work: number of samples that planned shards will hold, where the plan says so; else 0
+    worked: number of those samples that are made, running shards included
+    samples: number of samples in finished shards
+    rejects: number of items that finished shards refused
     """
 
     planned: int
@@ -47,18 +50,18 @@ class Progress:
 
 
 class EventLog:
-    """The bar, the lines and the log of one stage's run. Nothing is shown of a stage that has nothing to do."""
+    """Bar, lines and log of one stage's run."""
 
     def __init__(self, stage: str, log: Path) -> None:
         self._stage = stage
         self._log = log
         self._start = time.monotonic()
-        self._said = self._start
+        self._last_line = self._start
         self._left = TimeLeft()
         self._bar: tqdm[NoReturn] | None = None
 
     def say(self, text: str) -> None:
-        """A line for people and for the log."""
+        """Write a line to the terminal and to the log."""
         self.note(text)
         text = f"{self._stage}: {text}"
         if self._bar is not None:
@@ -67,7 +70,7 @@ class EventLog:
             print(text, file=sys.stderr, flush=True)
 
     def note(self, text: str) -> None:
-        """Lines for the log alone. A log that cannot be written stops nothing."""
+        """Write lines to the log alone; a log that cannot be written stops nothing."""
         stamp = datetime.now().astimezone().isoformat(timespec="seconds")
         try:
             with open(self._log, "a", encoding="utf-8") as stream:
@@ -75,44 +78,44 @@ class EventLog:
         except OSError:
             pass
 
-    def show(self, standing: Progress) -> None:
-        """Say how far the stage is: in the bar, or by a line now and then."""
+    def show(self, progress: Progress) -> None:
+        """Show the progress: in the bar, or by a line now and then."""
         now = time.monotonic()
-        left = self._left.after(standing.worked, standing.work, now)
-        text = progress_text(standing, now - self._start, left)
+        left = self._left.after(progress.worked, progress.work, now)
+        text = progress_text(progress, now - self._start, left)
         if sys.stderr.isatty():
             if self._bar is None:
                 self._bar = tqdm(bar_format=self._stage, dynamic_ncols=True, leave=False)
-            # How many shards there will be is known where samples are: elsewhere a bar would run backwards.
-            bar = "{percentage:3.0f}% |{bar:20}| " if standing.work else ""
+            # Without a number of samples the number of shards grows, and a bar would run backwards.
+            bar = "{percentage:3.0f}% |{bar:20}| " if progress.work else ""
             self._bar.bar_format = f"{self._stage:<14}{bar}{{desc}}"
-            self._bar.total, self._bar.n = standing.work, standing.worked
+            self._bar.total, self._bar.n = progress.work, progress.worked
             self._bar.set_description_str(text)
-        elif now - self._said >= _LINE_EVERY:
-            self._said = now
+        elif now - self._last_line >= _LINE_SECONDS:
+            self._last_line = now
             self.say(text)
 
     def close(self) -> None:
-        """Take the bar away: what there is to say of the finished stage is said in lines."""
+        """Remove the bar."""
         if self._bar is not None:
             self._bar.close()
             self._bar = None
 
 
-def progress_text(standing: Progress, seconds: float, left: float | None) -> str:
-    """What is told of a stage that has run for `seconds` and needs about `left` more, if that can be told."""
-    if standing.work:
-        told = [f"{int(standing.worked):,} of {standing.work:,} samples, {int(standing.done):,}"]
+def progress_text(progress: Progress, seconds: float, left: float | None) -> str:
+    """Describe a stage that has run for `seconds` and needs about `left` seconds more, where that is known."""
+    if progress.work:
+        items = [f"{int(progress.worked):,} of {progress.work:,} samples, {int(progress.done):,}"]
     else:
-        told = [f"{standing.done:,.1f}"]
-    told[0] += f" of {standing.planned:,} shards"
-    if standing.samples and not standing.work:
-        told.append(f"{standing.samples:,} samples")
-    if standing.rejects:
-        told.append(f"{standing.rejects:,} rejects")
-    if standing.failed:
-        told.append(f"{standing.failed} set aside")
-    told.append(f"{duration_text(seconds)} gone")
+        items = [f"{progress.done:,.1f}"]
+    items[0] += f" of {progress.planned:,} shards"
+    if progress.samples and not progress.work:
+        items.append(f"{progress.samples:,} samples")
+    if progress.rejects:
+        items.append(f"{progress.rejects:,} rejects")
+    if progress.failed:
+        items.append(f"{progress.failed} quarantined")
+    items.append(f"{duration_text(seconds)} elapsed")
     if left is not None:
-        told.append(f"about {duration_text(left)} left")
-    return ", ".join(told)
+        items.append(f"about {duration_text(left)} left")
+    return ", ".join(items)

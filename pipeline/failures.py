@@ -1,4 +1,4 @@
-"""What a failed shard costs: another try, one with nothing beside it, or that it is set aside and the rest goes on."""
+"""Consequences of a failed shard: a retry, a retry in isolation, or quarantine while the rest goes on."""
 
 from __future__ import annotations
 
@@ -11,53 +11,53 @@ from pipeline.records import fingerprint
 from pipeline.shards import json_bytes
 from pipeline.task import Job, Report
 
-_DEATHS_BEFORE_ALONE = 3
+_DEATHS_BEFORE_ISOLATION = 3
 
 
 class Failures:
-    """Counts what goes wrong in one run of a stage. `aside`: the shards that were set aside, and why; `alone`: those
-    that are to be tried with nothing beside them."""
+    """Counts the failures of one run of a stage.
 
-    def __init__(self, places: StagePaths, journal: EventLog, retries: int, aside: dict[str, str]) -> None:
-        self.aside = aside
-        self.alone: deque[Job] = deque()
-        self._places = places
-        self._journal = journal
+    quarantined: message by name of each shard that is not tried again in this run
+    isolated: jobs that are tried while no other shard runs
+    """
+
+    def __init__(self, paths: StagePaths, log: EventLog, retries: int, quarantined: dict[str, str]) -> None:
+        self.quarantined = quarantined
+        self.isolated: deque[Job] = deque()
+        self._paths = paths
+        self._log = log
         self._retries = retries
         self._failed: Counter[str] = Counter()
         self._died: Counter[str] = Counter()
 
     def death(self, job: Job, cause: str, ready: deque[Job]) -> None:
-        """A shard has killed its worker: it goes back to `ready` twice, then it is tried alone, then set aside."""
+        """Handle a shard that killed its worker: retry it twice, then in isolation, then quarantine it."""
         self._died[job.shard.name] += 1
         deaths = self._died[job.shard.name]
-        self._journal.note(f"{job.shard.name}: {cause}, time {deaths}")
-        if deaths < _DEATHS_BEFORE_ALONE:
+        self._log.note(f"{job.shard.name}: {cause}, time {deaths}")
+        if deaths < _DEATHS_BEFORE_ISOLATION:
             ready.append(job)
-        elif deaths == _DEATHS_BEFORE_ALONE:
-            self.alone.append(job)
+        elif deaths == _DEATHS_BEFORE_ISOLATION:
+            self.isolated.append(job)
         else:
-            self._set_aside(job, Report(job.shard.name, "failed", f"{cause}, {deaths} times, at last alone"))
+            self._quarantine(job, Report(job.shard.name, "failed", f"{cause}, {deaths} times, the last in isolation"))
 
     def failure(self, job: Job, report: Report, ready: deque[Job]) -> None:
-        """A shard has failed: it goes back to `ready` as often as is wanted, then it is set aside.
-
-        Raises Fatal for what no other shard would survive either.
-        """
+        """Handle a failed shard: retry it, then quarantine it. Raises Fatal for what would fail every shard."""
         if report.status == "fatal":
-            self._journal.note(report.trace)
+            self._log.note(report.trace)
             raise Fatal(f"shard {job.shard.name} of {job.stage}: {report.message}")
         self._failed[job.shard.name] += 1
         if report.status == "failed" and self._failed[job.shard.name] <= self._retries:
-            self._journal.note(f"{job.shard.name} failed and is tried again: {report.message}\n{report.trace}")
+            self._log.note(f"{job.shard.name} failed and is retried: {report.message}\n{report.trace}")
             ready.append(job)
         else:
-            self._set_aside(job, report)
+            self._quarantine(job, report)
 
-    def _set_aside(self, job: Job, report: Report) -> None:
+    def _quarantine(self, job: Job, report: Report) -> None:
         name = job.shard.name
-        self.aside[name] = report.message
-        self._journal.say(f"shard {name} is set aside: {report.message}")
-        self._journal.note(report.trace)
-        described = {"fingerprint": fingerprint(job.recipe), "message": report.message, "trace": report.trace}
-        write_atomically(self._places.failed / f"{name}.json", json_bytes(described))
+        self.quarantined[name] = report.message
+        self._log.say(f"shard {name} is quarantined: {report.message}")
+        self._log.note(report.trace)
+        failure = {"fingerprint": fingerprint(job.recipe), "message": report.message, "trace": report.trace}
+        write_atomically(self._paths.failed / f"{name}.json", json_bytes(failure))

@@ -1,4 +1,4 @@
-"""The end of a stage: what is no longer planned goes away, what is for users is put in place, then the manifest."""
+"""The end of a stage: delete unplanned files, publish results, then write the manifest."""
 
 from __future__ import annotations
 
@@ -12,69 +12,69 @@ from pipeline.paths import DatasetPaths, file_digest, read_json, remove, sync_fo
 from pipeline.shards import json_bytes
 
 
-def finish_stage(survey: Inventory, name: str, places: DatasetPaths) -> None:
-    """Close a stage whose every planned shard is done; done again, it changes nothing.
+def finish_stage(inventory: Inventory, name: str, paths: DatasetPaths) -> None:
+    """Close a stage whose every planned shard is done; idempotent.
 
     Raises ValueError when `publish` names a path outside the output folder or a file that no shard has.
     """
-    surveyed = survey.stage(name)
-    _forget_unplanned(surveyed)
+    state = inventory.stage(name)
+    _delete_unplanned(state)
     rejects: Counter[str] = Counter()
-    for record in surveyed.records.values():
+    for record in state.records.values():
         rejects.update(record.rejects)
-    publish(surveyed, places)
+    publish(state, paths)
     manifest = json_bytes(
         {
             "stage": name,
-            "dataset": survey.config.name,
-            "version": survey.config.version,
-            "seed": survey.config.seed,
-            "samples": sum(record.samples for record in surveyed.records.values()),
+            "dataset": inventory.config.name,
+            "version": inventory.config.version,
+            "seed": inventory.config.seed,
+            "samples": sum(record.samples for record in state.records.values()),
             "rejects": dict(rejects),
-            "code": surveyed.code,
-            "shards": surveyed.fingerprints,
+            "code": state.code,
+            "shards": state.fingerprints,
         }
     )
-    if not surveyed.paths.manifest.is_file() or surveyed.paths.manifest.read_bytes() != manifest:
-        _write(surveyed.paths.manifest, manifest)
+    if not state.paths.manifest.is_file() or state.paths.manifest.read_bytes() != manifest:
+        _write(state.paths.manifest, manifest)
 
 
-def publish(surveyed: StageInventory, places: DatasetPaths) -> None:
-    """Bring the output folder to what the stage publishes, and take away what it published before and no more.
+def publish(state: StageInventory, paths: DatasetPaths) -> None:
+    """Put what the stage publishes into the output folder, and remove what it published before.
 
-    Raises ValueError when that is a path outside the output folder or a file that no finished shard has.
+    Raises ValueError when `publish` names a path outside the output folder or a file that no finished shard has.
     """
-    wanted = {_inside(target): file for target, file in sorted(surveyed.stage.publish(surveyed.view).items())}
-    listing = surveyed.paths.published
+    wanted = {_inside(target): file for target, file in sorted(state.stage.publish(state.view).items())}
+    listing = state.paths.published
     before = _listed(listing)
     gone = [target for target in before if target not in wanted]
     if set(before) != set(wanted):
-        # Everything that may lie there is listed before it does, so that no kill leaves a file nobody knows of.
-        _write(listing, json_bytes(sorted(str(each) for each in {*before, *wanted})))
+        # Files are listed before they are written, so that a kill leaves none that is not listed.
+        _write(listing, json_bytes(sorted(map(str, {*before, *wanted}))))
     for target, file in wanted.items():
-        record = surveyed.records.get(file.partition(".")[0])
+        record = state.records.get(file.partition(".")[0])
         if record is None or file not in record.files:
-            raise ValueError(f"stage {surveyed.stage.name} publishes {file!r}, which is no file of its shards")
-        _put(surveyed.paths.root / file, places.out / target, record.files[file]["sha256"])
+            raise ValueError(f"stage {state.stage.name} publishes {file!r}, which is no file of its shards")
+        _put(state.paths.root / file, paths.out / target, record.files[file]["sha256"])
     for target in gone:
-        _take_away(places.out, target)
+        _unpublish(paths.out, target)
     if gone:
-        _write(listing, json_bytes(sorted(str(each) for each in wanted)))
+        _write(listing, json_bytes(sorted(map(str, wanted))))
 
 
-def _forget_unplanned(surveyed: StageInventory) -> None:
-    places, planned = surveyed.paths, surveyed.fingerprints
-    # Records first: a record without its files is a shard to be made, files without a record are nothing.
-    for folder in (places.records, places.root, places.rejects, places.failed, places.progress):
+def _delete_unplanned(state: StageInventory) -> None:
+    paths, planned = state.paths, state.fingerprints
+    # Records first: a record without its files is a shard to make, files without a record are nothing.
+    for folder in (paths.records, paths.root, paths.rejects, paths.failed, paths.progress):
         for path in folder.iterdir():
             if path.is_file() and path.name.lstrip(".").partition(".")[0] not in planned:
                 path.unlink(missing_ok=True)
 
 
 def _listed(listing: Path) -> list[Path]:
-    """What the stage has published before; nothing where that cannot be read any more, and nobody knows of it then."""
+    """Return what the stage published before; nothing where the listing is missing or corrupted."""
     try:
-        return [_inside(each) for each in read_json(listing)]
+        return [_inside(target) for target in read_json(listing)]
     except (ValueError, TypeError):
         return []
 
@@ -96,20 +96,20 @@ def _put(source: Path, target: Path, digest: str) -> None:
     if target.is_file() and (source.samefile(target) or file_digest(target) == digest):
         return
     target.parent.mkdir(parents=True, exist_ok=True)
-    beside = temporary_path(target)
-    beside.unlink(missing_ok=True)
+    temporary = temporary_path(target)
+    temporary.unlink(missing_ok=True)
     try:
-        os.link(source, beside)
-    except OSError:  # a disk without links; when it is full instead, the copy says so
-        with open(source, "rb") as stream, open(beside, "wb") as copy:
+        os.link(source, temporary)
+    except OSError:  # no links on this disk; if it is full instead, the copy raises
+        with open(source, "rb") as stream, open(temporary, "wb") as copy:
             shutil.copyfileobj(stream, copy)
             copy.flush()
             os.fsync(copy.fileno())
-    os.replace(beside, target)
+    os.replace(temporary, target)
     sync_folder(target.parent)
 
 
-def _take_away(out: Path, target: Path) -> None:
+def _unpublish(out: Path, target: Path) -> None:
     (out / target).unlink(missing_ok=True)
     for folder in target.parents:
         if folder != Path(".") and (out / folder).is_dir() and not any((out / folder).iterdir()):

@@ -1,4 +1,4 @@
-"""The mill's own part of `verify`: every byte of every finished shard is what its record says."""
+"""Integrity of finished shards: every byte of every file is what its record says."""
 
 from __future__ import annotations
 
@@ -12,50 +12,50 @@ from pipeline.records import ShardRecord, read_record
 from pipeline.stage import Stage
 
 
-def corrupted_shards(config: Config, stages: Mapping[str, Stage], places: DatasetPaths) -> Iterator[str]:
-    """A line for each stage that is unfinished, for each file whose bytes differ from its record, and for each file in
-    the output folder that is not the one that a stage put there. A stage that publishes parts, as training does its
-    models, is not unfinished because nobody has asked for some of them.
+def corrupted_shards(config: Config, stages: Mapping[str, Stage], paths: DatasetPaths) -> Iterator[str]:
+    """Yield a line for each unfinished stage, each file whose bytes differ from its record, and each published file
+    that is missing or altered.
 
-    The record of a damaged shard is withdrawn, so that the next run makes that shard again and nothing else; it puts
-    published files back, too.
+    Removes the record of a corrupted shard, so that the next run rebuilds that shard and restores published files. A
+    stage that publishes incomplete results, such as training, does not count as unfinished.
     """
-    survey = Inventory(config, stages, places)
+    inventory = Inventory(config, stages, paths)
     for name in stages:
-        surveyed = survey.stage(name)
-        missing = [] if surveyed.stage.publishes_incomplete else surveyed.missing
+        state = inventory.stage(name)
+        missing = [] if state.stage.publishes_incomplete else state.missing
         if missing:
-            yield f"{name}: {len(missing)} of {len(surveyed.shards)} shards are not made, first {missing[0].name}"
-        for shard, record in surveyed.records.items():
-            for file in () if shard in surveyed.pruned else corrupted_files(record, surveyed.paths):
-                remove(surveyed.paths.records / f"{shard}.json")
-                yield f"{name}: {file} is damaged; the next run makes {shard} again"
+            yield f"{name}: {len(missing)} of {len(state.shards)} shards are not made, first {missing[0].name}"
+        for shard, record in state.records.items():
+            for file in () if shard in state.pruned else corrupted_files(record, state.paths):
+                remove(state.paths.records / f"{shard}.json")
+                yield f"{name}: {file} is corrupted; the next run rebuilds {shard}"
         if not missing:
-            yield from (f"{name}: {path} is not what the stage made" for path in _altered(surveyed, places))
+            yield from (f"{name}: {path} is not what the stage made" for path in _altered(state, paths))
 
 
-def _altered(surveyed: StageInventory, places: DatasetPaths) -> Iterator[Path]:
-    """The published files that are gone, or have other bytes than the stage gave them."""
-    for target, file in surveyed.stage.publish(surveyed.view).items():
-        path, made = places.out / target, surveyed.paths.root / file
-        noted = surveyed.records[file.partition(".")[0]].files[file]["sha256"]
-        # what is linked has been looked at as a file of the shard
-        if not path.is_file() or not ((made.is_file() and path.samefile(made)) or file_digest(path) == noted):
+def _altered(state: StageInventory, paths: DatasetPaths) -> Iterator[Path]:
+    """Yield the published files that are missing, or have other bytes than the stage gave them."""
+    for target, file in state.stage.publish(state.view).items():
+        path, original = paths.out / target, state.paths.root / file
+        noted = state.records[file.partition(".")[0]].files[file]["sha256"]
+        # A link to a file of the shard was checked with the shard.
+        linked = path.is_file() and original.is_file() and path.samefile(original)
+        if not linked and not (path.is_file() and file_digest(path) == noted):
             yield path
 
 
-def corrupted_files(record: ShardRecord, places: StagePaths) -> list[Path]:
-    """The files of a shard whose bytes are not what its record says, or that are gone."""
-    paths = {places.root / file: noted["sha256"] for file, noted in record.files.items()}
-    return [path for path, digest in paths.items() if not path.is_file() or file_digest(path) != digest]
+def corrupted_files(record: ShardRecord, paths: StagePaths) -> list[Path]:
+    """Return the files of a shard that are missing or whose bytes differ from its record."""
+    digests = {paths.root / file: noted["sha256"] for file, noted in record.files.items()}
+    return [path for path, digest in digests.items() if not path.is_file() or file_digest(path) != digest]
 
 
-def withdraw_corrupted(places: DatasetPaths, source: str) -> bool:
-    """Take away the record of `source`, `stage/shard`, if its files are not what it says; tell whether it was so."""
+def withdraw_corrupted(paths: DatasetPaths, source: str) -> bool:
+    """Remove the record of `source`, `stage/shard`, if one of its files is corrupted; return whether it was."""
     stage, _, shard = source.partition("/")
-    path = places.stage(stage).records / f"{shard}.json"
+    path = paths.stage(stage).records / f"{shard}.json"
     record = read_record(path)
-    if record is not None and not corrupted_files(record, places.stage(stage)):
+    if record is not None and not corrupted_files(record, paths.stage(stage)):
         return False
     remove(path)
     return True

@@ -1,4 +1,4 @@
-"""A cluster on this machine: a scheduler and its workers, each a process of its own. To try it, and for tests."""
+"""A cluster on this machine, for trying it out and for tests: a scheduler and its workers, each a process."""
 
 from __future__ import annotations
 
@@ -11,23 +11,25 @@ import time
 from pipeline.termination import die_with_parent, exit_on_signals
 
 _ENVIRONMENT = {
-    # Deaths are counted by the mill, shard by shard: the scheduler's own count blames whatever a dead worker held.
+    # The engine counts deaths by shard; the scheduler's own count blames every task of a dead worker.
     "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1000000",
     "DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "warning",
 }
 
 
 def serve_cluster(workers: int, port: int) -> int:
-    """Start a scheduler on `port` of this machine alone, and `workers` workers of one thread each, and stay until a
-    signal ends them all. The exit code: 1 where the scheduler has ended by itself."""
+    """Run a scheduler on a port of this machine, and workers of one thread each, until a signal ends them.
+
+    Returns the exit code: 1 where the scheduler ended by itself.
+    """
     address = f"tcp://127.0.0.1:{port}"
     with exit_on_signals(), tempfile.TemporaryDirectory(prefix="shapemill-cluster-") as folder:
-        alone = ["--no-dashboard", "--dashboard-address", "127.0.0.1:0"]
-        scheduler = _start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), *alone)
-        one = ["--nthreads", "1", "--no-nanny", "--memory-limit", "0", "--local-directory", folder]
+        quiet = ["--no-dashboard", "--dashboard-address", "127.0.0.1:0"]
+        scheduler = _start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), *quiet)
+        single = ["--nthreads", "1", "--no-nanny", "--memory-limit", "0", "--local-directory", folder]
         started = [scheduler]
         try:
-            started += [_start("distributed.cli.dask_worker", address, *one, *alone) for _ in range(workers)]
+            started += [_start("distributed.cli.dask_worker", address, *single, *quiet) for _ in range(workers)]
             print(f"a scheduler and {workers} workers: make dataset CLUSTER={address}", flush=True)
             while scheduler.poll() is None:
                 time.sleep(0.2)

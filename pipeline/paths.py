@@ -1,18 +1,18 @@
-"""Where things lie on disk, and how a file gets there whole.
+"""Paths of everything on disk, and atomic writing.
 
-    OUT/.work/<dataset>/log.txt                    what the mill did, by the minute
-    OUT/.work/<dataset>/workers.txt                what workers and native libraries printed
-    OUT/.work/<dataset>/<stage>/<shard>.<...>      the files of finished shards
-    OUT/.work/<dataset>/<stage>/records/           one record a finished shard
+    OUT/.work/<dataset>/log.txt                    event log
+    OUT/.work/<dataset>/workers.txt                output of workers and native libraries
+    OUT/.work/<dataset>/<stage>/<shard>.<...>      files of finished shards
+    OUT/.work/<dataset>/<stage>/records/           one record for each finished shard
     OUT/.work/<dataset>/<stage>/rejects/           refused items, one JSON line each
-    OUT/.work/<dataset>/<stage>/failed/            shards set aside, with their tracebacks
-    OUT/.work/<dataset>/<stage>/progress/          how far running shards are
-    OUT/.work/<dataset>/<stage>/mill/              manifest.json (written last: all shards of the finished stage with
+    OUT/.work/<dataset>/<stage>/failed/            quarantined shards, with their tracebacks
+    OUT/.work/<dataset>/<stage>/progress/          progress of running shards
+    OUT/.work/<dataset>/<stage>/engine/            manifest.json (written last: all shards of the finished stage with
                                                    their fingerprints, and the digests of its code), published.json
-                                                   (the files that it has put in OUT itself), let-go.json (the
-                                                   records whose files were taken away on purpose), locks
+                                                   (files that the stage has put into OUT), pruned.json (records whose
+                                                   files were pruned), locks
 
-A file that begins with a dot and ends in `.tmp` is being written; every other file is whole.
+A file whose name begins with a dot and ends in `.tmp` is being written; every other file is complete.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class StagePaths:
 
     @property
     def engine(self) -> Path:
-        return self.root / "mill"
+        return self.root / "engine"
 
     @property
     def manifest(self) -> Path:
@@ -67,10 +67,10 @@ class StagePaths:
 
     @property
     def pruned(self) -> Path:
-        return self.engine / "let-go.json"
+        return self.engine / "pruned.json"
 
     def make(self) -> None:
-        """Make the folders. Raises Fatal when the disk does not let us."""
+        """Make the folders. Raises Fatal where the disk refuses."""
         try:
             for folder in (self.records, self.rejects, self.failed, self.progress, self.engine):
                 folder.mkdir(parents=True, exist_ok=True)
@@ -82,7 +82,7 @@ class StagePaths:
 class DatasetPaths:
     """The folders of one dataset under an output folder.
 
-    shelf: where what other datasets have published is looked for, the output folder itself if not said.
+    shelf: folder of published files of other datasets; without, the output folder
     """
 
     out: Path
@@ -105,9 +105,9 @@ class DatasetPaths:
         return StagePaths(self.work / name)
 
     def published(self, file: str) -> Path:
-        """Where a dataset publishes a file, `<folder>/<file>` below the output folder, whether it is there or not.
+        """Return the path of a published file, `<folder>/<file>` below the output folder; it need not exist.
 
-        Raises ValueError for a name that leads elsewhere.
+        Raises ValueError for a name that leads out of the output folder.
         """
         if not file or any(step in ("", ".", "..") for step in file.split("/")) or file.startswith("."):
             raise ValueError(f"{file!r} is no file below the output folder")
@@ -115,12 +115,12 @@ class DatasetPaths:
 
 
 def temporary_path(path: Path) -> Path:
-    """Where `path` is written before it is whole: beside it, so that the rename is atomic."""
+    """Return where `path` is written before it is complete: in the same folder, so that the rename is atomic."""
     return path.with_name(f".{path.name}.tmp")
 
 
 def remove(path: Path) -> None:
-    """Take away what stands at a place of the mill's own, whatever it is: nothing there belongs to anybody else."""
+    """Delete a file or folder in a folder of the engine's own."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:
@@ -128,7 +128,7 @@ def remove(path: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Bring renames in `folder` to the disk."""
+    """Flush renames in a folder to the disk."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(descriptor)
@@ -137,22 +137,22 @@ def sync_folder(folder: Path) -> None:
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a small file so that it is there whole or not at all, after a power cut too."""
-    beside = temporary_path(path)
+    """Write a small file completely or not at all, even if the power fails."""
+    temporary = temporary_path(path)
     try:
-        with open(beside, "wb") as stream:
+        with open(temporary, "wb") as stream:
             stream.write(content)
             stream.flush()
             os.fsync(stream.fileno())
-        os.replace(beside, path)
+        os.replace(temporary, path)
     except BaseException:
-        beside.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
 
 
 def read_json(path: Path) -> Any:
-    """The JSON in a file of the mill's own; None where there is none, or none any more: the disk has spoilt it.
+    """Return the JSON in a file of the engine's own; None where it is missing or corrupted.
 
     Raises PermissionError.
     """
@@ -165,9 +165,9 @@ def read_json(path: Path) -> Any:
 
 
 def write_file(path: Path, content: bytes) -> Path:
-    """Write a file that a command was asked for, whole, and the folders above it; `path`.
+    """Write a file that a command was asked for, and the folders above it; return its path.
 
-    Raises ConfigError where that cannot be.
+    Raises ConfigError where that is impossible.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -178,13 +178,13 @@ def write_file(path: Path, content: bytes) -> Path:
 
 
 def file_digest(path: Path) -> str:
-    """The sha256 of a file's bytes, in hex."""
+    """Return the sha256 of a file's bytes, in hex."""
     with open(path, "rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def fatal_cause(error: BaseException | None) -> OSError | None:
-    """The error in the chain of causes of `error` that no other shard would survive either: disk full, no right."""
+    """Return the error in the chain of causes that would fail every shard: disk full or no permission; else None."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in _FATAL:
             return error

@@ -1,4 +1,4 @@
-"""How far a stage is, and what there is to say of it at the end: of the survey and what is under way."""
+"""Progress of a stage while it runs, and its closing line."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from pipeline.inventory import StageInventory
 from pipeline.paths import StagePaths
 
 
-def stage_progress(surveyed: StageInventory, running: Iterable[str], failed: int) -> Progress:
-    """How far the stage is while the shards `running` are made and so many have `failed`."""
-    records = surveyed.records
-    share = {name: _how_far(surveyed.paths, name) for name in running} | dict.fromkeys(records, 1.0)
-    work = {shard.name: int(shard.params.get("samples", 0)) for shard in surveyed.shards}
+def stage_progress(state: StageInventory, running: Iterable[str], failed: int) -> Progress:
+    """Return the progress of a stage: `running` names the shards being made, `failed` counts quarantined ones."""
+    records = state.records
+    share = {name: _finished_share(state.paths, name) for name in running} | dict.fromkeys(records, 1.0)
+    work = {shard.name: int(shard.params.get("samples", 0)) for shard in state.shards}
     return Progress(
-        planned=len(surveyed.shards),
+        planned=len(state.shards),
         done=sum(share.values()),
         failed=failed,
         work=sum(work.values()),
@@ -26,28 +26,33 @@ def stage_progress(surveyed: StageInventory, running: Iterable[str], failed: int
     )
 
 
-def closing_line(surveyed: StageInventory, made: int, failed: Mapping[str, str], left: int) -> str:
-    """What a run says of the stage when it ends: `made` shards are new, `failed` are set aside, so many are `left`."""
-    records = surveyed.records.values()
-    text = f"{len(records):,} of {len(surveyed.shards):,} shards, {sum(each.samples for each in records):,} samples"
-    text += f", {byte_size(sum(each.bytes_on_disk() for each in records))}"
+def closing_line(state: StageInventory, made: int, failed: Mapping[str, str], left: int) -> str:
+    """Return the line that ends a run.
+
+    made: number of shards made by this run
+    failed: message by name of each quarantined shard
+    left: number of shards that are neither made nor failed
+    """
+    records = state.records.values()
+    text = f"{len(records):,} of {len(state.shards):,} shards, {sum(record.samples for record in records):,} samples"
+    text += f", {byte_size(sum(record.bytes_on_disk() for record in records))}"
     text += f", {shard_count_text(made)} made now" if made else ", nothing to make"
-    text += f" ({duration_text(sum(each.seconds for each in records))} of worker time in all)"
+    text += f" ({duration_text(sum(record.seconds for record in records))} of worker time in all)"
     if failed:
-        text += f"; {len(failed)} set aside: {', '.join(failed)}"
+        text += f"; {len(failed)} quarantined: {', '.join(failed)}"
     if left:
         text += f"; {left} not made"
     return text
 
 
 def shard_count_text(shards: int) -> str:
-    """So many shards, in words."""
+    """Return a number of shards with its unit: `1 shard`, `1,200 shards`."""
     return f"{shards:,} shard{'' if shards == 1 else 's'}"
 
 
-def _how_far(places: StagePaths, shard: str) -> float:
+def _finished_share(paths: StagePaths, shard: str) -> float:
     try:
-        done, total = (places.progress / shard).read_text().split()
+        done, total = (paths.progress / shard).read_text().split()
         return min(int(done) / int(total), 1.0)
     except (OSError, ValueError, ZeroDivisionError):
         return 0.0

@@ -1,8 +1,8 @@
-"""What lies between exemplars and dataset, taken away when the dataset is finished, where its config says so.
+"""Pruning: delete intermediate files when the dataset is finished, where its config says `keep: dataset`.
 
-Files go, records stay and count: a note in the stage's own folder, written before the first file goes, says of which
-records the files were let go of, each by its seal. Where a shard is to be made of them after all, they are found gone
-like any damaged input, and made again first.
+Records stay and count. A listing in the stage's folder, written before the first file is deleted, holds the checksums
+of the records whose files were pruned. A shard that needs such files later finds them missing, like any corrupted
+input, and the engine rebuilds them first.
 """
 
 from __future__ import annotations
@@ -10,35 +10,30 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from pipeline.inventory import Inventory, StageInventory
-from pipeline.paths import StagePaths, read_json, remove, write_atomically
+from pipeline.paths import read_json, remove, write_atomically
 from pipeline.registry import upstream
 from pipeline.shards import json_bytes
 from pipeline.stage import Stage
 
 
-def prune_inputs(survey: Inventory, stages: Mapping[str, Stage], name: str) -> int:
-    """Take away the files of all shards that the finished stage `name` reads, directly or not; the bytes that this
-    frees. Files that a stage publishes stay, and those of stages that other commands look at (`Stage.stays`)."""
-    freed = 0
-    for each in upstream(stages, name):
-        if each != name and not stages[each].keep_output:
-            freed += _let_go_of_stage(survey.stage(each))
-    return freed
+def prune_inputs(inventory: Inventory, stages: Mapping[str, Stage], name: str) -> int:
+    """Delete the files of all shards upstream of the finished stage `name`; return the number of bytes freed.
+
+    Published files stay, and those of stages with `keep_output`, which other commands read.
+    """
+    pruned = [read for read in upstream(stages, name) if read != name and not stages[read].keep_output]
+    return sum(_prune_stage(inventory.stage(read)) for read in pruned)
 
 
-def _let_go_of_stage(surveyed: StageInventory) -> int:
-    published = set(surveyed.stage.publish(surveyed.view).values())
-    unneeded = {name: each for name, each in surveyed.records.items() if published.isdisjoint(each.files)}
-    paths = [surveyed.paths.root / file for record in unneeded.values() for file in record.files]
-    there = [path for path in paths if path.exists()]
-    if there:
-        _note(surveyed.paths, {name: each.checksum() for name, each in unneeded.items()})
+def _prune_stage(state: StageInventory) -> int:
+    published = set(state.stage.publish(state.view).values())
+    unneeded = {name: record for name, record in state.records.items() if published.isdisjoint(record.files)}
+    files = [state.paths.root / file for record in unneeded.values() for file in record.files]
+    there = [path for path in files if path.exists()]
+    checksums = {name: record.checksum() for name, record in unneeded.items()}
+    if there and read_json(state.paths.pruned) != checksums:
+        write_atomically(state.paths.pruned, json_bytes(checksums))
     freed = sum(path.stat().st_size for path in there)
     for path in there:
         remove(path)
     return freed
-
-
-def _note(places: StagePaths, seals: Mapping[str, str]) -> None:
-    if read_json(places.pruned) != seals:
-        write_atomically(places.pruned, json_bytes(seals))

@@ -1,4 +1,4 @@
-"""Counted randomness: each decision has its own stream, named by what is decided, never by who decides first."""
+"""Counter-based randomness: each decision has its own stream, whatever the order of decisions."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ import numpy as np
 
 
 def decision_rng(seed: int, *decision: str | int) -> np.random.Generator:
-    """The random stream of one decision.
+    """Return the random stream of one decision.
 
-    The stream depends on `seed` and on the words and numbers of `decision` (stage, shard, item, what is
-    decided) and on nothing else, so the same decision falls alike with any number of workers, after a
-    kill and on another machine.
+    The stream depends only on `seed` and on the words and numbers of `decision` (stage, shard, item, purpose). So a
+    decision is the same with any number of workers, after a kill and on another machine.
     """
     spawn_key = tuple(
         int.from_bytes(hashlib.sha256(word.encode()).digest()[:4], "little") if isinstance(word, str) else int(word)

@@ -1,4 +1,4 @@
-"""Why shards are made again: what differs between the recipe in a record and the one of today."""
+"""Reasons for rebuilding shards: the difference between the recipe in a record and the current one."""
 
 from __future__ import annotations
 
@@ -12,36 +12,36 @@ _NAMED = {
     "code": "code",
     "config": "config",
     "dataset": "name, version or seed of the dataset",
-    "plan": "what is planned",
-    "inputs": "what it is made from",
+    "plan": "its plan",
+    "inputs": "its inputs",
 }
 
 
-def rebuild_reasons(surveyed: StageInventory) -> list[str]:
-    """A line for each reason, or set of reasons, for which shards that were made once are made again."""
+def rebuild_reasons(state: StageInventory) -> list[str]:
+    """Return a line for each set of reasons for which finished shards are rebuilt."""
     counts: Counter[str] = Counter()
-    for shard in surveyed.missing:
-        old = surveyed.outdated.get(shard.name)
+    for shard in state.missing:
+        old = state.outdated.get(shard.name)
         if old is not None:
-            counts[_changes(surveyed, old)] += 1
-    return [f"{count} shard{'s are' if count > 1 else ' is'} made again: {why}" for why, count in counts.items()]
+            counts[_changes(state, old)] += 1
+    return [f"{count} shard{'s are' if count > 1 else ' is'} rebuilt: {why}" for why, count in counts.items()]
 
 
-def _changes(surveyed: StageInventory, old: ShardRecord) -> str:
-    new = surveyed.recipes[old.shard]
+def _changes(state: StageInventory, old: ShardRecord) -> str:
+    new = state.recipes[old.shard]
     changed = {kind: name for kind, name in _NAMED.items() if old.recipe.get(kind) != new[kind]}
-    edited = _edited(surveyed) if "code" in changed else []
+    edited = _edited(state) if "code" in changed else []
     if edited:
         changed["code"] += f" ({', '.join(edited)})"
     if changed:
         return f"changed: {', '.join(changed.values())}"
-    return "what it is made from has other bytes" if old.is_whole(surveyed.paths) else "a file is gone"
+    return "an input has other bytes" if old.is_whole(state.paths) else "a file is missing"
 
 
-def _edited(surveyed: StageInventory) -> list[str]:
-    """The modules that are not as they were when the stage was last finished, as far as that is known."""
+def _edited(state: StageInventory) -> list[str]:
+    """Return the modules that changed since the stage was last finished, as far as known."""
     try:
-        before = read_json(surveyed.paths.manifest)["code"].items()
-        return sorted({module for module, _ in before ^ surveyed.code.items()})
+        before = read_json(state.paths.manifest)["code"].items()
+        return sorted({module for module, _ in before ^ state.code.items()})
     except (TypeError, KeyError, AttributeError):
         return []

@@ -1,4 +1,4 @@
-"""Records: what the mill knows of a finished shard. A shard is done when its record matches, and nothing else."""
+"""Records of finished shards. A shard is done when its record matches its fingerprint."""
 
 from __future__ import annotations
 
@@ -18,9 +18,14 @@ from pipeline.stage import Shard
 class ShardRecord:
     """One finished shard.
 
-    fingerprint: of its recipe; inputs: `{stage/file: sha256}` of what it has read; files: `{file: {"sha256", "bytes"}}`
-    of what it has written; rejects: refused items by reason; seconds: time that the shard took; peak_bytes: the largest
-    memory that its worker had held until then; summary: the stage's own facts.
+    fingerprint: sha256 of its recipe
+    recipe: digest of each kind of thing that its bytes depend on
+    inputs: `{stage/file: sha256}` of the files that it read
+    files: `{file: {"sha256", "bytes"}}` of the files that it wrote
+    rejects: number of refused items by reason
+    seconds: clock time that the shard took
+    peak_bytes: largest memory that its worker had held until then
+    summary: facts of the stage, as JSON
     """
 
     stage: str
@@ -36,31 +41,30 @@ class ShardRecord:
     summary: Mapping[str, Any]
 
     def to_bytes(self) -> bytes:
-        """The record as one line of JSON, with a digest of itself: plans are made of what it says."""
-        return json_bytes({**asdict(self), "seal": self.checksum()})
+        """Return the record as one line of JSON with its checksum, since plans depend on it."""
+        return json_bytes({**asdict(self), "checksum": self.checksum()})
 
     def checksum(self) -> str:
-        """A digest of all that it says."""
+        """Return the sha256 of its JSON."""
         return hashlib.sha256(json_bytes(json.loads(json_bytes(asdict(self))))).hexdigest()
 
     def bytes_on_disk(self) -> int:
-        """Bytes of all its files."""
-        return sum(int(each["bytes"]) for each in self.files.values())
+        """Return the total size of its files in bytes."""
+        return sum(int(file["bytes"]) for file in self.files.values())
 
-    def is_whole(self, places: StagePaths) -> bool:
-        """Whether all its files are there with the recorded size. Whoever reads one looks at its bytes (`Task.input`),
-        and so does `make verify` at all."""
-        paths = {places.root / name: each["bytes"] for name, each in self.files.items()}
-        return all(path.is_file() and path.stat().st_size == size for path, size in paths.items())
+    def is_whole(self, paths: StagePaths) -> bool:
+        """Whether all its files exist with the recorded size; `Task.input` and `make verify` check their bytes."""
+        sizes = {paths.root / name: file["bytes"] for name, file in self.files.items()}
+        return all(path.is_file() and path.stat().st_size == size for path, size in sizes.items())
 
 
 def read_record(path: Path) -> ShardRecord | None:
-    """The record in a file, or None if there is none, or none that this version of the mill wrote, or a damaged one."""
+    """Return the record in a file; None where it is missing, corrupted or of another version."""
     written = read_json(path)
     try:
-        seal = written.pop("seal")
+        checksum = written.pop("checksum")
         record = ShardRecord(**written)
-        return record if record.checksum() == seal else None
+        return record if record.checksum() == checksum else None
     except (ValueError, TypeError, KeyError, AttributeError):
         return None
 
@@ -73,23 +77,25 @@ def recipe(
     dataset: tuple[str, str, int],
     inputs: Mapping[str, str],
 ) -> dict[str, str]:
-    """All that a shard's bytes depend on, as a digest of each kind of thing: `code`, `config`, `dataset`, `plan`,
-    `inputs`.
+    """Return a digest of each kind of thing that a shard's bytes depend on.
 
-    `code` is the digest of the code that it reaches, `section` the stage's config as JSON, `dataset` name, version and
-    seed, `inputs` the fingerprint of each record that the shard reads. What else the bytes depend on (the bytes of a
-    mesh, the title on a card) the stage puts in the shard's `params`.
+    code: digest of the modules that the shard's code imports
+    section: the stage's config section as JSON
+    dataset: name, version and seed of the dataset
+    inputs: fingerprint of each record that the shard reads
+
+    Anything else (the bytes of a mesh, the title on a card) belongs into the shard's `params`.
     """
-    described = {
+    parts = {
         "code": code,
         "config": section,
         "dataset": dataset,
         "plan": [stage, shard.name, dict(shard.params)],
         "inputs": dict(inputs),
     }
-    return {kind: hashlib.sha256(json_bytes(value)).hexdigest() for kind, value in described.items()}
+    return {kind: hashlib.sha256(json_bytes(value)).hexdigest() for kind, value in parts.items()}
 
 
 def fingerprint(recipe: Mapping[str, str]) -> str:
-    """The sha256 over a recipe."""
+    """Return the sha256 of a recipe."""
     return hashlib.sha256(json_bytes(dict(recipe))).hexdigest()

@@ -1,4 +1,4 @@
-"""Finds the stages: every folder of a package that holds a `stage.py`, in the order in which they read each other."""
+"""Discovery of stages: every folder of a package that holds a `stage.py`, ordered by their inputs."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ from pipeline.stage import Stage
 
 
 def find_stages(package: str = "stages") -> dict[str, Stage]:
-    """The `STAGE` of each `<package>/<name>/stage.py`, earlier stages first.
+    """Return the `STAGE` of each `<package>/<name>/stage.py`, earlier stages first.
 
-    An input such as `*/producer.py` stands for every stage, other than the one that names it, whose folder holds such
-    a file. Raises TypeError for a `stage.py` without a STAGE of its folder's name and for stages that read each other
-    in a circle or read a stage that is not there.
+    An input `*/producer.py` means every other stage whose folder holds such a file. Raises TypeError for a `stage.py`
+    without a STAGE of its folder's name, for circular inputs and for inputs that do not exist.
     """
     found: dict[str, Stage] = {}
     for folder in folders_with(package, "stage.py"):
@@ -28,7 +27,7 @@ def find_stages(package: str = "stages") -> dict[str, Stage]:
     for stage in found.values():
         for name in stage.inputs:
             if name not in found:
-                raise TypeError(f"stage {stage.name} reads stage {name}, which is not there")
+                raise TypeError(f"stage {stage.name} reads stage {name}, which does not exist")
     try:
         order = TopologicalSorter({name: stage.inputs for name, stage in found.items()}).static_order()
         return {name: found[name] for name in order}
@@ -37,29 +36,27 @@ def find_stages(package: str = "stages") -> dict[str, Stage]:
 
 
 def folders_with(package: str, file: str) -> list[str]:
-    """The folders of a package that hold `file`, by name; the package may lie in several places."""
+    """The folders of a package that hold `file`, by name; the package may lie in several paths."""
     bases = [Path(base) for base in importlib.import_module(package).__path__]
-    folders = {each.name for base in bases if base.is_dir() for each in base.iterdir() if (each / file).is_file()}
-    return sorted(folders)
+    return sorted({path.parent.name for base in bases for path in base.glob(f"*/{file}") if path.is_file()})
 
 
 def _named(package: str, found: Mapping[str, Stage], stage: Stage) -> tuple[str, ...]:
-    """The inputs of a stage, all by name, each once."""
-    names: dict[str, None] = {}
-    for each in stage.inputs:
-        meant = [each]
-        if each.startswith("*/"):
-            meant = [name for name in folders_with(package, each[2:]) if name in found and name != stage.name]
-        names.update(dict.fromkeys(meant))
-    return tuple(names)
+    """Return the inputs of a stage by name, without duplicates."""
+    names: list[str] = []
+    for wanted in stage.inputs:
+        if wanted.startswith("*/"):
+            names += [name for name in folders_with(package, wanted[2:]) if name in found and name != stage.name]
+        else:
+            names.append(wanted)
+    return tuple(dict.fromkeys(names))
 
 
 def upstream(stages: Mapping[str, Stage], name: str) -> list[str]:
-    """The stages that `name` can read, its own among them, in the order of `stages`."""
-    reached, fresh = {name}, [name]
-    while fresh:
-        for each in stages[fresh.pop()].inputs:
-            if each not in reached:
-                reached.add(each)
-                fresh.append(each)
-    return [each for each in stages if each in reached]
+    """Return stage `name` and all stages that it reads, directly or not, in the order of `stages`."""
+    reached, waiting = {name}, [name]
+    while waiting:
+        fresh = set(stages[waiting.pop()].inputs) - reached
+        reached |= fresh
+        waiting += fresh
+    return [stage for stage in stages if stage in reached]

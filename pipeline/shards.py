@@ -1,8 +1,8 @@
 """Shards on disk: tar files whose bytes depend on their contents alone.
 
-A shard is an uncompressed tar in the WebDataset layout: the members of one sample stand together and are
-named `<key>.<member>`, for example `castle-000017.points.npy`. Entries carry no time, no user and one mode,
-so equal samples make equal files.
+A shard is an uncompressed tar in the WebDataset layout: the members of a sample follow each other and are named
+`<key>.<member>`, for example `castle-000017.points.npy`. Entries have no time, no user and one mode, so equal samples
+make equal files.
 """
 
 from __future__ import annotations
@@ -20,28 +20,28 @@ import numpy.typing as npt
 
 
 def json_bytes(value: Any) -> bytes:
-    """`value` as one line of canonical JSON: sorted keys, no NaN, UTF-8, newline at the end."""
+    """Encode a value as one line of canonical JSON: sorted keys, no NaN, UTF-8, newline at the end."""
     text = json.dumps(value, sort_keys=True, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.encode() + b"\n"
 
 
 def array_bytes(array: npt.NDArray[Any]) -> bytes:
-    """`array` as the bytes of a `.npy` file (never pickled)."""
+    """Encode an array as the bytes of a `.npy` file, never pickled."""
     buffer = io.BytesIO()
     np.lib.format.write_array(buffer, np.ascontiguousarray(array), version=(1, 0), allow_pickle=False)
     return buffer.getvalue()
 
 
 def bytes_array(content: bytes) -> npt.NDArray[Any]:
-    """The array in the bytes of a `.npy` file."""
+    """Decode the array in the bytes of a `.npy` file."""
     return np.lib.format.read_array(io.BytesIO(content), allow_pickle=False)
 
 
 class ShardWriter:
-    """Writes samples to a tar, one after another, to a stream that the caller commits.
+    """Writes samples to a tar in a stream that the caller commits.
 
-    Raises ValueError for a key with a dot, a slash or an upper-case member name: loaders group members by
-    what stands before the first dot of a file name.
+    Raises ValueError for a key with a dot or a slash and for an upper-case member name: loaders group members by the
+    part of a file name before its first dot.
     """
 
     def __init__(self, stream: BinaryIO) -> None:
@@ -50,7 +50,7 @@ class ShardWriter:
         self.offsets: dict[str, int] = {}
 
     def write(self, key: str, members: Mapping[str, bytes]) -> None:
-        """Append one sample; `members` maps the part after `<key>.` (such as `points.npy`) to its bytes."""
+        """Append one sample; `members` maps names such as `points.npy` to bytes."""
         if not key or "." in key or "/" in key:
             raise ValueError(f"sample key {key!r} must be non-empty and hold neither a dot nor a slash")
         if key in self.offsets:
@@ -76,9 +76,9 @@ class ShardWriter:
 
 
 def read_shard(path: Path) -> Iterator[tuple[str, dict[str, bytes]]]:
-    """The samples of a shard in order, `(key, {member: bytes})`, one in memory at a time.
+    """Yield the samples of a shard in order, `(key, {member: bytes})`, one in memory at a time.
 
-    Entries that are no files, such as the folders and links in a tar of somebody else, are passed over.
+    Skips entries that are not files, such as folders and links.
     """
     key: str | None = None
     members: dict[str, bytes] = {}
@@ -94,6 +94,6 @@ def read_shard(path: Path) -> Iterator[tuple[str, dict[str, bytes]]]:
             content = tar.extractfile(entry)
             assert content is not None, entry.name
             members[member] = content.read()
-            tar.members = []  # type: ignore[attr-defined]  # tarfile keeps every header it has seen; memory stays flat without them
+            tar.members = []  # type: ignore[attr-defined]  # tarfile keeps every header; memory stays flat without them
     if key is not None:
         yield key, members

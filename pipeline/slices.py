@@ -1,4 +1,4 @@
-"""Parts of a plan, and the locks that keep runs from working on the same part at once."""
+"""Slices of a plan for job arrays, and the locks that keep two runs off the same slice."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pipeline.paths import StagePaths
 
 @dataclass(frozen=True)
 class Slice:
-    """Part `index` of `count` of every plan, from 1: what one job of a job array makes."""
+    """Part `index` of `count` of every plan, from 1: the shards of one job of a job array."""
 
     index: int = 1
     count: int = 1
@@ -27,16 +27,16 @@ WHOLE = Slice()
 
 
 @contextmanager
-def locked(own: StagePaths, part: Slice, waits: bool) -> Iterator[BinaryIO]:
-    """One run at a time: a whole run excludes every other, a slice the same slice and whole runs.
+def locked(own: StagePaths, part: Slice, wait: bool) -> Iterator[BinaryIO]:
+    """Allow one run at a time: a whole run excludes every other, a slice the same slice and whole runs.
 
-    `waits` for the other run to end; else raises ConfigError while there is one.
+    wait: whether to wait for the other run; without, raises ConfigError while there is one
     """
     with open(own.engine / "lock", "ab") as whole, open(own.engine / f"lock-{part.index}-{part.count}", "ab") as slot:
-        at_once = 0 if waits else fcntl.LOCK_NB
+        nonblocking = 0 if wait else fcntl.LOCK_NB
         try:
-            fcntl.flock(whole, at_once | (fcntl.LOCK_EX if part.count == 1 else fcntl.LOCK_SH))
-            fcntl.flock(slot, at_once | fcntl.LOCK_EX)
+            fcntl.flock(whole, nonblocking | (fcntl.LOCK_EX if part.count == 1 else fcntl.LOCK_SH))
+            fcntl.flock(slot, nonblocking | fcntl.LOCK_EX)
         except BlockingIOError as error:
-            raise ConfigError(f"another run is at work in {own.root}: wait for it, or end it") from error
+            raise ConfigError(f"another run works in {own.root}: wait for it, or end it") from error
         yield whole

@@ -1,30 +1,29 @@
-"""What a stage is to the mill: a name, a config, a plan, and a pure function that makes one shard.
+"""The contract of a stage: a name, a config, a plan, and a pure function that makes one shard.
 
-A stage's `stage.py` holds one module-level `STAGE = Stage(...)`. The mill finds it by the folder's name, asks it
-for its plan, runs every planned shard that has no matching record, and asks again until nothing is missing (so
-a later part of a plan may depend on the records of an earlier part, as the rounds of a search do).
+A stage's `stage.py` holds one module-level `STAGE = Stage(...)`. The engine finds it by the folder's name, asks for
+its plan and runs every planned shard without a matching record. Then it asks again until nothing is missing: a later
+part of a plan may depend on the records of an earlier part, such as the rounds of a search.
 
-The contract for who writes a stage:
+Rules for the author of a stage:
 
-- `plan(plan) -> list[Shard]` runs in the parent, often; it is cheap, has no side effects and is a function of the
-  config and of finished records alone. Asked again after more records are there it may answer with more shards,
-  and keeps the shards it has named before. While a record that the rest of a plan depends on is missing
-  (`plan.summary` answers None), leave the rest out.
-- `run_shard(task) -> Outcome` runs in a worker. What it writes depends on `task.config`, `task.shard`, the files of
+- `plan(plan) -> list[Shard]` runs in the parent, often. It is cheap, without side effects, and depends only on the
+  config and on finished records. With more records it may return more shards, and keeps the earlier ones. It leaves
+  out what depends on a missing record (`plan.summary` answers None).
+- `run_shard(task) -> Outcome` runs in a worker. Its bytes depend on `task.config`, `task.shard`, the files of
   `task.shard.inputs` and `task.rng(...)`, and on nothing else: no clock, no global randomness, no order of a set.
-- A shard is made again when its fingerprint changes: the code that the stage's folder reaches (`pipeline/code.py`),
-  the stage's own config section, dataset name, version and seed, shard name and params, the fingerprints of its
-  inputs. Code that is found at run time, by a name in the config, goes into `Shard.code`. Whatever else its bytes
-  depend on goes into `params`: the sha256 of a mesh that it reads, the title that a card shows.
-- `task.config` and `plan.config` hold only the sections of the stage and of the stages it can read (its `inputs`,
-  and theirs), because a shard could not be made again for a change of any other. A stage that looks at a section of a
-  later stage names it in `sections`; what its shards depend on there goes into their `params`.
-- Files of a shard are named `<shard>.<anything>`. They appear all at once when `run_shard` returns, or not at all.
-- Raise ShardFailed when the shard cannot be made now and may succeed later: it is tried again, twice by default.
-  ConfigError or Rejected set it aside at once. Any other exception counts as ShardFailed. An OSError that says
-  "disk full" or "no permission" is Fatal: everything stops. Do not catch those.
-- Import native libraries inside functions. One thread a worker: the environment is set for BLAS, OpenMP and
-  numba before Python starts.
+- A shard is rebuilt when its fingerprint changes: the modules that the stage's code imports (`pipeline/code.py`), the
+  stage's own config section, dataset name, version and seed, shard name and params, the fingerprints of its inputs.
+  Modules found at run time, by a name in the config, go into `Shard.code`. Anything else that its bytes depend on goes
+  into `params`: the sha256 of a mesh that it reads, the title that a card shows.
+- `task.config` and `plan.config` hold only the sections of the stage and of all stages upstream, since a change of any
+  other section would not rebuild a shard. A stage that reads a section of a later stage names it in `sections`, and
+  puts into `params` what its shards depend on.
+- Files of a shard are named `<shard>.<anything>`. They appear all at once when `run_shard` returns, or never.
+- Raise ShardFailed for a shard that may succeed later: it is retried, twice by default. ConfigError and Rejected
+  quarantine it at once. Any other exception counts as ShardFailed. An OSError of a full disk or missing permission is
+  Fatal, and everything stops. Do not catch those.
+- Import native libraries inside functions. A worker has one thread: the environment is set for BLAS, OpenMP and numba
+  before Python starts.
 """
 
 from __future__ import annotations
@@ -44,10 +43,11 @@ if TYPE_CHECKING:
 class Shard:
     """One task of a plan: minutes of work at most.
 
-    `name` is the stem of its files and of its record (letters, digits, `-`, `_`). `params` is JSON and says what
-    the shard holds. `inputs` names the records it reads, as `stage/shard`, of earlier stages or of earlier
-    shards of its own stage. `code` names the modules that it finds at run time, and no import of the stage reaches.
-    `threads` is how many threads it works with: the mill puts that many workers aside for it, or all that it has.
+    name: stem of its files and of its record (letters, digits, `-`, `_`)
+    params: contents of the shard, as JSON
+    inputs: records that it reads, as `stage/shard`, of earlier stages or of earlier shards of its own stage
+    code: modules that it finds at run time, which the stage does not import
+    threads: number of threads that it uses; the engine reserves that many workers, or all
     """
 
     name: str
@@ -59,34 +59,37 @@ class Shard:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a finished shard tells the mill: how many samples it wrote, and a small JSON summary for its record."""
+    """Result of a finished shard: its number of samples, and a small summary for its record, as JSON."""
 
     samples: int
     summary: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Plan(Protocol):
-    """What a plan may look at: the config, and the records of finished shards."""
+    """What a plan may read: the config, and the records of finished shards."""
 
     @property
     def config(self) -> Config: ...
 
     def shards(self, stage: str) -> list[str]:
-        """Names of all planned shards of an earlier stage, in plan order."""
+        """Return the names of all planned shards of an earlier stage, in plan order."""
 
     def summary(self, stage: str, shard: str) -> Mapping[str, Any] | None:
-        """The summary in a shard's record, or None while that shard has no matching record."""
+        """Return the summary in a shard's record; None while it has no matching record."""
 
     def rejects(self, stage: str, shard: str) -> Mapping[str, int]:
-        """How many items a shard has refused, by reason; empty while that shard has no matching record."""
+        """Return the number of refused items by reason; empty while the shard has no matching record."""
 
     def published(self, file: str) -> Path:
-        """Where another dataset publishes a file, as `<its folder>/<file>`, whether it is there or not. A shard that is
-        to read it has its sha256 in `params`. Raises ValueError for a name that leads out of the output folder."""
+        """Return the path of another dataset's published file, `<its folder>/<file>`; it need not exist.
+
+        A shard that reads it has its sha256 in `params`. Raises ValueError for a name that leads out of the output
+        folder.
+        """
 
 
 class Task(Protocol):
-    """What `run_shard` gets: its shard, the config, its inputs, its outputs, its randomness."""
+    """What `run_shard` receives: its shard, config, inputs, outputs and randomness."""
 
     @property
     def shard(self) -> Shard: ...
@@ -95,26 +98,28 @@ class Task(Protocol):
     def config(self) -> Config: ...
 
     def rng(self, *decision: str | int) -> np.random.Generator:
-        """The stream of one decision inside this shard: counted from seed, stage, shard and `decision`."""
+        """Return the random stream of one decision: a function of seed, stage, shard and `decision`."""
 
     def input(self, stage: str, file: str) -> Path:
-        """A file that an input shard has committed, with the bytes that it had then. Raises ShardFailed if no input
-        record lists it; if it is damaged, the mill makes it again first."""
+        """Return a file of an input shard, with the recorded bytes.
+
+        Raises ShardFailed if no input record lists it, or if it is corrupted: the engine then rebuilds it first.
+        """
 
     def published(self, file: str) -> Path:
-        """Where another dataset publishes a file, as `Plan.published` says it."""
+        """Return the path of another dataset's published file, as `Plan.published`."""
 
     def output(self, file: str) -> BinaryIO:
-        """A stream to a new file of this shard, named `<shard>.<anything>`; committed with it, or not at all."""
+        """Open a new file of this shard, named `<shard>.<anything>`; committed with it, or never."""
 
     def reject(self, item: str, reason: str, detail: str = "", count: int = 1) -> None:
-        """Record that `count` items were refused for `reason`; counted in the record, listed in rejects.jsonl."""
+        """Record that `count` items were refused for `reason`."""
 
     def progress(self, done: int, total: int) -> None:
-        """Tell the bar how far this shard is."""
+        """Report the progress of this shard."""
 
 
-def _nothing_wrong(_: Config) -> None:
+def _no_check(_: Config) -> None:
     return
 
 
@@ -122,7 +127,7 @@ def _no_report(_: Plan) -> Sequence[str]:
     return ()
 
 
-def _nothing_asked(_: Config) -> Sequence[int]:
+def _no_samples(_: Config) -> Sequence[int]:
     return ()
 
 
@@ -130,34 +135,31 @@ def _always(_: Config, __: str) -> bool:
     return True
 
 
-def _nothing_published(_: Plan) -> Mapping[str, str]:
+def _no_files(_: Plan) -> Mapping[str, str]:
     return {}
 
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage of the mill. `module` is `__name__`: the code that its bytes depend on is what is reached from there.
+    """One stage of the engine.
 
-    `inputs` are the stages that it reads, by name; `*/producer.py` stands for every stage whose folder holds a file of
-    that name. `sections` are stages whose sections of the config it looks at without reading them.
-
-    `estimate_bytes` answers how much disk the whole stage will take at most about. `report`: lines about the
-    finished part of the stage, for people, shown after a run and by `status`. `publish`: asked when every shard
-    is done, which files stand in the output folder itself, `{path below OUT: file of a shard}`; the mill links
-    them there (or copies, where the disk has no links) and takes away what it published before and no more.
-    `check`: asked with the whole config before anything starts; raises ConfigError for sections that do not go
-    together. `check_machine`: asked before the stage makes its first shards, and before the stages that everything
-    begins with do; raises ConfigError for what this machine cannot do and the config asks for. May take seconds.
-
-    For `make plan`, a stage that makes samples says in `asked` how many the config wants, shard by shard of those that
-    later stages read, and in `trial` its section for a short run: some thirty samples in shards of at most ten.
-
-    `whole_section`: whether the bytes of each shard may depend on all of the stage's section. Where its entries are
-    apart, and an edit of one must not make the shards of another anew, say False: tasks then do not see the section,
-    and each shard has in its `params` what it needs of it. `publishes_parts`: `publish` is asked while shards are
-    missing, too, and names what is there of whole results. `stays`: its files stay where a config lets go of what lies
-    between, for other commands look at them. `reads_inputs`: whether shards called so (a name, or the
-    beginning of one; empty: all) read anything of other stages, which then must be finished before.
+    module: `__name__`; the stage's bytes depend on the modules that it imports, directly or not
+    inputs: names of the stages that it reads; `*/producer.py` means every stage whose folder holds such a file
+    estimate_bytes: returns an upper estimate of the disk that the whole stage takes, in bytes
+    report: returns lines about the finished part of the stage, shown after a run and by `status`
+    publish: returns the files for the output folder, `{path below OUT: file of a shard}`, when every shard is done;
+        the engine links or copies them, and removes what it published before
+    check: raises ConfigError for sections that contradict each other; called with the whole config at the start
+    check_environment: raises ConfigError for what the config requests and this machine cannot do; called before the
+        first shard of the stage, and of the first stage of a dataset; may take seconds
+    requested_samples: returns the number of samples that the config requests, for each shard that later stages read
+    sections: stages whose config sections it reads without reading the stages
+    trial_config: returns its section for a short run: about thirty samples in shards of at most ten
+    whole_section: whether a shard's bytes may depend on the whole config section; if False, tasks do not see the
+        section, and each shard has in `params` what it needs, so that an edit of one entry rebuilds only its shards
+    publishes_incomplete: whether `publish` is called while shards are missing, too
+    keep_output: whether its files are kept when intermediates are pruned, because other commands read them
+    uses_input: whether shards of a name, or of a prefix of names (empty: all), read other stages
     """
 
     name: str
@@ -168,10 +170,10 @@ class Stage:
     run_shard: Callable[[Task], Outcome]
     estimate_bytes: Callable[[Plan], int]
     report: Callable[[Plan], Sequence[str]] = _no_report
-    publish: Callable[[Plan], Mapping[str, str]] = _nothing_published
-    check: Callable[[Config], None] = _nothing_wrong
-    check_environment: Callable[[Config], None] = _nothing_wrong
-    requested_samples: Callable[[Config], Sequence[int]] = _nothing_asked
+    publish: Callable[[Plan], Mapping[str, str]] = _no_files
+    check: Callable[[Config], None] = _no_check
+    check_environment: Callable[[Config], None] = _no_check
+    requested_samples: Callable[[Config], Sequence[int]] = _no_samples
     sections: tuple[str, ...] = ()
     trial_config: Callable[[Config], StrictModel] | None = None
     whole_section: bool = True

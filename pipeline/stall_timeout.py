@@ -1,7 +1,7 @@
-"""Patience: which of the running shards have shown no sign of work for too long.
+"""Stall timeout: find running shards that have made no progress for too long.
 
-A sign is what the shard tells of itself (`Task.progress`), or that a file which it writes has grown. That its process
-lives, and is busy, is none: a loop without an end is busy, too.
+Progress is a call of `Task.progress` with new numbers, or the growth of a file that the shard writes. A busy process
+is no progress: an endless loop is busy, too.
 """
 
 from __future__ import annotations
@@ -18,57 +18,57 @@ if TYPE_CHECKING:
     from pipeline.task import Job
 
 DEFAULT_STALL_MINUTES = 60.0
-"""Minutes. A shard is minutes of work at most; on a machine that is too busy, some that tell nothing take many."""
+"""A shard is minutes of work; on a busy machine, one that reports nothing can take many."""
 
-_Signs = tuple[str, tuple[tuple[str, int], ...]]
+_Progress = tuple[str, tuple[tuple[str, int], ...]]
 
 
 class StallWatch:
-    """Watches the running shards of one stage; 0 minutes is patience without end."""
+    """Watches the running shards of one stage; a timeout of 0 minutes never ends a shard."""
 
-    def __init__(self, minutes: float, places: StagePaths) -> None:
+    def __init__(self, minutes: float, paths: StagePaths) -> None:
         self.seconds = minutes * 60
-        self._places = places
-        self._every = min(max(self.seconds / 20, 0.5), 30.0)
-        self._looked = time.monotonic()
-        self._quiet: dict[str, tuple[_Signs, float]] = {}
+        self._paths = paths
+        self._interval = min(max(self.seconds / 20, 0.5), 30.0)
+        self._last_look = time.monotonic()
+        self._stalled: dict[str, tuple[_Progress, float]] = {}
 
-    def lost_with(self, jobs: Iterable[Job]) -> list[Job]:
-        """Those of the running `jobs` that have been without a sign for longer than patience lasts."""
+    def stalled(self, jobs: Iterable[Job]) -> list[Job]:
+        """Return the running jobs that have made no progress for longer than the timeout."""
         now = time.monotonic()
-        # Time in which the mill itself was stopped is no time that its workers had.
-        passed = min(now - self._looked, 3 * self._every)
-        if not self.seconds or passed < self._every:
+        # Time in which this process itself was stopped does not count.
+        passed = min(now - self._last_look, 3 * self._interval)
+        if not self.seconds or passed < self._interval:
             return []
-        self._looked = now
+        self._last_look = now
         running, written = list(jobs), self._written()
         quiet = {}
         for name in (job.shard.name for job in running):
-            signs = self._told(name), tuple(written.get(name, ()))
-            before, seconds = self._quiet.get(name, (None, 0.0))
-            quiet[name] = signs, seconds + passed if signs == before else 0.0
-        self._quiet = quiet
+            progress = self._reported(name), tuple(written.get(name, ()))
+            before, seconds = self._stalled.get(name, (None, 0.0))
+            quiet[name] = progress, seconds + passed if progress == before else 0.0
+        self._stalled = quiet
         return [job for job in running if quiet[job.shard.name][1] >= self.seconds]
 
-    def begin_anew(self, shard: str) -> None:
-        """A shard has ended: when it runs again, it has all its time again."""
-        self._quiet.pop(shard, None)
+    def restart(self, shard: str) -> None:
+        """Give a shard its full time again: it has ended."""
+        self._stalled.pop(shard, None)
 
-    def _told(self, shard: str) -> str:
+    def _reported(self, shard: str) -> str:
         try:
-            return (self._places.progress / shard).read_text()
+            return (self._paths.progress / shard).read_text()
         except (OSError, ValueError):
             return ""
 
     def _written(self) -> dict[str, list[tuple[str, int]]]:
-        """Name and size of each unfinished file, by shard; one look at the folder for all of them."""
+        """Return name and size of each unfinished file, by shard."""
         sizes: dict[str, list[tuple[str, int]]] = {}
-        for folder in (self._places.root, self._places.rejects):
+        for folder in (self._paths.root, self._paths.rejects):
             for path in _unfinished(folder):
                 try:
                     size = path.stat().st_size
                 except OSError:
-                    continue  # it was finished meanwhile
+                    continue  # finished in the meantime
                 sizes.setdefault(path.name[1:].partition(".")[0], []).append((path.name, size))
         return sizes
 

@@ -1,4 +1,4 @@
-"""How far a dataset is and what failed, from the plans and the records alone."""
+"""Status of a dataset, from its plans and records."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from pipeline.stage import Stage
 _HEADER = ("stage", "done", "failed", "samples", "rejects", "time", "left", "memory", "disk")
 
 
-def status_lines(config: Config, stages: Mapping[str, Stage], places: DatasetPaths, workers: int) -> Iterator[str]:
-    """A table with a row for each stage, then its rejects by reason, its own report and the shards set aside.
+def status_lines(config: Config, stages: Mapping[str, Stage], paths: DatasetPaths, workers: int) -> Iterator[str]:
+    """Yield a table with a row for each stage, then rejects by reason, the stages' reports and quarantined shards.
 
-    `time` is worker time; `left` is for `workers` workers, from the mean of the finished shards; `memory` is the
-    largest that any worker of the stage has held.
+    Columns: `time` is worker time, `left` the estimate for `workers` workers from the mean of the finished shards,
+    `memory` the largest amount that a worker of the stage has held.
     """
-    survey = Inventory(config, stages, places)
+    inventory = Inventory(config, stages, paths)
     rows: list[tuple[str, ...]] = [_HEADER]
     notes: list[str] = []
     for name, stage in stages.items():
-        unfinished = [each for each in stage.inputs if not survey.complete(each)]
+        unfinished = [read for read in stage.inputs if not inventory.complete(read)]
         if unfinished:
             rows.append((name, f"waits for {unfinished[0]}", *[""] * 7))
             continue
-        surveyed = survey.stage(name)
-        failures = _failures(surveyed)
-        rejects = sum((Counter(record.rejects) for record in surveyed.records.values()), Counter[str]())
-        rows.append(_row(surveyed, len(failures), sum(rejects.values()), workers))
-        notes += [f"{name}: {line}" for line in rebuild_reasons(surveyed)]
-        notes += [f"{name}: {line}" for line in stage.report(surveyed.view)]
+        state = inventory.stage(name)
+        failures = _failures(state)
+        rejects = sum((Counter(record.rejects) for record in state.records.values()), Counter[str]())
+        rows.append(_row(state, len(failures), sum(rejects.values()), workers))
+        notes += [f"{name}: {line}" for line in rebuild_reasons(state)]
+        notes += [f"{name}: {line}" for line in stage.report(state.view)]
         notes += [f"{name}: {count:,} rejected: {reason}" for reason, count in rejects.most_common()]
-        notes += [f"{name}: {shard} is set aside: {message}" for shard, message in failures.items()]
-    # A long cell that ends its row (a stage that waits) may run over the columns after it.
+        notes += [f"{name}: {shard} is quarantined: {message}" for shard, message in failures.items()]
+    # A long cell that ends its row (a waiting stage) may extend over the columns after it.
     widths = [max(len(row[column]) for row in rows if row[column + 1 :] != ("",) * 7) for column in range(len(_HEADER))]
     for row in rows:
         cells = [
@@ -49,29 +49,29 @@ def status_lines(config: Config, stages: Mapping[str, Stage], places: DatasetPat
     yield from notes
 
 
-def _row(surveyed: StageInventory, failed: int, rejects: int, workers: int) -> tuple[str, ...]:
-    records = surveyed.records.values()
+def _row(state: StageInventory, failed: int, rejects: int, workers: int) -> tuple[str, ...]:
+    records = state.records.values()
     seconds = sum(record.seconds for record in records)
-    left = seconds / len(records) * len(surveyed.missing) / workers if records else 0.0
-    unknown = bool(surveyed.missing) and not records
+    left = seconds / len(records) * len(state.missing) / workers if records else 0.0
+    unknown = bool(state.missing) and not records
     return (
-        surveyed.stage.name,
-        f"{len(records)}/{len(surveyed.shards)}",
+        state.stage.name,
+        f"{len(records)}/{len(state.shards)}",
         str(failed),
         f"{sum(record.samples for record in records):,}",
         f"{rejects:,}",
         duration_text(seconds),
         "?" if unknown else duration_text(left),
         byte_size(max((record.peak_bytes for record in records), default=0)),
-        byte_size(sum(each.bytes_on_disk() for name, each in surveyed.records.items() if name not in surveyed.pruned)),
+        byte_size(sum(record.bytes_on_disk() for name, record in state.records.items() if name not in state.pruned)),
     )
 
 
-def _failures(surveyed: StageInventory) -> dict[str, str]:
-    """The message of each shard that was set aside and has not been made since."""
+def _failures(state: StageInventory) -> dict[str, str]:
+    """Return the message of each quarantined shard that has not been made since."""
     failures = {}
-    for shard in surveyed.missing:
-        noted = read_json(surveyed.paths.failed / f"{shard.name}.json")
-        if isinstance(noted, dict) and noted.get("fingerprint") == surveyed.fingerprints[shard.name]:
+    for shard in state.missing:
+        noted = read_json(state.paths.failed / f"{shard.name}.json")
+        if isinstance(noted, dict) and noted.get("fingerprint") == state.fingerprints[shard.name]:
             failures[shard.name] = str(noted["message"])
     return failures

@@ -1,4 +1,4 @@
-"""One shard inside a worker: its inputs, its randomness, its files, and the commit that makes them count."""
+"""One shard inside a worker: its inputs, randomness and files, and the commit of its record."""
 
 from __future__ import annotations
 
@@ -33,16 +33,17 @@ from pipeline.records import ShardRecord, fingerprint, read_record
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Shard, Task
 
-_PROGRESS_EVERY = 0.5
-"""Seconds between two notes on how far a shard is."""
+_PROGRESS_SECONDS = 0.5
+"""Between two notes of a shard's progress."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """All that a worker must know to make one shard; small, because it is sent to another process.
+    """What a worker needs to make one shard; small, because it is sent to another process.
 
-    inputs: `{stage/file: sha256}` of all files of its input shards, from their records.
-    starts, code: where the code of the shard begins, and the digests of what was reached from there when the run began.
+    inputs: `{stage/file: sha256}` of all files of its input shards, from their records
+    starts: modules at which the shard's code begins
+    code: digests of the modules that these import, from the start of the run
     """
 
     stage: str
@@ -60,16 +61,17 @@ class Job:
 class Report:
     """How a shard ended.
 
-    done: committed; failed: may be tried again; refused: would fail again; fatal: nothing else may start; damaged: a
-    file of the input `damaged`, `stage/shard`, is not what its record says. cpu_seconds: what a shard that is done has
-    kept processors busy for.
+    status: done, committed; failed, may be retried; refused, would fail again; fatal, nothing else may start;
+        corrupted, a file of an input differs from its record
+    corrupted: the corrupted input, as `stage/shard`
+    cpu_seconds: CPU time of a shard that is done
     """
 
     shard: str
-    status: Literal["done", "failed", "refused", "fatal", "damaged"]
+    status: Literal["done", "failed", "refused", "fatal", "corrupted"]
     message: str = ""
     trace: str = ""
-    damaged: str = ""
+    corrupted: str = ""
     cpu_seconds: float = field(default=0.0, compare=False)
 
 
@@ -84,8 +86,8 @@ def make_shard(job: Job) -> Report:
     except BaseException as error:
         task.withdraw()
         trace = traceback.format_exc()
-        if task.damage is not None:
-            return task.damage
+        if task.corruption is not None:
+            return task.corruption
         culprit = fatal_cause(error)
         if culprit is not None:
             return Report(job.shard.name, "fatal", str(culprit), trace)
@@ -98,7 +100,7 @@ def make_shard(job: Job) -> Report:
 
 
 def _check_code(job: Job) -> None:
-    """Raises Fatal where the code is not what it was when the run began: workers import late, and fresh ones anew."""
+    """Raise Fatal where the code changed since the run began: workers import late."""
     now = transitive_imports(job.starts)
     edited = sorted(module for module, _ in set(now.items()) ^ set(job.code.items()))
     if edited:
@@ -106,18 +108,18 @@ def _check_code(job: Job) -> None:
 
 
 class _ShardTask:
-    """The Task that `run_shard` sees."""
+    """The Task that `run_shard` receives."""
 
     def __init__(self, job: Job) -> None:
         self._job = job
-        self._places: StagePaths = job.paths.stage(job.stage)
+        self._paths: StagePaths = job.paths.stage(job.stage)
         self._streams: dict[str, BinaryIO] = {}
         self._read: dict[str, str] = {}
         self._rejects: Counter[str] = Counter()
         self._reject_stream: BinaryIO | None = None
         self._start = time.perf_counter()
         self._noted = 0.0
-        self.damage: Report | None = None
+        self.corruption: Report | None = None
 
     @property
     def shard(self) -> Shard:
@@ -146,14 +148,14 @@ class _ShardTask:
         return self._job.paths.published(file)
 
     def _check(self, path: Path, name: str, source: str) -> None:
-        """Raises ShardFailed, and notes the damage, where an input is not what its record says."""
+        """Raise ShardFailed, and keep the report, where an input differs from its record."""
         try:
             wrong = "its sha256 is not the one in its record" if file_digest(path) != self._job.inputs[name] else ""
         except (FileNotFoundError, IsADirectoryError):
-            wrong = "the file is gone"
+            wrong = "the file is missing"
         if wrong:
-            message = f"{name} is damaged: {wrong}"
-            self.damage = Report(self.shard.name, "damaged", message, damaged=source)
+            message = f"{name} is corrupted: {wrong}"
+            self.corruption = Report(self.shard.name, "corrupted", message, corrupted=source)
             raise ShardFailed(message)
 
     def output(self, file: str) -> BinaryIO:
@@ -161,7 +163,7 @@ class _ShardTask:
             raise ValueError(f"file {file!r} of shard {self.shard.name} must be named {self.shard.name}.<anything>")
         if file in self._streams:
             raise ValueError(f"file {file!r} is opened twice")
-        self._streams[file] = open(temporary_path(self._places.root / file), "wb")
+        self._streams[file] = open(temporary_path(self._paths.root / file), "wb")
         return self._streams[file]
 
     def reject(self, item: str, reason: str, detail: str = "", count: int = 1) -> None:
@@ -173,24 +175,24 @@ class _ShardTask:
 
     def progress(self, done: int, total: int) -> None:
         now = time.perf_counter()
-        if now - self._noted >= _PROGRESS_EVERY:
+        if now - self._noted >= _PROGRESS_SECONDS:
             self._noted = now
-            (self._places.progress / self.shard.name).write_text(f"{done} {total}")
+            (self._paths.progress / self.shard.name).write_text(f"{done} {total}")
 
     @property
     def _reject_path(self) -> Path:
-        return self._places.rejects / f"{self.shard.name}.jsonl"
+        return self._paths.rejects / f"{self.shard.name}.jsonl"
 
     def commit(self, outcome: Outcome) -> None:
-        """Bring the files to disk under their names, then the record that makes them count.
+        """Write the files to disk under their names, then the record.
 
-        Raises ShardFailed where an input was damaged and the stage went on all the same.
+        Raises ShardFailed where an input was corrupted and the stage continued.
         """
-        if self.damage is not None:
-            raise ShardFailed(self.damage.message)
-        record_path = self._places.records / f"{self.shard.name}.json"
+        if self.corruption is not None:
+            raise ShardFailed(self.corruption.message)
+        record_path = self._paths.records / f"{self.shard.name}.json"
         old = read_record(record_path)
-        files = {name: self._finish(stream, self._places.root / name) for name, stream in self._streams.items()}
+        files = {name: self._finish(stream, self._paths.root / name) for name, stream in self._streams.items()}
         if self._reject_stream is not None:
             self._finish(self._reject_stream, self._reject_path)
         record = ShardRecord(
@@ -207,44 +209,44 @@ class _ShardTask:
             summary=dict(outcome.summary),
         )
         content = record.to_bytes()
-        # The old record goes first: killed between two renames, the shard must not look like the old one.
+        # The old record is removed first: after a kill between two renames, the shard must not match it.
         if os.path.lexists(record_path):
             remove(record_path)
-            sync_folder(self._places.records)
+            sync_folder(self._paths.records)
         for name in files:
-            if (self._places.root / name).is_dir():
-                remove(self._places.root / name)
-            os.replace(temporary_path(self._places.root / name), self._places.root / name)
+            if (self._paths.root / name).is_dir():
+                remove(self._paths.root / name)
+            os.replace(temporary_path(self._paths.root / name), self._paths.root / name)
         if self._reject_stream is not None:
             os.replace(temporary_path(self._reject_path), self._reject_path)
         else:
             remove(self._reject_path)
         for name in old.files if old else ():
             if name not in files:
-                remove(self._places.root / name)
-        sync_folder(self._places.root)
+                remove(self._paths.root / name)
+        sync_folder(self._paths.root)
         write_atomically(record_path, content)
-        self._forget_progress()
+        self._delete_progress()
 
     def withdraw(self) -> None:
-        """Take away what is not committed."""
-        streams = {self._places.root / name: stream for name, stream in self._streams.items()}
+        """Delete what is not committed."""
+        streams = {self._paths.root / name: stream for name, stream in self._streams.items()}
         if self._reject_stream is not None:
             streams[self._reject_path] = self._reject_stream
         for path, stream in streams.items():
             temporary_path(path).unlink(missing_ok=True)
             with contextlib.suppress(OSError):  # closing flushes, which fails again on a full disk
                 stream.close()
-        self._forget_progress()
+        self._delete_progress()
 
-    def _forget_progress(self) -> None:
-        (self._places.progress / self.shard.name).unlink(missing_ok=True)
+    def _delete_progress(self) -> None:
+        (self._paths.progress / self.shard.name).unlink(missing_ok=True)
 
     @staticmethod
     def _finish(stream: BinaryIO, path: Path) -> dict[str, str | int]:
         if not stream.closed:
             stream.close()
-        beside = temporary_path(path)
-        with open(beside, "rb+") as written:
+        temporary = temporary_path(path)
+        with open(temporary, "rb+") as written:
             os.fsync(written.fileno())
-        return {"sha256": file_digest(beside), "bytes": beside.stat().st_size}
+        return {"sha256": file_digest(temporary), "bytes": temporary.stat().st_size}

@@ -1,4 +1,4 @@
-"""A trial: the stages of a config on a few samples, to learn what a sample costs before hours are spent."""
+"""Trial run: the stages of a config on a few samples, to measure the cost of a sample."""
 
 from __future__ import annotations
 
@@ -13,16 +13,20 @@ from pipeline.stage import Shard, Stage
 from pipeline.task import Job
 from pipeline.workers import Workers
 
-_SHARDS = 4
-"""So many shards of samples are made, evenly spread over the plan."""
+_TRIAL_SHARDS = 4
+"""Number of shards with samples that a trial makes, evenly spread over the plan."""
 
 
 @dataclass(frozen=True)
 class Costs:
-    """What a stage costs: for each sample, and for what is done once, in shards without samples.
+    """Measured cost of a stage.
 
-    samples, shards, other_shards: on how many samples this was measured, in how many shards with samples and without;
-    warm_up: seconds that each worker spends on its first shard alone, to load and compile.
+    samples: number of samples measured
+    seconds_each, bytes_each: cost of a sample
+    shards: number of measured shards with samples
+    other_shards: number of measured shards without samples
+    seconds_once, bytes_once: cost of the shards without samples
+    warm_up: extra seconds of a worker's first shard, for imports and compilation
     """
 
     samples: int
@@ -36,7 +40,7 @@ class Costs:
 
 
 def short_config(config: Config, stages: Mapping[str, Stage]) -> Config:
-    """The config with the section for a short run of each stage that has one."""
+    """Return the config with each stage's section for a short run, where it has one."""
     sections = dict(config.sections)
     for name, stage in stages.items():
         if stage.trial_config is not None:
@@ -44,29 +48,28 @@ def short_config(config: Config, stages: Mapping[str, Stage]) -> Config:
     return replace(config, sections=sections)
 
 
-def run_trial(config: Config, stages: Mapping[str, Stage], places: DatasetPaths) -> dict[str, Costs]:
-    """What each stage of a short config costs, measured in one worker each below `places`.
+def run_trial(config: Config, stages: Mapping[str, Stage], paths: DatasetPaths) -> dict[str, Costs]:
+    """Measure the cost of each stage of a short config, in one worker each, below `paths`.
 
-    The first shard of a stage is made twice: what the second time takes less, a worker pays once. Raises ConfigError
-    where a shard fails: so would the run.
+    Makes the first shard of a stage twice: the difference is the warm-up. Raises ConfigError where a shard fails.
     """
-    survey = Inventory(config, stages, places)
+    inventory = Inventory(config, stages, paths)
     costs: dict[str, Costs] = {}
     for name in stages:
-        places.stage(name).make()
-        workers = Workers(1, places.worker_output)
+        paths.stage(name).make()
+        workers = Workers(1, paths.worker_output)
         try:
-            costs[name] = _measured(survey, survey.stage(name), workers)
+            costs[name] = _measured(inventory, inventory.stage(name), workers)
         finally:
             workers.stop(kill=True)
     return costs
 
 
-def costs_of(surveyed: StageInventory, seconds: Mapping[str, float], warm_up: float = 0.0) -> Costs:
-    """What the finished shards of a stage have cost, where each has taken so many `seconds`."""
-    with_samples = {shard.name for shard in surveyed.shards if _holds_samples(shard)}
-    own = {name: record for name, record in surveyed.records.items() if name in with_samples}
-    other = {name: record for name, record in surveyed.records.items() if name not in with_samples}
+def costs_of(state: StageInventory, seconds: Mapping[str, float], warm_up: float = 0.0) -> Costs:
+    """Return the cost of the finished shards of a stage, given the seconds of each."""
+    with_samples = {shard.name for shard in state.shards if _holds_samples(shard)}
+    own = {name: record for name, record in state.records.items() if name in with_samples}
+    other = {name: record for name, record in state.records.items() if name not in with_samples}
     samples = sum(record.samples for record in own.values())
     return Costs(
         samples=samples,
@@ -80,39 +83,41 @@ def costs_of(surveyed: StageInventory, seconds: Mapping[str, float], warm_up: fl
     )
 
 
-def _measured(survey: Inventory, surveyed: StageInventory, workers: Workers) -> Costs:
+def _measured(inventory: Inventory, state: StageInventory, workers: Workers) -> Costs:
     seconds: dict[str, float] = {}
     warm_up = 0.0
     chosen: set[str] = set()
     while True:
-        sized = [shard.name for shard in surveyed.shards if _holds_samples(shard)]
-        chosen = chosen or {sized[place * len(sized) // _SHARDS] for place in range(_SHARDS if sized else 0)}
+        sized = [shard.name for shard in state.shards if _holds_samples(shard)]
+        chosen = chosen or {
+            sized[index * len(sized) // _TRIAL_SHARDS] for index in range(_TRIAL_SHARDS if sized else 0)
+        }
         ready = [
             shard
-            for shard in surveyed.missing
-            if surveyed.ready(shard) and (shard.name in chosen or not _holds_samples(shard))
+            for shard in state.missing
+            if state.ready(shard) and (shard.name in chosen or not _holds_samples(shard))
         ]
         if not ready:
-            return costs_of(surveyed, seconds, warm_up)
+            return costs_of(state, seconds, warm_up)
         for shard in ready:
             first = not seconds
-            job = survey.job(surveyed.stage.name, shard)
+            job = inventory.job(state.stage.name, shard)
             seconds[shard.name] = _make(job, workers)
             if first:
                 cold, seconds[shard.name] = seconds[shard.name], _make(job, workers)
                 warm_up = max(cold - seconds[shard.name], 0.0)
-        survey.refresh(surveyed.stage.name)
+        inventory.refresh(state.stage.name)
 
 
 def _make(job: Job, workers: Workers) -> float:
-    """Make a shard; the seconds that processors were busy with it, whatever else they had to do."""
+    """Make a shard; return its CPU seconds."""
     workers.submit(job)
     for _, report in workers.finished(None):
         if report is not None and report.status == "done":
             return report.cpu_seconds
         message = "its worker died" if report is None else report.message
         raise ConfigError(f"the trial of {job.stage} failed, as the run would: {message}")
-    raise AssertionError("a worker ends what it is given")
+    raise AssertionError("a worker returns every job")
 
 
 def _holds_samples(shard: Shard) -> bool:

@@ -1,8 +1,8 @@
-"""Workers: each is a loky executor of one process, so that a death has one culprit and harms no other shard.
+"""Workers: each is a loky executor of one process, so that a death has one cause and harms no other shard.
 
-One executor with many processes would break as a whole when one of them dies, and could not say which shard it
-was that killed it. Native libraries do kill (a segmentation fault, memory), so even one worker is a process of
-its own. Each worker of a cluster has such a process, too (`pipeline/cluster.py`), and so has each job of a job array.
+One executor with many processes would break as a whole when one of them dies, without naming the shard. Native
+libraries do kill their process (a segmentation fault, memory), so even a single worker is a process of its own. So it
+is for workers of a cluster (`pipeline/cluster.py`) and jobs of a job array.
 """
 
 from __future__ import annotations
@@ -24,16 +24,18 @@ from pipeline.termination import die_with_parent
 
 WORKER_DIED = "its worker process died (out of memory, or a crash in a native library)"
 
-_RECYCLED_AFTER = 64
-"""Shards that a worker makes before a fresh process takes its place: native libraries leak."""
+_SHARDS_PER_PROCESS = 64
+"""A fresh process then takes over: native libraries leak."""
 
-_SECONDS_TO_GO = 10.0
-"""After these, an idle worker that was asked to go is killed: it was stopped."""
+_EXIT_SECONDS = 10.0
+"""After these, a worker that was asked to exit is killed."""
 
 
 def _same_arithmetic() -> dict[str, str]:
-    """OpenBLAS has kernels for each kind of processor, whose sums differ in their last digits: those for AVX2 are taken
-    wherever it is there, with the blocks of one size of cache."""
+    """Return settings under which OpenBLAS gives the same sums on every processor with AVX2.
+
+    Its kernels differ by processor and cache size, and their sums in the last digits.
+    """
     flags = Path("/proc/cpuinfo").read_text().split() if Path("/proc/cpuinfo").is_file() else []
     return {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_L2_SIZE": "512"} if {"avx2", "fma"} <= set(flags) else {}
 
@@ -47,15 +49,14 @@ _ENVIRONMENT = {
     "PYTHONHASHSEED": "0",
     **_same_arithmetic(),
 }
-"""What a worker is started with, whatever the shell says: one thread, and the same arithmetic on every machine."""
+"""Environment of every worker: one thread, and the same arithmetic on every machine."""
 
-# loky itself gives a worker that has grown by 300 MB a fresh process before its next job, and warns, as if one
-# were lost.
+# loky replaces a process that has grown by 300 MB before its next job, and warns as if a job were lost.
 warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given to the executor")
 
 
 def _start_worker(parent: int, output: Path) -> None:
-    """Runs first in each worker: dies with its parent, leaves Ctrl-C to it, prints into a file of the dataset."""
+    """Prepare a worker: it dies with its parent, leaves Ctrl-C to it, and prints into a file of the dataset."""
     die_with_parent()
     if os.getppid() != parent:
         os._exit(1)  # the parent died before it could be watched
@@ -63,7 +64,7 @@ def _start_worker(parent: int, output: Path) -> None:
     try:
         descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     except OSError:
-        return  # a full disk is found, and named, by the first shard that writes
+        return  # the first shard that writes reports the full disk
     os.dup2(descriptor, 1)
     os.dup2(descriptor, 2)
     os.close(descriptor)
@@ -77,7 +78,7 @@ class _Worker:
         self._made = 0
 
     def submit(self, job: Job) -> Future[Report]:
-        if self._executor is not None and self._made >= _RECYCLED_AFTER:
+        if self._executor is not None and self._made >= _SHARDS_PER_PROCESS:
             self.stop(kill=False)
         if self._executor is None:
             self._made = 0
@@ -93,9 +94,9 @@ class _Worker:
         return future
 
     def stop(self, kill: bool) -> None:
-        """End the process: at once, or after what it does now, which it is not waited for longer than it takes to go.
+        """End the process: at once, or after its current job.
 
-        A process that was stopped (SIGSTOP) would never go by itself.
+        A process that was stopped (SIGSTOP) does not exit by itself and is killed after _EXIT_SECONDS.
         """
         if self._executor is None:
             return
@@ -105,7 +106,7 @@ class _Worker:
             _kill(processes)
         executor.shutdown(wait=kill, kill_workers=kill)
         if not kill and manager is not None:
-            manager.join(_SECONDS_TO_GO)
+            manager.join(_EXIT_SECONDS)
             if manager.is_alive():
                 _kill(processes)
                 manager.join()
@@ -117,7 +118,7 @@ def _kill(processes: Iterable[Any]) -> None:
 
 
 class Workers:
-    """A fixed number of workers that stay alive between the waves of a plan."""
+    """A fixed number of workers that stay alive while a plan grows."""
 
     def __init__(self, count: int, output: Path) -> None:
         self._count = count
@@ -126,26 +127,26 @@ class Workers:
 
     @property
     def jobs(self) -> list[Job]:
-        """The jobs that run now."""
+        """Return the running jobs."""
         return [job for _, job in self._busy.values()]
 
     def has_room(self, job: Job) -> bool:
-        """Whether as many workers are idle as the job has threads; or all, where it has more than there are workers."""
-        return len(self._idle) >= self._places(job)
+        """Whether enough workers are idle for the job's threads, or all of them."""
+        return len(self._idle) >= self._needed(job)
 
     def submit(self, job: Job) -> None:
-        """Start a job on an idle worker; for each further thread of it another stays idle meanwhile.
+        """Start a job on an idle worker and reserve one more worker for each further thread.
 
         Raises IndexError when there is no room.
         """
-        taken = [self._idle.pop() for _ in range(self._places(job))]
+        taken = [self._idle.pop() for _ in range(self._needed(job))]
         self._busy[taken[0].submit(job)] = (taken, job)
 
-    def _places(self, job: Job) -> int:
+    def _needed(self, job: Job) -> int:
         return min(job.shard.threads, self._count)
 
     def finished(self, timeout: float | None) -> Iterator[tuple[Job, Report | None]]:
-        """Jobs that end within `timeout` seconds (None: the next), with None for one that has killed its worker."""
+        """Yield the jobs that end within `timeout` seconds (None: the next), with None where the worker died."""
         for future in wait(self._busy, timeout=timeout, return_when=FIRST_COMPLETED).done:
             (worker, *others), job = self._busy.pop(future)
             try:
@@ -160,14 +161,14 @@ class Workers:
             yield job, report
 
     def end(self, job: Job) -> None:
-        """Kill the worker of a running job; another takes its place."""
+        """Kill the worker of a running job; another process replaces it."""
         future = next(future for future, (_, running) in self._busy.items() if running is job)
         taken, _ = self._busy.pop(future)
         taken[0].stop(kill=True)
         self._idle += taken
 
     def stop(self, kill: bool) -> None:
-        """End all workers: at once, or after what they do now."""
+        """End all workers: at once, or after their current jobs."""
         for worker in [*self._idle, *(worker for taken, _ in self._busy.values() for worker in taken)]:
             worker.stop(kill)
         self._busy.clear()

@@ -1,7 +1,7 @@
-"""YAML as people mistype it: values with the line of every key, duplicate keys refused, `1e-3` a number.
+"""YAML with the line of every key; duplicate keys are refused, and `1e-3` is a number.
 
-A file is looked through, event by event, before anything is built of it: its aliases may stand for billions of values,
-and the builder goes down as deep as a file goes.
+A file is scanned event by event before values are built: aliases may expand to billions of values, and the builder
+recurses as deep as the file nests.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ _Loader.add_implicit_resolver(
 
 
 def read_yaml(path: Path) -> tuple[Mapping[str, Any], Mapping[KeyPath, int]]:
-    """The mapping in a YAML file, and the line (from 1) where each key and list item stands.
+    """Return the mapping in a YAML file, and the line (from 1) of each key and list item.
 
     Raises ConfigError, with file and line, for an unreadable or huge file, bad syntax, a duplicate key, a key that is
-    no text, a tag, values that contain themselves, nest deeply or are too many, and a file that holds no mapping.
+    no text, a tag, values that contain themselves, deep nesting, too many values, and a file without a mapping.
     """
     try:
         text = _text(path)
@@ -52,7 +52,7 @@ def read_yaml(path: Path) -> tuple[Mapping[str, Any], Mapping[KeyPath, int]]:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     loader = _Loader("")
     try:
-        _look_through(path, text)
+        _scan(path, text)
         loader = _Loader(text)
         node = loader.get_single_node()
         lines: dict[KeyPath, int] = {}
@@ -80,7 +80,7 @@ def _text(path: Path) -> str:
     return text
 
 
-def _look_through(path: Path, text: str) -> None:
+def _scan(path: Path, text: str) -> None:
     """Raise ConfigError for tags, and for values that contain themselves, nest too deeply or are too many."""
     open_since: list[tuple[str | None, int]] = []
     sizes: dict[str | None, int] = {}
@@ -97,7 +97,7 @@ def _look_through(path: Path, text: str) -> None:
         elif isinstance(event, yaml.ScalarEvent):
             count += 1
             sizes[event.anchor] = 1
-            if any(each in _CONTROLS or "\ud800" <= each <= "\udfff" for each in event.value):
+            if any(char in _CONTROLS or "\ud800" <= char <= "\udfff" for char in event.value):
                 raise ConfigError(f"{where}: a value holds a control character or half a character; take it out")
         elif isinstance(event, yaml.CollectionStartEvent):
             open_since.append((event.anchor, count))
@@ -111,20 +111,20 @@ def _look_through(path: Path, text: str) -> None:
             raise ConfigError(f"{where}: holds more than {MAX_VALUES:,} values by here, which no config does")
 
 
-def _collect(path: Path, node: yaml.Node, place: KeyPath, lines: dict[KeyPath, int]) -> None:
+def _collect(path: Path, node: yaml.Node, parent: KeyPath, lines: dict[KeyPath, int]) -> None:
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
             line = key.start_mark.line + 1
             if not isinstance(key, yaml.ScalarNode) or key.tag != "tag:yaml.org,2002:str":
                 named = f"key {key.value!r}" if isinstance(key, yaml.ScalarNode) else "a key"
                 raise ConfigError(f"{path}:{line}: {named} must be text: put it in quotes")
-            below = (*place, key.value)
+            below = (*parent, key.value)
             if below in lines:
-                dotted = ".".join(str(each) for each in below)
-                raise ConfigError(f"{path}:{line}: key {dotted} stands twice; first in line {lines[below]}")
+                dotted = ".".join(map(str, below))
+                raise ConfigError(f"{path}:{line}: key {dotted} is defined twice; first in line {lines[below]}")
             lines[below] = line
             _collect(path, value, below, lines)
     elif isinstance(node, yaml.SequenceNode):
         for index, value in enumerate(node.value):
-            lines[*place, index] = value.start_mark.line + 1
-            _collect(path, value, (*place, index), lines)
+            lines[*parent, index] = value.start_mark.line + 1
+            _collect(path, value, (*parent, index), lines)

@@ -46,7 +46,7 @@ def cloud_similarity(
     tree, other = KDTree(exemplar), KDTree(shape)
     anchors = exemplar[_thinned(exemplar, radius / ANCHORS)]
     inside = tree.query_ball_point(anchors, radius)
-    known = np.array([_numbers(exemplar[each] - at, radius, up) for at, each in zip(anchors, inside, strict=True)])
+    known = np.array([_numbers(exemplar[item] - at, radius, up) for at, item in zip(anchors, inside, strict=True)])
     found = np.zeros(probes)
     asked = np.arange(len(shape)) if only is None else np.flatnonzero(only)
     for place, probe in enumerate(shape[rng.choice(asked, probes, replace=False)]):
@@ -80,7 +80,7 @@ def _ranked(tree: Any, around: FloatArray, anchors: FloatArray, up: int) -> list
     """The best turns (3, 3) and places (3,) to which a neighbourhood may go."""
     ways = [(turn, at) for turn in _turns(up) for at in anchors]
     off = [float(np.minimum(tree.query(around @ turn.T + at)[0], 1e300).mean()) for turn, at in ways]
-    return [ways[each] for each in np.argsort(off, kind="stable")[:CLOSE]]
+    return [ways[item] for item in np.argsort(off, kind="stable")[:CLOSE]]
 
 
 def _turns(up: int) -> list[FloatArray]:

@@ -76,7 +76,7 @@ def allowed(path: Path, module: str) -> bool:
 
 
 def against_the_way(path: Path) -> Iterator[str]:
-    yield from (f"may not import {each}" for each in imports(parsed(path)) if not allowed(path, each))
+    yield from (f"may not import {item}" for item in imports(parsed(path)) if not allowed(path, item))
 
 
 def test_imports_run_along_the_way_of_the_data() -> None:
@@ -91,7 +91,7 @@ def test_folders_of_stages_do_not_import_each_other_in_a_circle() -> None:
         place = path.relative_to(ROOT).parts
         if place[0] == "stages" and len(place) > 2:
             modules = [module.split(".") for module in imports(parsed(path))]
-            targets = {each[1] for each in modules if each[0] == "stages" and len(each) > 1}
+            targets = {module[1] for module in modules if module[0] == "stages" and len(module) > 1}
             reads.setdefault(place[1], set()).update(targets - {place[1]})
     order = list(TopologicalSorter(reads).static_order())
     assert order[0] == "shape"
@@ -101,7 +101,7 @@ def test_folders_of_stages_do_not_import_each_other_in_a_circle() -> None:
 def uncertain(path: Path) -> Iterator[str]:
     """What in a file takes bytes from the moment, the machine or a state that anybody changes."""
     tree = parsed(path)
-    yield from {each for each in imports(tree) if each.split(".")[0] in {"random", "uuid", "secrets"}}
+    yield from {item for item in imports(tree) if item.split(".")[0] in {"random", "uuid", "secrets"}}
     for name, call in calls(tree):
         tail = name.split(".")
         if tail[-2:-1] == ["random"] and tail[0] in {"np", "numpy"} and tail[-1] not in GLOBAL_RANDOMNESS:
@@ -124,7 +124,7 @@ def test_bytes_depend_on_no_file_that_a_fingerprint_does_not_know() -> None:
 def executing(path: Path) -> Iterator[str]:
     """What in a file would run what it reads."""
     tree = parsed(path)
-    yield from {each for each in imports(tree) if each.split(".")[0] in EXECUTING}
+    yield from {item for item in imports(tree) if item.split(".")[0] in EXECUTING}
     for name, call in calls(tree):
         if name in {"yaml.load", "yaml.unsafe_load", "yaml.full_load", "eval", "exec"}:
             yield f"line {call.lineno}: {name}"
@@ -163,14 +163,14 @@ def kernels(tree: ast.Module) -> list[ast.FunctionDef]:
         node
         for node in tree.body
         if isinstance(node, ast.FunctionDef)
-        and any(ast.unparse(each).startswith("numba.njit") for each in node.decorator_list)
+        and any(ast.unparse(item).startswith("numba.njit") for item in node.decorator_list)
     ]
 
 
 def test_types_are_asked_for_everywhere_but_in_files_with_kernels() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mypy"]
     assert settings["strict"]
-    spared = [each["module"] for each in settings["overrides"] if each.get("disallow_untyped_defs") is False]
+    spared = [setting["module"] for setting in settings["overrides"] if setting.get("disallow_untyped_defs") is False]
     files = [path for path in CODE if kernels(parsed(path))]
     assert spared == [[relative(path).removesuffix(".py").replace("/", ".") for path in files]]
 
@@ -182,7 +182,7 @@ def untyped(path: Path) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef) and node not in compiled:
             named = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
-            without = [each.arg for each in named if each.annotation is None and each.arg not in {"self", "cls"}]
+            without = [item.arg for item in named if item.annotation is None and item.arg not in {"self", "cls"}]
             if node.returns is None:
                 yield f"line {node.lineno}: what does {node.name} return?"
             if without:

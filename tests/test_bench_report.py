@@ -16,7 +16,7 @@ def test_a_kept_report_marks_what_differs_from_the_one_before_by_more_than_noise
     assert "**" not in path.with_suffix(".md").read_text()
     now = [Measure("slower", "samples", 7.0), Measure("alike", "samples", 9.0), Measure("faster", "samples", 14.0)]
     kept = figures(path)
-    assert [change(each, kept) for each in now] == ["**-30%**", "-10%", "**+40%**"]
+    assert [change(item, kept) for item in now] == ["**-30%**", "-10%", "**+40%**"]
     assert change(Measure("other", "samples", 1.0), kept) == "new"
     keep(path, now)
     text = path.with_suffix(".md").read_text()

@@ -166,7 +166,7 @@ def test_every_string_of_the_corpus_decodes_to_its_graph_and_obeys_the_grammar(m
         kit = load_kit(exemplars / f"{kit_name}.json", exemplars / f"{kit_name}.tar")
         alphabet = make_alphabet(kit.type_names())
         decoded = [check_string(line, alphabet, kit.grammar) for line in text.read_text().splitlines()]
-        assert {graph_digest(each.types, each.edges) for each in decoded} == graphs[text.stem]
+        assert {graph_digest(item.types, item.edges) for item in decoded} == graphs[text.stem]
         seen += len(decoded)
     statistics = json.loads((one / "small-corpus" / "statistics.json").read_text())
     assert seen > 500

@@ -69,7 +69,7 @@ def test_samples_of_a_new_producer_have_what_all_stages_add(made: tuple[Path, st
     for members in samples.values():
         record = json.loads(members["json"])
         assert (record["producer"], record["language"]) == ("pebbles", "heap")
-        heights = [float(each) for each in members["txt"].decode().split()]
+        heights = [float(word) for word in members["txt"].decode().split()]
         np.testing.assert_allclose(bytes_array(members["mass.npy"]), 2.5 * np.array(heights), rtol=1e-6)
         assert record["total_mass"] == pytest.approx(2.5 * sum(heights), abs=1e-3)
         assert {"glb", "points.npy", "labels.npy", "sketch0.png"} <= set(members)
@@ -85,10 +85,10 @@ def test_what_they_say_of_themselves_stands_in_card_croissant_index_and_manifest
         assert said in card
     assert "| `<key>.mass.npy` | float32 (parts) | Mass of each part. |" in card
     croissant = json.loads((folder / "croissant.json").read_text())
-    assert "mass" in {each["name"] for each in croissant["recordSet"]}
+    assert "mass" in {item["name"] for item in croissant["recordSet"]}
     rows = pyarrow.parquet.read_table(made[0] / "heaps-index" / "heaps.parquet").to_pylist()
     assert all(row["total_mass"] > 0 for row in rows)
-    assert "mass.npy" in {each["name"] for each in json.loads((folder / "manifest.json").read_text())["members"]}
+    assert "mass.npy" in {load["name"] for load in json.loads((folder / "manifest.json").read_text())["members"]}
 
 
 def test_a_table_of_theirs_is_found_and_stands_in_the_report(made: tuple[Path, str]) -> None:

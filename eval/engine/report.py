@@ -111,7 +111,7 @@ def _facts(run: DatasetRun, started: datetime) -> list[tuple[str, str]]:
         ("Config", f"{run.config.path}, seed {run.config.seed}"),
     ]
     if manifest:
-        made_with = manifest["made_with"]["shapemill"]
+        made_with = manifest["software"]["shapemill"]
         facts.append(("Dataset", f"{manifest['name']} {manifest['version']}, seed {manifest['seed']}"))
         facts.append(("Dataset made by", f"shapemill {made_with}"))
         changed = _changed_sections(run)

@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from eval.engine.evaluation import Figure
 from eval.engine.pictures import cloud_portrait
 from eval.programs.figures import boxes_portrait, picture_figure
-from stages.abstraction.hierarchy import MIN_TURN_GAIN
+from stages.abstraction.hierarchy import MAX_TURNED_VOLUME_SHARE
 from stages.programs.program import find_program
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import box_corners, nearest_axes
@@ -62,7 +62,7 @@ def curve_parts(program: str, shapes: int, rng: np.random.Generator) -> PartClou
     points, features = [], []
     for shape in islice(random_shapes(find_program(program), TRAIN_INTERVAL, rng), shapes):
         meshes = [part.mesh for part in shape.parts]
-        boxes = [nearest_axes(minimum_box(mesh.vertices, MIN_TURN_GAIN), np.eye(3)) for mesh in meshes]
+        boxes = [nearest_axes(minimum_box(mesh.vertices, MAX_TURNED_VOLUME_SHARE), np.eye(3)) for mesh in meshes]
         for mesh, box in zip(meshes, boxes, strict=True):
             local = (even_points(mesh.vertices, mesh.triangles, POINTS_PER_PART) - box.center) @ box.axes.T
             points.append(local / np.maximum(box.size, 1e-6))

@@ -1,4 +1,4 @@
-"""How `make verify` looks at the ShapeAssembly programs of samples."""
+"""Verification of the ShapeAssembly programs of samples."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from stages.shapeassembly.syntax.errors import ProgramError
 from stages.shapeassembly.syntax.parser import parse
 
 MAX_CORNER_SHARE = 0.35
-"""By how much of the sample's diagonal a corner of the box around a program may miss that of the sample: it was let
-through by its surface, and its parts may reach out a little."""
+"""Distance between the corners of the bounding boxes of program and sample, as a share of the sample's diagonal.
+
+Programs are accepted by their surface, so parts may reach out a little."""
 
 
 def _faults(sample: PackagedSample) -> Iterator[str]:
     if PROGRAM not in sample.members:
         return
-    said, text = sample.record["program"], sample.members[PROGRAM].decode()
-    if bool(text) != (said["refused"] == PROGRAM_FOUND):
+    entry, text = sample.record["program"], sample.members[PROGRAM].decode()
+    if bool(text) != (entry["refused"] == PROGRAM_FOUND):
         yield "it has a ShapeAssembly program and a reason why it has none, or neither"
         return
     if not text:
@@ -34,12 +35,12 @@ def _faults(sample: PackagedSample) -> Iterator[str]:
     except ProgramError as error:
         yield f"its ShapeAssembly program: {error}"
         return
-    if sum(1 + len(block.lines) for block in program.blocks) != said["lines"]:
-        yield "its ShapeAssembly program has another number of lines than its json says"
+    if sum(1 + len(block.lines) for block in program.blocks) != entry["lines"]:
+        yield "its ShapeAssembly program has another number of lines than its json states"
     bounds = shape_bounds(sample.shape)
-    placed = np.array(said["centre"]) + said["scale"] * np.stack([corners.min(axis=0), corners.max(axis=0)])
+    placed = np.array(entry["centre"]) + entry["scale"] * np.stack([corners.min(axis=0), corners.max(axis=0)])
     if np.abs(placed - bounds).max() > MAX_CORNER_SHARE * np.linalg.norm(bounds[1] - bounds[0]):
-        yield "its ShapeAssembly program stands elsewhere than its mesh"
+        yield "its ShapeAssembly program is elsewhere than its mesh"
 
 
 AUDIT = Audit(faults=_faults)

@@ -1,4 +1,4 @@
-"""A shape as a part hierarchy: each part its smallest box, and near parts gathered until an assembly is small."""
+"""A shape as a part hierarchy: the minimum box of each part, with near parts grouped into small assemblies."""
 
 from __future__ import annotations
 
@@ -13,33 +13,34 @@ from stages.shapeassembly.extraction.boxes import bounding_box, box_corners, box
 from stages.shapeassembly.extraction.hierarchy import Box, PartHierarchy, PartNode, check_limits
 from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
 
-SAME_SHARE = 0.01
-"""Up to which boxes count as touching, as a share of the diagonal of the shape."""
+TOUCHING_GAP_SHARE = 0.01
+"""Gap up to which boxes count as touching, as a share of the shape's diagonal."""
 
-MIN_TURN_GAIN = 0.5
-"""A part stands along its own axes unless a turned box has less than this share of the volume: leaning posts are far
-below it, roofs and bent armrests, which look no better in a turned box, above."""
+MAX_TURNED_VOLUME_SHARE = 0.5
+"""Share of the volume below which a turned box replaces the box along the part's own axes.
+
+Leaning posts are far below it; roofs and bent armrests, which look no better in a turned box, are above."""
 
 
 class Boxes:
-    """The smallest box around each mesh, found once for all parts and shapes that have it."""
+    """Caches the minimum box of each mesh."""
 
     def __init__(self) -> None:
         self._known: dict[PartMesh, Box] = {}
 
     def of(self, mesh: PartMesh, pose: FloatArray) -> Box:
-        """The box of a part of this mesh at a rigid pose (4, 4)."""
+        """Return the box of a part of this mesh at a rigid pose (4, 4)."""
         if mesh not in self._known:
-            self._known[mesh] = minimum_box(mesh.vertices, MIN_TURN_GAIN)
+            self._known[mesh] = minimum_box(mesh.vertices, MAX_TURNED_VOLUME_SHARE)
         box = self._known[mesh]
         return Box(pose[:3, :3] @ box.center + pose[:3, 3], box.size, box.axes @ pose[:3, :3].T)
 
 
 def hierarchy_of(shape: Shape, children: int, boxes: Boxes) -> PartHierarchy:
-    """The parts of an upright shape below nodes of at most `children` each.
+    """Return the parts of an upright shape below nodes of at most `children` children.
 
-    Nodes are groups of parts that hang together; where a group falls into more pieces than that, its node has more.
-    Raises Rejected for more parts than a hierarchy may have.
+    Nodes are connected groups of parts; a node with more disconnected pieces has more children. Raises Rejected for
+    more parts than a hierarchy may have.
     """
     assembly = shape.assembly
     leaves = [
@@ -47,16 +48,16 @@ def hierarchy_of(shape: Shape, children: int, boxes: Boxes) -> PartHierarchy:
         for kind, pose in zip(assembly.types.tolist(), assembly.poses, strict=True)
     ]
     corners = np.stack([box_corners(leaf.box) for leaf in leaves])
-    reach = SAME_SHARE * float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
+    reach = TOUCHING_GAP_SHARE * float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
     label = max(leaves, key=lambda leaf: float(np.prod(leaf.box.size))).label
     check_limits(PartNode(label, leaves[0].box, tuple(leaves)), "a sample")
     return PartHierarchy("sample", _node(label, leaves, corners, children, reach))
 
 
 def _node(label: str, leaves: Sequence[PartNode], corners: FloatArray, children: int, reach: float) -> PartNode:
-    """The node of some leaves, whose corners are (n, 8, 3)."""
+    """Return the node of some leaves with corners (n, 8, 3)."""
     below = []
-    for group in _gathered(leaves, corners, children, reach):
+    for group in _grouped(leaves, corners, children, reach):
         within = [leaves[index] for index in group]
         if len(within) == 1:
             below.append(within[0])
@@ -66,9 +67,11 @@ def _node(label: str, leaves: Sequence[PartNode], corners: FloatArray, children:
     return PartNode(label, bounding_box(corners.reshape(-1, 3), np.eye(3)), tuple(below))
 
 
-def _gathered(leaves: Sequence[PartNode], corners: FloatArray, most: int, reach: float) -> list[list[int]]:
-    """Leaves with corners (n, 8, 3) in at most `most` groups, or as many as they fall apart into: of two groups
-    that touch, those are joined whose common upright box is least, again and again."""
+def _grouped(leaves: Sequence[PartNode], corners: FloatArray, max_groups: int, reach: float) -> list[list[int]]:
+    """Group leaves with corners (n, 8, 3) into at most `max_groups`, or into their connected components.
+
+    Repeatedly joins the two touching groups with the smallest common upright box.
+    """
     groups = [[index] for index in range(len(corners))]
     low, high = corners.min(axis=1), corners.max(axis=1)
     # Over all pairs of groups: the volume of their common box, and infinite where they do not touch.
@@ -79,8 +82,8 @@ def _gathered(leaves: Sequence[PartNode], corners: FloatArray, most: int, reach:
     cost = np.where(touching, _common(low, high, low, high), np.inf)
     np.fill_diagonal(cost, np.inf)
     # A group of all would be the node again.
-    while sum(map(bool, groups)) > most:
-        first, second = sorted(int(each) for each in np.unravel_index(int(cost.argmin()), cost.shape))
+    while sum(map(bool, groups)) > max_groups:
+        first, second = sorted(map(int, np.unravel_index(int(cost.argmin()), cost.shape)))
         if not np.isfinite(cost[first, second]):
             break
         groups[first], groups[second] = sorted(groups[first] + groups[second]), []
@@ -98,7 +101,7 @@ def _gathered(leaves: Sequence[PartNode], corners: FloatArray, most: int, reach:
 
 
 def _common(low: FloatArray, high: FloatArray, others_low: FloatArray, others_high: FloatArray) -> FloatArray:
-    """The volume of the box around each two boxes, (n, m), of n and m; flat ones count as thin."""
+    """Return the volume (n, m) of the common box of each of n boxes and each of m others; flat boxes count as thin."""
     sizes = np.maximum(high[:, None], others_high) - np.minimum(low[:, None], others_low)
     volumes: FloatArray = np.prod(sizes + 1e-3 * float(np.abs(sizes).max()), axis=-1)
     return volumes

@@ -1,4 +1,4 @@
-"""What stage `abstraction` adds to every sample: a ShapeAssembly program of its parts' boxes, where it has one."""
+"""The member that stage `abstraction` adds to samples: a ShapeAssembly program of their parts' boxes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from stages.shape.collection.members import Member, Members, RecordField
 
 PROGRAM = "program.txt"
 PROGRAM_FOUND = "not refused"
-"""What a record says of a sample that has a program."""
+"""Value of `refused` in the record of a sample with a program."""
 
 
 def _members(config: Config) -> tuple[Member, ...]:
@@ -33,10 +33,10 @@ def _fields(config: Config) -> Mapping[str, RecordField]:
             "type": "number",
             "minimum": 0,
             "maximum": 100,
-            "description": "how well its cuboids agree with the boxes of the parts, percent",
+            "description": "agreement of its cuboids with the boxes of the parts, percent",
         },
-        "lines": {"type": "integer", "minimum": 0, "description": "its lines, those of all assemblies"},
-        "leaves": {"type": "integer", "minimum": 0, "description": "cuboids that it declares and does not expand"},
+        "lines": {"type": "integer", "minimum": 0, "description": "number of lines in all assemblies"},
+        "leaves": {"type": "integer", "minimum": 0, "description": "number of cuboids that it does not expand"},
         "centre": {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
         "scale": {"type": "number", "minimum": 0, "description": "centre + scale * its coordinates are the mesh's"},
     }
@@ -54,12 +54,13 @@ def _fields(config: Config) -> Mapping[str, RecordField]:
 
 
 def figures(plan: Plan) -> Mapping[str, float] | None:
-    """Samples looked at, programs found, and the means of their F-scores and lines; None while there are none."""
-    done = [each for each in (plan.summary("abstraction", name) for name in plan.shards("abstraction")) if each]
-    samples, programs = (sum(each[name] for each in done) for name in ("samples", "programs"))
+    """Return the numbers of samples and programs, and means of F-scores and lines; None without samples."""
+    summaries = [plan.summary("abstraction", name) or {} for name in plan.shards("abstraction")]
+    done = [summary for summary in summaries if summary]
+    samples, programs = (sum(summary[name] for summary in done) for name in ("samples", "programs"))
     if not samples:
         return None
-    means = {name: sum(each[name] for each in done) / max(programs, 1) for name in ("f_score", "lines")}
+    means = {name: sum(summary[name] for summary in done) / max(programs, 1) for name in ("f_score", "lines")}
     return {"samples": samples, "programs": programs, **means}
 
 
@@ -69,7 +70,7 @@ def _card(plan: Plan) -> Sequence[str]:
         return []
     return [
         f"{found['programs']:,} of {found['samples']:,} samples have a ShapeAssembly program of their parts' boxes "
-        f"(`{PROGRAM}`), of {found['lines']:.1f} lines in the mean, with a mean F-score of {found['f_score']:.1f} %."
+        f"(`{PROGRAM}`), with {found['lines']:.1f} lines and an F-score of {found['f_score']:.1f} % on average."
     ]
 
 

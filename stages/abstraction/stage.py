@@ -1,4 +1,4 @@
-"""Stage `abstraction`: each sample of the collection gets a ShapeAssembly program, if a config asks for it."""
+"""Stage `abstraction`: a ShapeAssembly program of each sample, if the config asks for it."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ BYTES_PER_SAMPLE = 4096
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """One shard for each shard of the collection; none unless programs are asked for."""
+    """Plan one shard for each shard of the collection, if programs are asked for."""
     return collection_shards(plan) if plan.config.section(AbstractionConfig).programs else []
 
 
 def run_shard(task: Task) -> Outcome:
-    """What `members.py` declares, of each sample. The summary has sums over the programs that were found."""
+    """Write the members of `members.py` for each sample; the summary has sums over all programs."""
     config = task.config.section(AbstractionConfig)
     boxes = Boxes()
     sums: dict[str, float] = {"programs": 0, "f_score": 0.0, "lines": 0}
@@ -56,13 +56,13 @@ def _fields(found: ExtractedProgram) -> dict[str, Any]:
         "f_score": round(found.f_score, 3),
         "lines": sum(1 + len(block.lines) for block in found.program.blocks),
         "leaves": found.leaves,
-        "centre": [float(f"{each:.9g}") for each in found.center],
+        "centre": [float(f"{coordinate:.9g}") for coordinate in found.center],
         "scale": float(f"{found.scale:.9g}"),
     }
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """How many samples have a program, and how well they fit."""
+    """Describe how many samples have a program, and how well these fit."""
     found = figures(plan)
     if found is None:
         return []

@@ -1,4 +1,4 @@
-"""`README.md`: the dataset's card, with the metadata that Hugging Face reads and the text that people read."""
+"""`README.md`: the dataset card, with metadata for Hugging Face and text for people."""
 
 from __future__ import annotations
 
@@ -15,26 +15,30 @@ from stages.package.tables import class_table, member_table, origin_table, rejec
 SIZE_CATEGORIES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
 USES = (
-    "For training and measuring models that generate, complete, segment or reconstruct shapes made of parts, and for "
-    "work on shape grammars, shape programs and physical validity. Not for conclusions about how real things look or "
-    "are built, nor for deciding whether a real thing is safe."
+    "For training and evaluating models that generate, complete, segment or reconstruct shapes made of parts, and for "
+    "work on shape grammars, shape programs and physical validity. Not for conclusions about the look or construction "
+    "of real objects, and not for judging whether a real object is safe."
 )
 LIMITS = (
-    "The shapes are synthetic. They are not a sample of real things, and no person has judged them.",
-    "Whether a shape stands is computed by statics with one density everywhere. Nothing was simulated or built.",
-    "Meshes have one colour a face at most, and no textures, materials or normals.",
-    "Points lie on the whole surface of every part, also where it is hidden inside another part: no scanner sees that.",
+    "The shapes are synthetic. They do not represent real objects, and no person has reviewed them.",
+    "Stability is computed by statics with one density everywhere. Nothing was simulated or built.",
+    "Meshes have at most one colour per face, and no textures, materials or normals.",
+    "Points cover the whole surface of every part, even where it is hidden inside another part, unlike a scan.",
 )
 
 
 @dataclass(frozen=True)
-class Story:
-    """How a dataset was made, in the words of its producer and its language.
+class CardText:
+    """Text of a card from the dataset's producer and language.
 
-    made: how its samples come about; splits: paragraphs on what keeps the splits apart; coordinates: their units and
-    their origin;
-    limits: what not to expect; paragraphs, variety: Markdown; rejects: refused items by reason; origins: what it was
-    made from, and whose that is; unstated: a sentence for each of these without a licence.
+    made: how the samples are made
+    splits: paragraphs on the separation of the splits
+    coordinates: their unit and origin
+    limits: limitations, a sentence each
+    paragraphs, variety: Markdown
+    rejects: number of refused items by reason
+    origins: the files that the dataset was made from, with author and licence
+    missing_licenses: a sentence for each origin without a licence
     """
 
     made: str
@@ -49,7 +53,7 @@ class Story:
 
 
 def citation(facts: Mapping[str, Any]) -> str:
-    """How to cite the dataset, as BibTeX on one line."""
+    """Return the citation as BibTeX on one line."""
     year = str(facts["published"])[:4]
     return (
         f"@misc{{{facts['name']}, title={{{facts['title']}}}, author={{{facts['creator']}}}, year={{{year}}}, "
@@ -58,7 +62,7 @@ def citation(facts: Mapping[str, Any]) -> str:
 
 
 def size_category(samples: int) -> str:
-    """Hugging Face's name for a dataset of this size."""
+    """Return Hugging Face's name for a dataset of this size."""
     return next((name for limit, name in SIZE_CATEGORIES if samples < limit), "n>1M")
 
 
@@ -69,21 +73,23 @@ def card(
     tallies: Mapping[str, SourceTally],
     sources: Mapping[str, str],
     classes: Sequence[Mapping[str, Any]],
-    story: Story,
+    text: CardText,
 ) -> str:
-    """The card's text.
+    """Return the card.
 
-    facts: name, version, title, description, license, creator, published, tags, task_categories; shards: summaries
-    of the package's shards; members: name, sentence, dtype and shape of each; tallies: what the index
-    says of each kit; sources: the kits or programs by name, with what there is to say of them in short; classes: the
-    rows of `classes.json`.
+    facts: name, version, title, description, license, creator, published, tags, task_categories
+    shards: summaries of the package's shards
+    members: name, sentence, dtype and shape of each
+    tallies: statistics of the index for each kit or program
+    sources: a short description of each kit or program, by name
+    classes: rows of `classes.json`
     """
     splits = list(dict.fromkeys(str(shard["split"]) for shard in shards))
     header = {
         "license": str(facts["license"]).lower(),
         "pretty_name": facts["title"],
         "task_categories": list(facts["task_categories"]),
-        "size_categories": [size_category(sum(each.samples for each in tallies.values()))],
+        "size_categories": [size_category(sum(tally.samples for tally in tallies.values()))],
         "tags": list(dict.fromkeys([*facts["tags"], *sources])),
         "configs": [
             {
@@ -96,42 +102,41 @@ def card(
         f"# {facts['title']}",
         f"![Shapes, their points and their sketches]({PREVIEW})",
         str(facts["description"]),
-        "## What is in it",
+        "## Contents",
         split_table(splits, shards),
         source_table(sources, tallies),
-        "## How the splits are kept apart",
-        *story.splits,
+        "## Splits",
+        *text.splits,
         "## Part labels",
         class_table(classes, splits),
-        *(["## How different they are", *story.variety] if story.variety else []),
+        *(["## Diversity", *text.variety] if text.variety else []),
         "## A sample",
         member_table(members),
-        f"`{SCHEMA}` says what each field of the JSON means. No key holds a dot, no value is null or empty, and each "
-        "sample has all members and all fields. A part is named by its place in the record's `parts`: instances of "
-        "points, and the two rows of `contacts.npy` and `joints.npy`, are such places. `lineage.parents` says what a "
-        "sample was made from.",
+        f"`{SCHEMA}` describes each field of the JSON. No key holds a dot, no value is null or empty, and each sample "
+        "has all members and all fields. Instances of points and the two rows of `contacts.npy` and `joints.npy` are "
+        "indices into the record's `parts`. `lineage.parents` names the sources of a sample.",
         "## Coordinates",
-        f"Right-handed, y up; mesh, poses, bounds and contacts have one frame. {story.coordinates} The ground of a "
-        "shape is the plane through its lowest point, `bounds[0][1]` in the record. A part's `pose` moves its mesh "
-        "from the part's own coordinates into those of the shape, and is the matrix of its node in the GLB. The points "
-        "are in the coordinates of the mesh, or moved and scaled as `points.centre` and `points.scale` say. Vertex "
-        "colours are linear, as glTF asks.",
-        "## What it is for, and what not",
+        f"Right-handed, y up; mesh, poses, bounds and contacts share one frame. {text.coordinates} The ground of a "
+        "shape is the plane through its lowest point, `bounds[0][1]` in the record. A part's `pose` maps its own "
+        "coordinates to those of the shape, and is the matrix of its node in the GLB. Points have the coordinates of "
+        "the mesh, or are moved and scaled by `points.centre` and `points.scale`. Vertex colours are linear, as in "
+        "glTF.",
+        "## Intended use and limitations",
         USES,
-        "\n".join(f"- {each}" for each in (*LIMITS, *story.limits)),
-        "## Loading it",
+        "\n".join(f"- {limit}" for limit in (*LIMITS, *text.limits)),
+        "## Loading",
         _loading(facts, splits, shards),
         "## How it was made",
-        f"By Shapemill: {story.made} `{MANIFEST}` holds the whole config and the versions of code and libraries.",
-        *([reject_table(story.rejects)] if story.rejects else []),
-        *story.paragraphs,
-        "## Checking it",
-        f"`sha256sum -c {CHECKSUMS}` compares every file; `make verify` also holds every sample against what it "
-        "says of itself, and computes contacts anew from meshes.",
+        f"By Shapemill: {text.made} `{MANIFEST}` holds the whole config and the versions of code and libraries.",
+        *([reject_table(text.rejects)] if text.rejects else []),
+        *text.paragraphs,
+        "## Verification",
+        f"`sha256sum -c {CHECKSUMS}` checks every file; `make verify` also checks every sample against its record, and "
+        "recomputes contacts from meshes.",
         "## Licence and citation",
         f"{facts['license']}.",
-        *(["What it was made from, and whose that is:", origin_table(story.origins)] if story.origins else []),
-        *(["\n".join(f"- {each}" for each in story.missing_licenses)] if story.missing_licenses else []),
+        *(["Made from:", origin_table(text.origins)] if text.origins else []),
+        *(["\n".join(f"- {sentence}" for sentence in text.missing_licenses)] if text.missing_licenses else []),
         f"```bibtex\n{citation(facts)}\n```",
     ]
     front = yaml.safe_dump(header, sort_keys=False, allow_unicode=True, width=1000)
@@ -158,8 +163,8 @@ loader = DataLoader(samples.to_tuple("points.npy", "labels.npy").batched(16), ba
 import datasets
 samples = datasets.load_dataset("{name}", split="{split}")
 
-# Croissant: each member is a record set of `key` and `content`, an array being the bytes of its .npy;
-# with "-of-samples" behind its name it has `split` and `kit` too; `samples` is the index
+# Croissant: each member is a record set of `key` and `content` (an array as the bytes of its .npy);
+# `<member>-of-samples` has `split` and `kit` too; `samples` is the index
 import mlcroissant
 records = mlcroissant.Dataset("{name}/{CROISSANT}").records("points-of-samples")
 

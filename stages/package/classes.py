@@ -1,4 +1,4 @@
-"""`classes.json`: what each class of a dataset is, and how many shapes and parts of each split have it."""
+"""`classes.json`: the classes of a dataset, with the numbers of shapes and parts in each split."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from stages.shape.collection.classes import Classes
 from stages.shape.shape import Shape
 
 UNSEEN_COLOR = (160, 160, 160)
-"""The colour of a class that has none of its own and of which there is no part."""
+"""Colour of a class without a colour of its own and without parts, sRGB."""
 
 
 class ClassTally:
-    """How many shapes and parts of one shard have each class, and in which colour."""
+    """Counts shapes and parts of each class in one shard, and keeps the colour of the first part."""
 
     def __init__(self) -> None:
         self._shapes: Counter[int] = Counter()
@@ -25,7 +25,7 @@ class ClassTally:
         self._colors: dict[int, list[int]] = {}
 
     def add(self, shape: Shape) -> None:
-        """Count one more shape."""
+        """Count a shape."""
         classes = shape.part_classes.tolist()
         for part, number in enumerate(classes):
             if number not in self._colors:
@@ -35,7 +35,7 @@ class ClassTally:
         self._shapes.update(set(classes))
 
     def counts(self) -> dict[str, dict[str, Any]]:
-        """Of each class that is there, by its id: shapes, parts, and the colour of the first part."""
+        """Return shapes, parts and colour of each class with parts, by its id."""
         return {
             str(number): {"shapes": self._shapes[number], "parts": self._parts[number], "color": color}
             for number, color in sorted(self._colors.items())
@@ -45,30 +45,31 @@ class ClassTally:
 def count_classes(
     classes: Classes, tallies: Iterable[tuple[str, Mapping[str, Mapping[str, Any]]]]
 ) -> list[dict[str, Any]]:
-    """What `classes.json` says: the classes in the order of their ids, also those of which there is no part.
+    """Return the rows of `classes.json` in the order of ids, with classes that have no parts.
 
-    tallies: split and `ClassTally.counts` of each shard, the shards of a split next to each other. A class whose
-    source names no colour has that of its first part.
+    tallies: split and `ClassTally.counts` of each shard, the shards of a split next to each other
+
+    A class whose source has no colour gets that of its first part.
     """
-    each_split = list(tallies)
-    splits = tuple(dict.fromkeys(split for split, _ in each_split))
+    counts_by_shard = list(tallies)
+    splits = tuple(dict.fromkeys(split for split, _ in counts_by_shard))
     shapes: Counter[tuple[str, str]] = Counter()
     parts: Counter[tuple[str, str]] = Counter()
     seen: dict[str, tuple[int, ...]] = {}
-    for split, counts in each_split:
+    for split, counts in counts_by_shard:
         for number, count in counts.items():
             shapes[number, split] += count["shapes"]
             parts[number, split] += count["parts"]
             seen.setdefault(number, tuple(count["color"]))
     table = []
-    for each in classes.all:
-        number = str(each.id)
-        red, green, blue = each.color or seen.get(number, UNSEEN_COLOR)
+    for label in classes.all:
+        number = str(label.id)
+        red, green, blue = label.color or seen.get(number, UNSEEN_COLOR)
         table.append(
             {
-                "id": each.id,
-                "name": each.name,
-                "kit": each.kit,
+                "id": label.id,
+                "name": label.name,
+                "kit": label.kit,
                 "color": f"#{red:02x}{green:02x}{blue:02x}",
                 "shapes": {split: shapes[number, split] for split in splits},
                 "parts": {split: parts[number, split] for split in splits},
@@ -78,6 +79,6 @@ def count_classes(
 
 
 def table_bytes(table: Iterable[Mapping[str, Any]]) -> bytes:
-    """The table as JSON, a list with a line for each class."""
-    lines = ",\n ".join(json.dumps(each, ensure_ascii=False, allow_nan=False) for each in table)
+    """Encode the table as JSON, a list with a line for each class."""
+    lines = ",\n ".join(json.dumps(row, ensure_ascii=False, allow_nan=False) for row in table)
     return f"[{lines}]\n".encode()

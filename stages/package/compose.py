@@ -1,4 +1,4 @@
-"""The shard that is made last: the files that speak of the whole dataset."""
+"""The last shard: the files about the whole dataset."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, BinaryIO, cast
 
 from pipeline.paths import file_digest
 from pipeline.stage import Outcome, Task
-from stages.package.card import Story, card, citation
+from stages.package.card import CardText, card, citation
 from stages.package.classes import count_classes, table_bytes
 from stages.package.croissant import croissant
 from stages.package.hashing import HashingStream
@@ -24,10 +24,19 @@ from stages.shape.collection.discovery import language_of
 def compose_dataset(task: Task) -> Outcome:
     """Write card, Croissant, schema, classes, manifest, checksums and index.
 
-    The shard's params hold `facts`; `producer`; `sections` (the whole config); `shards` (summaries of the package's
-    shards); `members` (what is to say of each); `schema` (of the records); `apart` (whether graphs keep the splits
-    apart); `origins` (what the dataset was made from); `story` (the other fields of the card's `Story`); `measures`
-    (figures for the manifest); `preview` (the shard with the picture) and `made_with` (versions of code and libraries).
+    Params of the shard:
+
+    facts, producer: name and other facts of the dataset, and its producer
+    sections: the whole config
+    shards: summaries of the package's shards
+    members: name, sentence, dtype and shape of each
+    schema: JSON schema of the records
+    graphs_share_split: whether samples of equal graphs are in one split
+    origins: the files that the dataset was made from
+    card_text: the other fields of `CardText`
+    measures: figures for the manifest
+    preview: the shard with the preview picture
+    software: versions of code and libraries
     """
     params = task.shard.params
     shards, facts, members = params["shards"], params["facts"], params["members"]
@@ -47,28 +56,28 @@ def compose_dataset(task: Task) -> Outcome:
     classes = count_classes(Classes.of(known), of_shards)
     listed = table_bytes(classes)
     counted = {"path": CLASSES, "count": len(classes), "sha256": hashlib.sha256(listed).hexdigest()}
-    sources = {name: each.sentence for name, each in known.items() if name in tallies}
-    story = Story(**params["story"], origins=params["origins"])
+    sources = {name: source.sentence for name, source in known.items() if name in tallies}
+    text = CardText(**params["card_text"], origins=params["origins"])
     files = {
-        CARD: card(facts, shards, members, tallies, sources, classes, story).encode(),
+        CARD: card(facts, shards, members, tallies, sources, classes, text).encode(),
         CROISSANT: _text(croissant(facts, shards, members, indexed, counted, params["origins"], citation(facts))),
         SCHEMA: _text(params["schema"]),
         CLASSES: listed,
     }
     digests = {file: hashlib.sha256(content).hexdigest() for file, content in files.items()}
     digests[PREVIEW] = file_digest(task.input("package", f"{params['preview']}.png"))
-    described = manifest(
+    document = manifest(
         *(facts, params["sections"], shards, members, digests, indexed, counted),
-        *(params["measures"], params["made_with"], params["origins"]),
+        *(params["measures"], params["software"], params["origins"]),
     )
-    files[MANIFEST] = _text({**described, "apart": params["apart"]})
+    files[MANIFEST] = _text({**document, "graphs_share_split": params["graphs_share_split"]})
     digests[MANIFEST] = hashlib.sha256(files[MANIFEST]).hexdigest()
     digests.update({shard["path"]: shard["sha256"] for shard in shards})
     files[CHECKSUMS] = checksums(digests).encode()
     for file, content in files.items():
         with task.output(f"{task.shard.name}.{file}") as stream:
             stream.write(content)
-    return Outcome(samples=0, summary={"samples": sum(each.samples for each in tallies.values())})
+    return Outcome(samples=0, summary={"samples": sum(tally.samples for tally in tallies.values())})
 
 
 def _read(task: Task, file: str) -> Any:

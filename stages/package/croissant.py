@@ -99,11 +99,11 @@ def croissant(
         "datePublished": facts["published"],
         "citeAs": citation,
         "keywords": list(facts["tags"]),
-        **({"isBasedOn": [_work(each) for each in origins]} if origins else {}),
+        **({"isBasedOn": [_work(origin) for origin in origins]} if origins else {}),
         "distribution": [
             *map(_shard, shards),
             _index(index),
-            *(_files(each["name"], each["sentence"], shards) for each in members),
+            *(_files(member["name"], member["sentence"], shards) for member in members),
             _class_file(classes),
         ],
         "recordSet": [
@@ -152,7 +152,7 @@ def _index(index: Mapping[str, Any]) -> dict[str, Any]:
         "@type": "cr:FileObject",
         "@id": INDEX,
         "name": str(index["path"]).rpartition("/")[2],
-        "description": "One row a sample. It stands in a folder beside that of the dataset.",
+        "description": "One row a sample. Its folder is next to that of the dataset.",
         "contentUrl": index["path"],
         "contentSize": f"{index['bytes']} B",
         "encodingFormat": "application/x-parquet",
@@ -225,8 +225,8 @@ def _joined_records(member: Mapping[str, Any]) -> dict[str, Any]:
             references={"field": {"@id": "samples/key"}},
         ),
         *(
-            _field(f"{name}/{each}", f"The sample's {each}.", "sc:Text", source={"field": {"@id": f"samples/{each}"}})
-            for each in ("split", "kit")
+            _field(f"{name}/{item}", f"The sample's {item}.", "sc:Text", source={"field": {"@id": f"samples/{item}"}})
+            for item in ("split", "kit")
         ),
         _field(
             f"{name}/content",
@@ -243,7 +243,7 @@ def _content_type(member: Mapping[str, Any]) -> dict[str, Any]:
         return {"dataType": "sc:ImageObject"}
     if not member["name"].endswith(".npy"):
         return {"dataType": "sc:Text"}
-    lengths = ",".join(str(each) if isinstance(each, int) else "-1" for each in member["shape"])
+    lengths = ",".join(str(item) if isinstance(item, int) else "-1" for item in member["shape"])
     return {"dataType": ["sc:Text", ELEMENTS[member["dtype"]]], "isArray": True, "arrayShape": lengths}
 
 

@@ -1,8 +1,7 @@
-"""GLB files of shapes (glTF 2.0): one node a part, each mesh once, colours at the vertices.
+"""GLB files of shapes (glTF 2.0): one node per part, each mesh once, vertex colours.
 
-The binary part of a mesh never changes, so it is built once for all shapes of a kit; a file is these parts put one
-behind another and a JSON of nodes. Bytes depend on the shape alone. There is no material: trimesh, and with it
-Hugging Face `datasets`, drops vertex colours where there is one.
+The binary chunk of a mesh is built once for all shapes of a kit; a file concatenates chunks after a JSON of nodes.
+Bytes depend only on the shape. There is no material: with one, trimesh and Hugging Face `datasets` drop vertex colours.
 """
 
 from __future__ import annotations
@@ -19,17 +18,17 @@ from stages.shape.arrays import ByteArray
 from stages.shape.kit import PartMesh
 from stages.shape.shape import Shape
 
-FLOAT, UNSIGNED_BYTE, UNSIGNED_SHORT, UNSIGNED_INT = 5126, 5121, 5123, 5125
+GL_FLOAT, GL_UNSIGNED_BYTE, GL_UNSIGNED_SHORT, GL_UNSIGNED_INT = 5126, 5121, 5123, 5125
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 ASSET = {"version": "2.0", "generator": "Shapemill"}
 
 
 @dataclass(frozen=True)
 class MeshChunk:
-    """One mesh as it stands in a file: `content`, and where in it which array lies.
+    """The binary chunk of a mesh.
 
-    views: `(offset, length, target)` of positions, colours and indices; accessors: the three glTF accessors without
-    their views.
+    views: (offset, length, target) of positions, colours and indices
+    accessors: the three glTF accessors without their views
     """
 
     name: str
@@ -39,10 +38,10 @@ class MeshChunk:
 
 
 def glb_bytes(shape: Shape) -> bytes:
-    """The GLB of `shape`: nodes in the order of the parts, with their names; only meshes in use.
+    """Return the GLB of a shape: named nodes in the order of the parts, and the meshes in use.
 
-    Vertices stay in each mesh's own coordinates as float32; the poses stand in the nodes as 4x4 matrices. Each
-    node's `extras` has `class` and `instance`, what labels and instances of points refer to.
+    Vertices are float32 in each mesh's own coordinates; nodes have 4x4 pose matrices. A node's `extras` has `class` and
+    `instance`, the labels and instances of points.
     """
     chunks, assembly = _chunks(shape.meshes), shape.assembly
     used = sorted(set(assembly.types.tolist()))
@@ -85,11 +84,11 @@ def glb_bytes(shape: Shape) -> bytes:
 
 @lru_cache(maxsize=16)
 def _chunks(meshes: tuple[PartMesh, ...]) -> list[MeshChunk]:
-    return [_chunk(each) for each in meshes]
+    return [_chunk(mesh) for mesh in meshes]
 
 
 def linear_colors(colors: ByteArray) -> ByteArray:
-    """sRGB uint8 (n, 3) as linear uint8 (n, 4) with full alpha: vertex colours of glTF are linear."""
+    """Convert sRGB uint8 (n, 3) to linear uint8 (n, 4) with full alpha: vertex colours of glTF are linear."""
     level = colors / 255.0
     linear = np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
     full = np.full((len(colors), 4), 255, dtype=np.uint8)
@@ -98,7 +97,7 @@ def linear_colors(colors: ByteArray) -> ByteArray:
 
 
 def _chunk(mesh: PartMesh) -> MeshChunk:
-    """The arrays of a mesh: a vertex stands once for each colour that its faces have, so that faces keep theirs."""
+    """Return the arrays of a mesh, with a vertex for each colour of its faces."""
     faces = mesh.faces.astype(np.int64)
     shades, shade_of_face = np.unique(mesh.face_colors, axis=0, return_inverse=True)
     coded = faces * len(shades) + shade_of_face.reshape(-1, 1)
@@ -118,14 +117,14 @@ def _chunk(mesh: PartMesh) -> MeshChunk:
         content += _padded(stored, b"\0")
     accessors: tuple[dict[str, Any], ...] = (
         {
-            "componentType": FLOAT,
+            "componentType": GL_FLOAT,
             "count": len(pairs),
             "type": "VEC3",
             "min": positions.min(axis=0).tolist(),
             "max": positions.max(axis=0).tolist(),
         },
-        {"componentType": UNSIGNED_BYTE, "normalized": True, "count": len(pairs), "type": "VEC4"},
-        {"componentType": UNSIGNED_SHORT if short else UNSIGNED_INT, "count": flat.size, "type": "SCALAR"},
+        {"componentType": GL_UNSIGNED_BYTE, "normalized": True, "count": len(pairs), "type": "VEC4"},
+        {"componentType": GL_UNSIGNED_SHORT if short else GL_UNSIGNED_INT, "count": flat.size, "type": "SCALAR"},
     )
     return MeshChunk(mesh.name, content, tuple(views), accessors)
 
@@ -145,5 +144,5 @@ def _container(header: dict[str, Any], content: bytes) -> bytes:
 
 
 def _padded(stored: bytes, filler: bytes) -> bytes:
-    """`stored`, filled up to a multiple of four bytes as glTF asks."""
+    """Pad to a multiple of four bytes, as glTF requires."""
     return stored + filler * (-len(stored) % 4)

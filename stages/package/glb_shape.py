@@ -1,4 +1,4 @@
-"""The shape in a sample's GLB: `glb_bytes` backwards."""
+"""Decoding of a sample's GLB: the inverse of `glb_bytes`."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from stages.shape.views.palette import linear_to_srgb
 
 
 def glb_shape(content: bytes) -> Shape:
-    """The parts of a sample by the bytes of its member `glb`: their names, meshes, poses, and colours within 2 of 255;
-    y up. What touches what stands in the sample's `json`: the shape has no contacts."""
+    """Return the parts in a sample's member `glb`: names, meshes, poses, and colours within 2 of 255; y up.
+
+    The shape has no contacts: these are in the sample's `json`.
+    """
     import trimesh
 
     scene = trimesh.load_scene(io.BytesIO(content), file_type="glb", process=False)
@@ -32,8 +34,8 @@ def glb_shape(content: bytes) -> Shape:
 
 
 def _part_mesh(label: str, mesh: Any) -> PartMesh:
-    # In the file a vertex stands once for each of its colours, so the first corner of a face has the face's.
-    vertices, place = np.unique(np.asarray(mesh.vertices, dtype=np.float64), axis=0, return_inverse=True)
+    # The file has a vertex for each of its colours, so the first corner of a face has the colour of the face.
+    vertices, index = np.unique(np.asarray(mesh.vertices, dtype=np.float64), axis=0, return_inverse=True)
     faces = np.asarray(mesh.faces)
     linear = np.asarray(mesh.visual.vertex_colors, dtype=np.float64)[faces[:, 0], :3] / 255.0
-    return PartMesh(label, vertices, place.reshape(-1)[faces].astype(np.int32), linear_to_srgb(linear))
+    return PartMesh(label, vertices, index.reshape(-1)[faces].astype(np.int32), linear_to_srgb(linear))

@@ -1,4 +1,4 @@
-"""A stream that knows the length and the SHA-256 of what was written to it."""
+"""A stream that computes the length and the SHA-256 of its content."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import BinaryIO
 
 
 class HashingStream:
-    """What a file is written to: passes all on to `stream`, and knows its length and SHA-256."""
+    """Passes content on to `stream`, and computes its length and SHA-256."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
@@ -21,17 +21,17 @@ class HashingStream:
         return self._stream.write(content)
 
     def flush(self) -> None:
-        """Nothing is held back here."""
+        """Do nothing: this stream has no buffer."""
 
     @property
     def closed(self) -> bool:
-        """Whoever gave `stream` closes it."""
+        """Return False: the owner of `stream` closes it."""
         return False
 
     def tell(self) -> int:
-        """How many bytes have been written."""
+        """Return the number of bytes written."""
         return self.written
 
     def digest(self) -> str:
-        """SHA-256 of what has been written, in hexadecimal."""
+        """Return the SHA-256 of the content, in hex."""
         return self._hash.hexdigest()

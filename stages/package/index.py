@@ -1,4 +1,4 @@
-"""The index: one row a sample, as Parquet, so that samples can be chosen and read without reading shards."""
+"""The index: one Parquet row per sample, for choosing and reading samples without reading shards."""
 
 from __future__ import annotations
 
@@ -24,28 +24,26 @@ RECORD_COLUMNS = {
     "types": IndexColumn("int32", ("counts", "types")),
     "text": IndexColumn("string", ("text",)),
 }
-"""What the index takes from a record, beside the columns that stages declare."""
+"""Columns from a record, besides those that stages declare."""
 
 LOCATION_COLUMNS = {"shard": "string", "offset": "int64", "bytes": "int64"}
-"""Where a sample stands: `shard` is relative to the dataset's folder; the `bytes` bytes at `offset` of that file are
-the sample's members as a tar."""
+"""Location of a sample: `shard` is relative to the dataset's folder; `bytes` at `offset` are its members as a tar."""
 
 ROWS_PER_GROUP = 65_536
-"""Rows of a row group."""
 
 
 def columns() -> dict[str, IndexColumn]:
-    """All columns that come from a record, by name."""
-    return RECORD_COLUMNS | {name: column for each in members().values() for name, column in each.columns.items()}
+    """Return all columns that come from a record, by name."""
+    return RECORD_COLUMNS | {name: column for added in members().values() for name, column in added.columns.items()}
 
 
 def column_kinds() -> dict[str, str]:
-    """The Arrow type of every column of the index, by name."""
+    """Return the Arrow type of every column of the index, by name."""
     return {name: column.kind for name, column in columns().items()} | LOCATION_COLUMNS
 
 
 def index_row(record: Mapping[str, Any], path: str, offset: int, size: int) -> dict[str, Any]:
-    """The row of a sample of which `size` bytes begin at `offset` of the shard at `path`."""
+    """Return the row of a sample with `size` bytes at `offset` of the shard at `path`."""
     row: dict[str, Any] = {}
     for name, column in columns().items():
         value: Any = record
@@ -56,19 +54,19 @@ def index_row(record: Mapping[str, Any], path: str, offset: int, size: int) -> d
 
 
 def tar_bytes(members: Mapping[str, bytes]) -> int:
-    """How many bytes of a tar the members of a sample take, with their headers."""
-    return sum(512 + (len(each) + 511) // 512 * 512 for each in members.values())
+    """Return the size of the members of a sample in a tar, with headers, in bytes."""
+    return sum(512 + (len(content) + 511) // 512 * 512 for content in members.values())
 
 
 def read_rows(files: Iterable[Path]) -> Iterator[dict[str, Any]]:
-    """The rows that the shards of the package kept, in order, one in memory at a time."""
+    """Yield the rows of the package's shards in order, one in memory at a time."""
     for file in files:
         with open(file, encoding="utf-8") as lines:
             yield from map(json.loads, lines)
 
 
 def write_index(rows: Iterable[Mapping[str, Any]], stream: BinaryIO) -> None:
-    """Write the rows as Parquet; equal rows give equal bytes. A group of rows is in memory at a time."""
+    """Write rows as Parquet, one row group in memory at a time; equal rows give equal bytes."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

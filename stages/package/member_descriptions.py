@@ -1,4 +1,4 @@
-"""The members of a dataset's samples in words and types: those that stages declare, and package's own."""
+"""Descriptions of the members of samples: those that stages declare, and the package's own."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def describe_members(config: Config, names: Sequence[str], language: Language) -
 
     Raises ValueError for a member that nobody declares.
     """
-    declared = {each.name: each for stage in members().values() for each in stage.of(config)}
-    declared |= {each.name: each for each in OWN_MEMBERS}
+    declared = {item.name: item for stage in members().values() for item in stage.of(config)}
+    declared |= {item.name: item for item in OWN_MEMBERS}
     if not language.graphs:
         declared[TEXT] = Member(TEXT, language.text)
     unknown = [name for name in names if name not in declared]
     if unknown:
         raise ValueError(f"samples have {', '.join(unknown)}, which no stage declares in its members.py")
     return [
-        {"name": name, "sentence": each.sentence, "dtype": each.dtype, "shape": list(each.shape)}
-        for name, each in ((name, declared[name]) for name in names)
+        {"name": name, "sentence": item.sentence, "dtype": item.dtype, "shape": list(item.shape)}
+        for name, item in ((name, declared[name]) for name in names)
     ]

@@ -1,4 +1,4 @@
-"""One shard of the dataset: what the stages made of each sample, put together under the sample's key."""
+"""One shard of the dataset: the members of all stages, merged by sample."""
 
 from __future__ import annotations
 
@@ -24,18 +24,17 @@ from stages.shape.sample import Sample
 
 
 def merge_shard(task: Task) -> Outcome:
-    """Files of the shard: `.tar`, the dataset's, `.jsonl`, its rows of the index, and `.classes.json`, what its
-    samples have of each class. Its params name the `stages`
-    that add members; fields that these add to the record stand in a member `json` of theirs.
+    """Write the dataset's shard `.tar`, its rows of the index `.jsonl`, and its class counts `.classes.json`.
 
-    A sample that one of the stages has refused is left out and counted. Raises ShardFailed where samples differ in
-    their members.
+    The param `stages` names the stages that add members; their member `json` holds the fields that they add to the
+    record. Samples that a stage refused are left out and counted. Raises ShardFailed where samples have different
+    members.
     """
     split = str(task.shard.params["split"])
     path = shard_path(task.config, split, int(task.shard.name.rpartition("-")[2]))
     collection = Collection(task)
     total, rows = int(task.shard.params["samples"]), []
-    members_of_all: list[str] = []
+    member_names: list[str] = []
     counts: Counter[str] = Counter()
     tally = ClassTally()
     with task.output(f"{task.shard.name}.tar") as file:
@@ -47,9 +46,9 @@ def merge_shard(task: Task) -> Outcome:
                 members = {"glb": glb_bytes(shape), TEXT: sample.text.encode(), **added}
                 record = describe_sample(sample, collection.language.name, shape, members, fields)
                 members["json"] = json_bytes(record)
-                if members_of_all and list(members) != members_of_all:
-                    raise ShardFailed(f"{sample.key} has members {list(members)}, others have {members_of_all}")
-                members_of_all = list(members)
+                if member_names and list(members) != member_names:
+                    raise ShardFailed(f"{sample.key} has members {list(members)}, others have {member_names}")
+                member_names = list(members)
                 writer.write(sample.key, members)
                 counts[sample.kit] += 1
                 tally.add(shape)
@@ -65,7 +64,7 @@ def merge_shard(task: Task) -> Outcome:
         "samples": writer.samples,
         "bytes": stream.written,
         "sha256": stream.digest(),
-        "members": members_of_all,
+        "members": member_names,
         "kits": dict(counts),
     }
     return Outcome(samples=writer.samples, summary=summary)
@@ -74,8 +73,7 @@ def merge_shard(task: Task) -> Outcome:
 def _samples(
     task: Task, collection: Collection, stages: Sequence[str]
 ) -> Iterator[tuple[Sample, dict[str, bytes], dict[str, Any]]]:
-    """Each sample with the members and the fields that the stages add. They keep the order of the collection, with
-    gaps."""
+    """Yield each sample with the members and fields that stages add, in the order of the collection, with gaps."""
     readers = {stage: read_shard(task.input(stage, f"{task.shard.name}.tar")) for stage in stages}
     heads = {stage: next(reader, None) for stage, reader in readers.items()}
     for sample in collection.samples():
@@ -96,7 +94,7 @@ def _samples(
 
 
 def _merged(key: str, made: Mapping[str, dict[str, bytes]]) -> tuple[dict[str, bytes], dict[str, Any]]:
-    """Members and fields of all stages. Raises ShardFailed where two stages add the same."""
+    """Merge members and fields of all stages. Raises ShardFailed where two stages add the same."""
     members: dict[str, bytes] = {}
     fields: dict[str, Any] = {}
     for stage, added in made.items():

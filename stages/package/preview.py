@@ -1,4 +1,4 @@
-"""`preview.png`: what the dataset holds, on one sheet: exemplars, shapes, and some shapes' points and sketches."""
+"""`preview.png`: one sheet with exemplars, shapes, and points and sketches of some shapes."""
 
 from __future__ import annotations
 
@@ -25,23 +25,22 @@ from stages.sketches.settings import SketchesConfig
 
 PREVIEW_COLUMNS = 8
 CELL_PIXELS = 232
-EXEMPLAR_MARK_PIXELS = 12
-"""What differs from the background by more than so many levels is something shown."""
+MIN_CONTRAST_LEVELS = 12
+"""Pixels that differ more from the background are content, of 255."""
 CELL_PAD_SHARE = 0.02
-"""Height of the strip left above and below what a row shows, as a share of the pictures' height."""
+"""Strip above and below the content of a row, as a share of the pictures' height."""
 MAX_PREVIEW_CANDIDATES = 512
-"""At most so many shapes, evenly spread over the samples, are looked at to choose those that are shown."""
+"""Number of shapes, evenly spread over the samples, from which the preview is chosen."""
 ABOVE = Camera(azimuth=-40.0, elevation=25.0)
 BELOW = replace(ABOVE, elevation=-ABOVE.elevation)
-"""Where the first sketch looks from below, as at a ceiling lamp, so does the sheet."""
+"""Used where the first sketch looks from below, as at a ceiling lamp."""
 
 
 def draw_preview(task: Task) -> Outcome:
-    """File of the shard: `.png`. Its params: `title`, `of` how many samples, the `shards` to choose from, and the
-    stages that have `rows` to show.
+    """Write the shard's `.png`, drawn by the renderer of the sketches.
 
-    The first row of shapes and the rows of the stages show the same shapes, one a column. The backend that draws the
-    sketches draws this picture too.
+    Params: `title`, `of` (number of samples), `shards` to choose from, and stages with `rows`. The first row of shapes
+    and the rows of stages show the same shapes, one per column.
     """
     params, config = task.shard.params, task.config.section(PackageConfig)
     sketches = task.config.section(SketchesConfig)
@@ -49,17 +48,17 @@ def draw_preview(task: Task) -> Outcome:
     camera = BELOW if sketches.views[0].elevation < 0 else ABOVE
     collection, shards = Collection(task), params["shards"]
     made = {stage: _members(task, stage, shards) for stage in params["rows"]}
-    samples = [each for shard in shards for each in collection.samples(shard)]
-    whole = [each for each in samples if all(each.key in added for added in made.values())]
+    samples = [sample for shard in shards for sample in collection.samples(shard)]
+    whole = [sample for sample in samples if all(sample.key in added for added in made.values())]
     whole = whole[:: -(-len(whole) // MAX_PREVIEW_CANDIDATES)]
-    shown = varied([(each, collection.shape(each)) for each in whole], config.previewed)
+    shown = varied([(sample, collection.shape(sample)) for sample in whole], config.previewed)
     variants = [Cell(_picture(shape, camera, backend), part_count(shape)) for _, shape in shown]
-    sections = [Section("Shapes", _rows(variants), f"what comes out: {len(shown)} of {params['of']:,}")]
-    going_in = [
-        Cell(_picture(shape, ABOVE, backend), said) for said, shape in collection.decoder.shown(PREVIEW_COLUMNS)
+    sections = [Section("Shapes", _rows(variants), f"{len(shown)} of {params['of']:,}")]
+    exemplars = [
+        Cell(_picture(shape, ABOVE, backend), caption) for caption, shape in collection.decoder.shown(PREVIEW_COLUMNS)
     ]
-    if going_in:
-        sections.insert(0, Section("Exemplars", _rows(going_in), "what goes in"))
+    if exemplars:
+        sections.insert(0, Section("Exemplars", _rows(exemplars), "input"))
     for stage, added in made.items():
         row = members()[stage].row
         if row is not None:
@@ -71,10 +70,12 @@ def draw_preview(task: Task) -> Outcome:
 
 
 def varied(samples: Sequence[tuple[Sample, Shape]], count: int) -> list[tuple[Sample, Shape]]:
-    """`count` samples, or all if there are fewer: the kits take turns, each beginning with its largest sample and
-    going on with the one that differs most from those before in how many parts of which label it has."""
+    """Choose at most `count` samples, farthest first by the numbers of parts of each label.
+
+    The kits take turns; each begins with its largest sample.
+    """
     kits = dict.fromkeys(sorted(sample.kit for sample, _ in samples))
-    queues = [_farthest([each for each in samples if each[0].kit == kit], count) for kit in kits]
+    queues = [_farthest([pair for pair in samples if pair[0].kit == kit], count) for kit in kits]
     turns = [queue[turn] for turn in range(count) for queue in queues if turn < len(queue)]
     return turns[:count]
 
@@ -83,12 +84,12 @@ def _farthest(samples: Sequence[tuple[Sample, Shape]], count: int) -> list[tuple
     labels = max(len(shape.labels) for _, shape in samples)
     counts = np.array([np.bincount(shape.part_labels, minlength=labels) for _, shape in samples], dtype=np.float64)
     chosen = [int(np.argmax(counts.sum(axis=1)))]
-    apart = np.full(len(samples), np.inf)
+    distance = np.full(len(samples), np.inf)
     while len(chosen) < min(count, len(samples)):
-        apart = np.minimum(apart, np.abs(counts - counts[chosen[-1]]).sum(axis=1))
-        apart[chosen] = -1.0
-        chosen.append(int(np.argmax(apart)))
-    return [samples[each] for each in chosen]
+        distance = np.minimum(distance, np.abs(counts - counts[chosen[-1]]).sum(axis=1))
+        distance[chosen] = -1.0
+        chosen.append(int(np.argmax(distance)))
+    return [samples[index] for index in chosen]
 
 
 def _members(task: Task, stage: str, shards: Sequence[str]) -> dict[str, dict[str, bytes]]:
@@ -100,17 +101,17 @@ def _picture(shape: Shape, camera: Camera, backend: RendererName) -> ByteArray:
 
 
 def _rows(cells: Sequence[Cell]) -> list[list[Cell]]:
-    """The cells in rows, each row without the empty strips above and below its pictures."""
+    """Arrange cells in rows, without the empty strips above and below their pictures."""
     return [_trimmed(cells[start : start + PREVIEW_COLUMNS]) for start in range(0, len(cells), PREVIEW_COLUMNS)]
 
 
 def _trimmed(row: Sequence[Cell]) -> list[Cell]:
-    """The same strip of every picture of a row, a little higher than what is shown in the fullest."""
+    """Crop the pictures of a row to one strip that holds the content of all."""
     tops, ends = [], []
     for cell in row:
         height = len(cell.picture)
         marked = (
-            (np.abs(cell.picture.astype(np.int16) - cell.picture[0, 0]) > EXEMPLAR_MARK_PIXELS)
+            (np.abs(cell.picture.astype(np.int16) - cell.picture[0, 0]) > MIN_CONTRAST_LEVELS)
             .reshape(height, -1)
             .any(axis=1)
         )

@@ -53,7 +53,7 @@ def describe_sample(
             "types": len(set(shape.part_labels.tolist())),
         },
         "bounds": rounded(shape_bounds(shape)).tolist(),
-        # strings are a list, of which the first is the canonical one
+        # the first of several strings is the canonical one
         "text": sample.text or members["txt"].decode().split("\n", 1)[0],
         **added,
     }

@@ -1,7 +1,7 @@
-"""`schema.json`: what the JSON member of every sample of a dataset holds (JSON Schema 2020-12).
+"""`schema.json`: the fields of the JSON member of every sample (JSON Schema 2020-12).
 
-Put together of package's own fields, those that stages declare in `members.py`, and what the producer says in
-`producer.py` of its lineage. No field is optional, none may be there that is not declared, and nothing may be empty.
+It joins the package's own fields, those that stages declare in `members.py`, and the lineage that the producer declares
+in `producer.py`. Every field is required, no other is allowed, and none may be empty.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ MAX_FAULTS_LISTED = 5
 
 
 def record_schema(config: Config, producer: str, stages: Iterable[str]) -> dict[str, Any]:
-    """The schema of the records of a dataset that `producer` makes and to whose samples `stages` add."""
+    """Return the schema of the records of a dataset, by its producer and the stages that add fields."""
     declared = members()
     added = {name: dict(field.schema) for stage in stages for name, field in declared[stage].fields(config).items()}
     own = {
         **_own_fields(),
         "producer": {"const": producer, "description": "the stage that made the sample"},
-        "language": {"const": language_of(producer).name, "description": "what the sample's text or assembly is"},
+        "language": {"const": language_of(producer).name, "description": "format of the sample's text or assembly"},
         "lineage": _lineage({name: field.schema for name, field in producers()[producer].lineage(config).items()}),
     }
     return {
         "$schema": SCHEMA_DIALECT,
         "title": f"{config.name}: the record of a sample",
-        "description": "What <key>.json holds. Every sample has every field; nothing is null, and nothing is empty.",
+        "description": "Content of <key>.json. Every sample has every field; none is null or empty.",
         **_object({**own, **added}),
     }
 
 
 @lru_cache(maxsize=4)
 def validator_of(schema: str) -> Validator:
-    """The validator of a schema given as JSON. Raises jsonschema.SchemaError for what is none."""
+    """Return the validator of a schema, given as JSON. Raises jsonschema.SchemaError."""
     from jsonschema import Draft202012Validator
 
     loaded = json.loads(schema)
@@ -50,78 +50,78 @@ def validator_of(schema: str) -> Validator:
 
 
 def schema_faults(validator: Validator, record: Any) -> Iterator[str]:
-    """What of a record is not as the schema says, a sentence each, a few at most."""
+    """Yield a sentence for each violation of the schema, at most MAX_FAULTS_LISTED."""
     for _, error in zip(range(MAX_FAULTS_LISTED), validator.iter_errors(record), strict=False):
-        place = error.json_path.removeprefix("$").removeprefix(".")
-        yield f"its json is not as schema.json says: {place or 'the whole'}: {error.message[:200]}"
+        where = error.json_path.removeprefix("$").removeprefix(".")
+        yield f"its json is not as schema.json says: {where or 'the whole'}: {error.message[:200]}"
 
 
 def _own_fields() -> dict[str, dict[str, Any]]:
-    """The fields that every record has, whatever made its sample."""
+    """Return the fields of every record."""
     return {
         "key": {
             "type": "string",
             "pattern": "^[^.]+$",
-            "description": "unique in the dataset; the files of the sample are called <key>.<member>",
+            "description": "unique in the dataset; the files of the sample are named <key>.<member>",
         },
-        "split": {"enum": ["train", "val", "test"], "description": "the split that the sample is in"},
+        "split": {"enum": ["train", "val", "test"], "description": "split of the sample"},
         "producer": {},
         "language": {},
-        "kit": _text("the kit, the program or the category of programs that the sample comes from"),
+        "kit": _text("source of the sample: a kit, a program or a category of programs"),
         "graph": {
             "type": "string",
             "pattern": "^[0-9a-f]+$",
             "description": "digest of the structure: equal for samples of one kit with equal shape graphs, or of one "
-            "program that are alike up to continuous parameters",
+            "program that are equal up to continuous parameters",
         },
         "lineage": {},
         "parts": {
             "type": "array",
             "minItems": 1,
-            "description": "the parts; where others name a part, they give its place in this list",
+            "description": "the parts; other fields refer to a part by its index in this list",
             "items": _object(
                 {
-                    "name": _text("the part's own name, that of its node in the mesh"),
-                    "label": _text("what the part is; parts of one kit or program with one label are of one class"),
+                    "name": _text("name of the part, and of its node in the mesh"),
+                    "label": _text("label of the part; parts of one kit or program with one label have one class"),
                     "class": _whole("id of the label, unique in the dataset"),
-                    "instance": _whole("the part's place in this list"),
+                    "instance": _whole("index of the part in this list"),
                     "pose": {
                         **_numbers(4, 4),
-                        "description": "moves the part's mesh from its own coordinates into those of the shape; a "
-                        "4x4 matrix, row by row, for column vectors; rigid, but of a part that was stretched "
+                        "description": "maps the part's own coordinates to those of the shape; a "
+                        "4x4 matrix, row by row, for column vectors; rigid except for stretched parts "
                         "(lineage.deformed)",
                     },
                 }
             ),
         },
         "counts": {
-            "description": "how much there is of what",
+            "description": "numbers of parts, contacts and more",
             **_object(
                 {
-                    "parts": _whole("parts"),
+                    "parts": _whole("number of parts"),
                     "contacts": _whole("pairs of parts in contact"),
-                    "pieces": _whole("pieces that the contacts make; parts of different pieces do not touch"),
+                    "pieces": _whole("connected components of the contact graph"),
                     "cycles": _whole("independent cycles of the contact graph"),
                     "types": _whole("different labels"),
                 }
             ),
         },
-        "bounds": {**_numbers(2, 3), "description": "lowest and highest corner of the box around the shape"},
+        "bounds": {**_numbers(2, 3), "description": "lowest and highest corner of the bounding box"},
         "text": _text("the text that the sample is made from, or the canonical string of its shape graph"),
     }
 
 
 def _lineage(declared: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     common = {
-        "method": _text("how the sample was made, in a word of its producer"),
+        "method": _text("method of the producer that made the sample"),
         "parents": {
             "type": "array",
             "minItems": 1,
             "items": _text(""),
-            "description": "what the sample was made from: keys of samples, or names of exemplars, programs or files",
+            "description": "sources of the sample: keys of samples, or names of exemplars, programs or files",
         },
     }
-    return {"description": "where the sample comes from", **_object({**common, **declared})}
+    return {"description": "provenance of the sample", **_object({**common, **declared})}
 
 
 def _object(properties: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
@@ -134,8 +134,7 @@ def _object(properties: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _text(description: str) -> dict[str, Any]:
-    described = {"description": description} if description else {}
-    return {"type": "string", "minLength": 1, **described}
+    return {"type": "string", "minLength": 1, **({"description": description} if description else {})}
 
 
 def _whole(description: str) -> dict[str, Any]:
@@ -143,7 +142,7 @@ def _whole(description: str) -> dict[str, Any]:
 
 
 def _numbers(*lengths: int) -> dict[str, Any]:
-    """An array of arrays of these lengths of numbers."""
+    """Return the schema of nested arrays of numbers, with the length of each level."""
     schema: dict[str, Any] = {"type": "number"}
     for length in reversed(lengths):
         schema = {"type": "array", "items": schema, "minItems": length, "maxItems": length}

@@ -1,4 +1,4 @@
-"""The `package` section of a config: what the dataset's card says beside the dataset's own name and version."""
+"""The `package` section of a config: facts for the dataset's card."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pipeline.config import StrictModel
 
 
 class PackageConfig(StrictModel):
-    """What the card, `croissant.json` and the preview picture say and show."""
+    """Facts for the card, `croissant.json` and the preview picture."""
 
     creator: str = Field("Shapemill", min_length=1, description="who made the dataset: a person or an organization")
     published: str = Field(

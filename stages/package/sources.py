@@ -1,4 +1,4 @@
-"""What the samples of each kit or program are like, gathered row by row: memory does not grow with what rows hold."""
+"""Statistics of the samples of each kit or program, gathered row by row in little memory."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 RANGES = ("parts", "contacts", "cycles")
-"""The columns of the index of which a card tells least, median and most."""
+"""Columns of the index whose minimum, median and maximum the card lists."""
 
 
 class SourceTally:
-    """Rows of the index of one kit or program, counted.
+    """Statistics of the index rows of one kit or program.
 
-    samples; rooted, stable: so many of them are; spans: how often each number stands in each of the columns `RANGES`.
+    samples, rooted, stable: numbers of samples
+    spans: number of rows by value, for each column of RANGES
     """
 
     def __init__(self) -> None:
@@ -26,25 +27,25 @@ class SourceTally:
         self._graphs = array("Q")
 
     def add(self, row: Mapping[str, Any]) -> None:
-        """Count one more row."""
+        """Count a row."""
         self.samples += 1
         self.rooted += row["rooted"]
         self.stable += row["stable"]
         for name, counts in self.spans.items():
             counts[row[name]] += 1
-        # eight bytes instead of a text: two of a million agree by chance in one of 40 million datasets
+        # Eight bytes instead of a text: of a million, two collide in one of 40 million datasets.
         digest = hashlib.blake2b(row["graph"].encode(), digest_size=8).digest()
         self._graphs.append(int.from_bytes(digest, "little"))
 
     @property
     def structures(self) -> int:
-        """How many different graphs there are."""
+        """Return the number of distinct graphs."""
         import numpy as np
 
         return len(np.unique(np.frombuffer(self._graphs, dtype=np.uint64))) if self._graphs else 0
 
     def span(self, name: str) -> str:
-        """`least / median / most` of a column of `RANGES`, or `-` where there is no row."""
+        """Return `minimum / median / maximum` of a column of RANGES, or `-` without rows."""
         counts = sorted(self.spans[name].items())
         if not counts:
             return "-"
@@ -53,16 +54,16 @@ class SourceTally:
 
     @staticmethod
     def tallied(rows: Iterable[Mapping[str, Any]], tallies: dict[str, SourceTally]) -> Iterator[Mapping[str, Any]]:
-        """Pass the rows on, and count each in the tally of its kit."""
+        """Yield the rows, and count each in the tally of its kit."""
         for row in rows:
             tallies.setdefault(row["kit"], SourceTally()).add(row)
             yield row
 
 
-def _at(counts: Iterable[tuple[int, int]], place: int) -> int:
-    """The number at a place of all numbers in order, each of which stands so often."""
+def _at(counts: Iterable[tuple[int, int]], index: int) -> int:
+    """Return the number at an index of a sorted list, given as (number, count) pairs."""
     for number, count in counts:
-        if place < count:
+        if index < count:
             return number
-        place -= count
-    raise IndexError(place)
+        index -= count
+    raise IndexError(index)

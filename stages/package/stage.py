@@ -1,4 +1,4 @@
-"""Stage `package`: the dataset folder that users load, made of what the stages before it made of each sample."""
+"""Stage `package`: the dataset folder that users load, merged from the members that all stages made."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ from stages.sketches.settings import SketchesConfig
 DATASET_SHARD = "dataset"
 PREVIEW_SHARD = "preview"
 MAX_PREVIEW_SHARDS = 8
-"""The preview picture chooses from the samples of at most so many shards."""
+BYTES_PER_SAMPLE = 300_000
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """One shard for each of the collection; when these are done, the picture, and the files about the whole."""
+    """Plan one shard for each of the collection; after these, the preview and the files about the whole dataset."""
     producer = planned_producer(plan)
     if producer is None:
         return []
@@ -46,14 +46,14 @@ def plan(plan: Plan) -> list[Shard]:
     summaries = [plan.summary("package", shard.name) for shard in merged]
     if not merged or any(summary is None for summary in summaries):
         return merged
-    described = [{"name": shard.name, **(summary or {})} for shard, summary in zip(merged, summaries, strict=True)]
-    filled = [shard for shard in described if shard["samples"]]
+    named = [{"name": shard.name, **(summary or {})} for shard, summary in zip(merged, summaries, strict=True)]
+    filled = [shard for shard in named if shard["samples"]]
     if not filled:
         return merged
     read = language_of(producer).reads(plan)
     shown = [shard["name"] for shard in filled[:MAX_PREVIEW_SHARDS]]
-    rows = [stage for stage, each in members().items() if each.row and shown[0] in plan.shards(stage)]
-    pictured = {
+    rows = [stage for stage, added in members().items() if added.row and shown[0] in plan.shards(stage)]
+    preview = {
         "producer": producer,
         "title": plan.config.title or plan.config.name,
         "of": sum(shard["samples"] for shard in filled),
@@ -61,7 +61,7 @@ def plan(plan: Plan) -> list[Shard]:
         "rows": rows,
     }
     drawn = (*read, *(f"{stage}/{name}" for name in shown for stage in (producer, *rows)))
-    picture = Shard(PREVIEW_SHARD, pictured, drawn, member_modules())
+    picture = Shard(PREVIEW_SHARD, preview, drawn, member_modules())
     declared, language = producers()[producer], language_of(producer)
     origins = declared.origins(plan)
     params = {
@@ -71,28 +71,28 @@ def plan(plan: Plan) -> list[Shard]:
         "shards": filled,
         "members": describe_members(plan.config, filled[0]["members"], language),
         "schema": record_schema(plan.config, producer, merged[0].params["stages"]),
-        "apart": declared.graphs_share_split,
-        "story": {
+        "graphs_share_split": declared.graphs_share_split,
+        "card_text": {
             "made": declared.sentence,
             "splits": [declared.splits, *declared.nearness(plan)],
             "coordinates": language.coordinates,
             "limits": list(declared.limits),
-            "paragraphs": [*declared.card(plan), *(said for each in members().values() for said in each.card(plan))],
+            "paragraphs": [*declared.card(plan), *(text for added in members().values() for text in added.card(plan))],
             "variety": list(declared.variety(plan)),
             "rejects": _rejects(plan, producer),
             "missing_licenses": missing_licenses(origins),
         },
         "measures": dict(declared.measures(plan)),
         "preview": PREVIEW_SHARD,
-        "made_with": {"shapemill": code_version(), "libraries": library_versions()},
-        "origins": [asdict(each) for each in origins],
+        "software": {"shapemill": code_version(), "libraries": library_versions()},
+        "origins": [asdict(origin) for origin in origins],
     }
     inputs = (*read, *(f"package/{shard['name']}" for shard in filled), f"package/{PREVIEW_SHARD}")
     return [*merged, picture, Shard(DATASET_SHARD, params, inputs, member_modules())]
 
 
 def _merged(plan: Plan) -> list[Shard]:
-    """The shards of the dataset. Each reads the shard of its name of every stage that adds members to it."""
+    """Return the shards of the dataset; each reads the shard of its name of every stage that adds members."""
     shards = []
     planned = {stage: set(plan.shards(stage)) for stage in members()}
     for shard in collection_shards(plan):
@@ -113,7 +113,7 @@ def run_shard(task: Task) -> Outcome:
 
 
 def publish(plan: Plan) -> Mapping[str, str]:
-    """The dataset's folder and the index beside it, by the files of the shards; nothing where no sample is left."""
+    """Return the files of the dataset's folder and its index, by the files of shards; none without samples."""
     name = plan.config.name
     if DATASET_SHARD not in plan.shards("package"):
         return {}
@@ -130,7 +130,7 @@ def publish(plan: Plan) -> Mapping[str, str]:
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """What the finished dataset holds."""
+    """Describe the finished dataset."""
     drawn = plan.summary("package", PREVIEW_SHARD)
     if drawn is None or plan.summary("package", DATASET_SHARD) is None:
         return []
@@ -144,17 +144,17 @@ def report(plan: Plan) -> Sequence[str]:
 
 
 def check_environment(config: Config) -> None:
-    """Raises ConfigError where the backend that draws sketches and preview cannot draw."""
+    """Raise ConfigError where the renderer of sketches and preview cannot draw."""
     check_renderer(config.section(SketchesConfig).renderer, f"{config.path}: sketches.renderer")
 
 
 def estimate_bytes(plan: Plan) -> int:
-    """Bytes of all shards: what the stages before have made of each sample, and a mesh of a usual size."""
-    return sample_count(plan) * 300_000
+    """Estimate the bytes of all shards."""
+    return sample_count(plan) * BYTES_PER_SAMPLE
 
 
 def _rejects(plan: Plan, producer: str) -> dict[str, int]:
-    """What the producer refused, by reason."""
+    """Return the number of items that the producer refused, by reason."""
     counts: Counter[str] = Counter()
     for shard in plan.shards(producer):
         counts.update(plan.rejects(producer, shard))

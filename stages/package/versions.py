@@ -1,4 +1,4 @@
-"""What a dataset was made with: the version of this code, and those of the libraries that it needs."""
+"""Versions of the code and of the libraries that a dataset was made with."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ PROJECT = Path(pipeline.__file__).parent.parent / "pyproject.toml"
 
 
 @cache
-def code_version(*besides: ModuleType) -> str:
-    """The project's version and a digest of its code, of the packages `besides` as well, `0.1.0+3f2a9c01d4e7`.
+def code_version(*packages: ModuleType) -> str:
+    """Return the project's version and a digest of its code and of further packages: `0.1.0+3f2a9c01d4e7`.
 
-    It is a function of what the code says alone, comments and docstrings aside, so that the same code says the same in
-    a checkout, in a fresh clone and in a copy without history, and an edited file says so by itself.
+    The digest depends only on the code without comments and docstrings, so that it is the same in every checkout and
+    in a copy without history.
     """
     digest = code_digest(
-        transitive_imports(name for package in (pipeline, stages, *besides) for name in _modules(package))
+        transitive_imports(name for package in (pipeline, stages, *packages) for name in _modules(package))
     )
     return f"{_project()['version']}+{digest[:12]}"
 
 
 def _modules(package: ModuleType) -> Iterator[str]:
-    """The names of all modules of a package, wherever its folders lie."""
+    """Yield the names of all modules of a package, in all its folders."""
     for root in map(Path, package.__path__):
         for path in root.rglob("*.py"):
             steps = path.relative_to(root).with_suffix("").parts
@@ -41,15 +41,15 @@ def _modules(package: ModuleType) -> Iterator[str]:
 
 @cache
 def library_versions() -> dict[str, str]:
-    """The versions of the libraries that pyproject.toml lists, by name; those that are not installed are left out."""
-    found = {}
-    for asked in sorted(_project()["dependencies"], key=str.lower):
-        name = re.split(r"[^\w.-]", asked, maxsplit=1)[0]
+    """Return the versions of the installed libraries that pyproject.toml lists, by name."""
+    versions = {}
+    for requirement in sorted(_project()["dependencies"], key=str.lower):
+        name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
         try:
-            found[name] = version(name).partition("+")[0]  # +cpu says where it came from, not what it is
+            versions[name] = version(name).partition("+")[0]  # without a suffix such as +cpu
         except PackageNotFoundError:
             continue
-    return found
+    return versions
 
 
 def _project() -> dict[str, Any]:

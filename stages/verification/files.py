@@ -1,4 +1,4 @@
-"""Whether a dataset's files are whole, all there, and say the same: checksums, listings, index, splits."""
+"""Checks of a dataset's files: checksums, listings, index, splits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SampleRow = tuple[str, str, str, str, str]
 """Key, shard, split, kit and graph of a sample."""
 
 ClassCounts = Counter[tuple[str, str, str]]
-"""How many `shapes` and `parts` of a split have a class, by these three."""
+"""Numbers of `shapes` and `parts` by (`shapes` or `parts`, split, class)."""
 
 _COUNTS = {"type": "object", "additionalProperties": {"type": "integer", "minimum": 0}}
 _MEMBER = {"name": {"type": "string"}, "dtype": {"type": "string"}, "shape": {"type": "array"}}
@@ -44,12 +44,14 @@ MANIFEST_SCHEMA = _object(
         "config": {"type": "object", "additionalProperties": {"type": "object"}},
     }
 )
-"""What a manifest must have before anything can be compared with it, as a JSON schema."""
+"""JSON schema of the fields that verification reads."""
 
 
 def check_files(folder: Path, findings: Findings) -> tuple[dict[str, Any], set[str]] | None:
-    """Check the files of the dataset in `folder`: its manifest, and which of the files are whole; None where the
-    manifest cannot be read. Never raises for what it finds in the files."""
+    """Check the files of a dataset; return its manifest and the files with the right bytes.
+
+    Returns None where the manifest cannot be read. Never raises for faults of the files.
+    """
     listed = _listed(folder, findings)
     whole = _check_bytes(folder, listed, findings)
     manifest = read_document(folder / MANIFEST, findings)
@@ -57,14 +59,14 @@ def check_files(folder: Path, findings: Findings) -> tuple[dict[str, Any], set[s
         return None
     error = best_match(Draft202012Validator(MANIFEST_SCHEMA).iter_errors(manifest))
     if error is not None:
-        findings.fault("manifest", MANIFEST, f"cannot be meant: {error.json_path}: {error.message}")
+        findings.fault("manifest", MANIFEST, f"is invalid: {error.json_path}: {error.message}")
         return None
     _check_listing(folder, listed, manifest, findings)
     return manifest, whole
 
 
 def read_document(path: Path, findings: Findings) -> dict[str, Any] | None:
-    """The JSON object in a file, or None, with a fault, where there is none."""
+    """Return the JSON object in a file; None, with a fault, where it has none."""
     try:
         document = json.loads(path.read_bytes())
     except (OSError, ValueError) as error:
@@ -77,7 +79,7 @@ def read_document(path: Path, findings: Findings) -> dict[str, Any] | None:
 
 
 def read_schema(folder: Path, findings: Findings) -> str:
-    """The schema of the records as text; one that allows everything, with a fault, where it cannot be read."""
+    """Return the schema of the records as text; where it cannot be read, one that allows everything, with a fault."""
     from jsonschema import SchemaError
 
     document = read_document(folder / SCHEMA, findings)
@@ -92,42 +94,44 @@ def read_schema(folder: Path, findings: Findings) -> str:
 
 
 def check_splits(manifest: Mapping[str, Any], rows: Sequence[SampleRow], findings: Findings) -> None:
-    """Keys stand once, graphs in one split where the dataset says so, and the counts of the splits are right. `rows`:
-    what `check_shard` answers for each sample of each whole shard."""
+    """Check that keys are unique, that graphs share a split where the manifest says so, and the counts of splits.
+
+    rows: result of `check_shard` for each sample of each readable shard
+    """
     seen: dict[str, str] = {}
     graphs: dict[tuple[str, str], tuple[str, str]] = {}
     for key, shard, split, kit, graph in rows:
         where = f"{shard}: {key}"
         if key in seen:
-            findings.fault("samples", where, f"stands also in {seen[key]}, or its members lie apart")
+            findings.fault("samples", where, f"is also in {seen[key]}, or its members do not follow each other")
         seen[key] = shard
         first_split, first = graphs.setdefault((kit, graph), (split, key))
-        if manifest.get("apart") and first_split != split:
-            findings.fault("splits", where, f"has the graph of {first}, which stands in {first_split}")
+        if manifest.get("graphs_share_split") and first_split != split:
+            findings.fault("splits", where, f"has the graph of {first}, which is in {first_split}")
     findings.look("splits", len(rows))
     for split, samples in manifest["splits"].items():
-        found = sum(each[2] == split for each in rows)
+        found = sum(row[2] == split for row in rows)
         if found != samples and len(rows) == manifest["samples"]:
             findings.fault("splits", MANIFEST, f"counts {samples} samples of {split}, the shards have {found}")
 
 
 def check_classes(folder: Path, tally: ClassCounts, findings: Findings) -> None:
-    """`classes.json` counts as many shapes and parts of each class in each split as the samples have."""
+    """Check the numbers of shapes and parts of each class and split in `classes.json`."""
     try:
         listed = json.loads((folder / CLASSES).read_bytes())
-        said = {
-            (what, split, str(each["id"])): count
-            for each in listed
+        stated = {
+            (what, split, str(row["id"])): count
+            for row in listed
             for what in ("shapes", "parts")
-            for split, count in each[what].items()
+            for split, count in row[what].items()
             if count
         }
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
         findings.fault("classes", CLASSES, f"cannot be read: {type(error).__name__}: {error}")
         return
     findings.look("classes", len(listed))
-    for what, split, number in sorted(said.keys() | tally.keys()):
-        counted, found = said.get((what, split, number), 0), tally[what, split, number]
+    for what, split, number in sorted(stated.keys() | tally.keys()):
+        counted, found = stated.get((what, split, number), 0), tally[what, split, number]
         if counted != found:
             findings.fault(
                 "classes", CLASSES, f"counts {counted} {what} of class {number} in {split}; there are {found}"
@@ -135,21 +139,21 @@ def check_classes(folder: Path, tally: ClassCounts, findings: Findings) -> None:
 
 
 def _listed(folder: Path, findings: Findings) -> dict[str, str]:
-    """`{file: sha256}` of the checksums file."""
+    """Return `{file: sha256}` of the checksums file."""
     try:
         lines = (folder / CHECKSUMS).read_text().splitlines()
     except (OSError, ValueError) as error:
         findings.fault("checksums", CHECKSUMS, f"cannot be read: {error}")
         return {}
     listed = {file: digest for digest, _, file in (line.partition("  ") for line in lines)}
-    for file in [each for each in listed if not each or ".." in Path(each).parts or Path(each).is_absolute()]:
+    for file in [name for name in listed if not name or ".." in Path(name).parts or Path(name).is_absolute()]:
         findings.fault("checksums", CHECKSUMS, f"names {file!r}, which is no file inside the dataset")
         del listed[file]
     return listed
 
 
 def _check_bytes(folder: Path, listed: Mapping[str, str], findings: Findings) -> set[str]:
-    """The listed files that are there with the bytes they should have; the others and foreign ones become faults."""
+    """Return the listed files with the right bytes; others and foreign files become faults."""
     whole = set()
     for file, digest in listed.items():
         findings.look("checksums")
@@ -179,22 +183,22 @@ def _check_foreign(folder: Path, before: str, known: set[str], whose: str, findi
 
 
 def _check_listing(folder: Path, listed: Mapping[str, str], manifest: Mapping[str, Any], findings: Findings) -> None:
-    """Manifest, checksums and Croissant name the same files with the same digests, and counts add up."""
+    """Check that manifest, checksums and Croissant name the same files and digests, and that counts add up."""
     shards = {shard["path"]: shard["sha256"] for shard in manifest["shards"]}
     digests = {**shards, **manifest["files"]}
     others = {CHECKSUMS: ({file: digest for file, digest in listed.items() if file != MANIFEST}, digests)}
-    described = read_document(folder / CROISSANT, findings)
-    if described is not None:
-        given = described.get("distribution")
-        files = [each for each in given if isinstance(each, dict)] if isinstance(given, list) else []
-        named = {str(each.get("@id")): each["sha256"] for each in files if "sha256" in each}
+    croissant = read_document(folder / CROISSANT, findings)
+    if croissant is not None:
+        given = croissant.get("distribution")
+        files = [item for item in given if isinstance(item, dict)] if isinstance(given, list) else []
+        named = {str(item.get("@id")): item["sha256"] for item in files if "sha256" in item}
         own = digests | {INDEX: manifest["index"]["sha256"]}
         others[CROISSANT] = (named, {file: own.get(file) for file in named} | shards)
     findings.look("manifest", len(digests))
     for name, (other, own) in others.items():
         for file in sorted({*own, *other}):
             if own.get(file) != other.get(file):
-                findings.fault("manifest", file, f"{MANIFEST} and {name} do not say the same of it")
+                findings.fault("manifest", file, f"{MANIFEST} and {name} disagree")
     for split, samples in manifest["splits"].items():
         if samples != sum(shard["samples"] for shard in manifest["shards"] if shard["split"] == split):
             findings.fault("manifest", MANIFEST, f"its shards of split {split} do not add up to {samples} samples")
@@ -203,11 +207,11 @@ def _check_listing(folder: Path, listed: Mapping[str, str], manifest: Mapping[st
     for shard in manifest["shards"]:
         parts, split = Path(shard["path"]).parts, shard["split"]
         if parts[:2] != ("data", split) or ".." in parts or f"-{split}-" not in parts[-1]:
-            findings.fault("splits", shard["path"], f"is a shard of {split}, and its path says otherwise")
+            findings.fault("splits", shard["path"], f"is a shard of {split}, but its path is of another")
 
 
 def check_index(folder: Path, manifest: Mapping[str, Any], findings: Findings) -> Path | None:
-    """Whether the index is there, whole, alone in its folder and of the right size; where it is, None if not."""
+    """Check that the index exists, alone in its folder, with the right bytes and size; return its path, else None."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -222,10 +226,10 @@ def check_index(folder: Path, manifest: Mapping[str, Any], findings: Findings) -
         findings.fault("checksums", name, f"is corrupted: its sha256 is not the one in {MANIFEST}")
         return None
     try:
-        described = pq.read_metadata(path)
+        metadata = pq.read_metadata(path)
     except (pa.ArrowException, OSError) as error:
         findings.fault("index", name, f"cannot be read: {error}")
         return None
-    if described.num_rows != manifest["samples"]:
-        findings.fault("index", name, f"has {described.num_rows} rows for {manifest['samples']} samples")
+    if metadata.num_rows != manifest["samples"]:
+        findings.fault("index", name, f"has {metadata.num_rows} rows for {manifest['samples']} samples")
     return path

@@ -1,5 +1,4 @@
-"""Is a sample what its record says? Asked of all samples: members, arrays, record, mesh, and whatever the stages that
-added something ask of it."""
+"""Checks of every sample against its record: members, arrays, record, mesh, and the audits of stages."""
 
 from __future__ import annotations
 
@@ -22,15 +21,15 @@ from stages.shape.kit import Assembly
 from stages.shape.shape import Shape
 
 ROUNDING_SHARE = 1e-6
-"""As a share of the shape's size, so near are positions that are made anew on another processor."""
+"""Difference of positions computed on another processor, as a share of the shape's size."""
 
 
 class SampleError(Exception):
-    """A sample that cannot be read far enough to be looked at; the sentence says why."""
+    """A sample that cannot be read; the message says why."""
 
 
 def read_record(content: bytes) -> dict[str, Any]:
-    """The record of a sample. Raises SampleError for what is none."""
+    """Return the record of a sample. Raises SampleError."""
     try:
         record = json.loads(content)
     except ValueError as error:
@@ -44,17 +43,19 @@ def read_packaged(
     key: str,
     record: Mapping[str, Any],
     members: Mapping[str, bytes],
-    anew: Mapping[str, RebuildShape],
+    rebuild: Mapping[str, RebuildShape],
     sections: Mapping[str, Any],
 ) -> PackagedSample:
-    """The sample, with the shape that its record says. `anew`: by language.
+    """Return the sample with the shape of its record.
 
-    Raises SampleError where arrays or shape cannot be had; LookupError where what the shape is made from is not there.
+    rebuild: function that rebuilds the shape of a record, by language
+
+    Raises SampleError for unreadable arrays or records, and LookupError where the source of the shape is missing.
     """
     arrays = {name: _array(name, content) for name, content in members.items() if name.endswith(".npy")}
     packaged = PackagedSample(key, record, members, arrays, _NOTHING, sections)
     try:
-        shape = anew[record["language"]](record, packaged.contacts)
+        shape = rebuild[record["language"]](record, packaged.contacts)
         parts = record["parts"]
         first = parts[0]["class"] - int(shape.part_labels[0])
         assembly = replace(shape.assembly, poses=rounded(shape.assembly.poses))
@@ -62,14 +63,14 @@ def read_packaged(
         return PackagedSample(key, record, members, arrays, shape, sections)
     except LookupError as error:
         if isinstance(error, KeyError | IndexError):
-            raise SampleError(f"its json cannot be meant: nothing at {error}") from error
+            raise SampleError(f"its json is invalid: nothing at {error}") from error
         raise
     except Exception as error:
-        raise SampleError(f"its json cannot be meant: {error}") from error
+        raise SampleError(f"its json is invalid: {error}") from error
 
 
 def record_faults(record: Mapping[str, Any], key: str, split: str, kits: Collection[str]) -> Iterator[str]:
-    """What is wrong with a record by itself: a sentence for each fault."""
+    """Yield a sentence for each fault of a record by itself."""
     if record.get("key") != key or record.get("split") != split:
         yield "its json names another key or split"
     if record.get("kit") not in kits:
@@ -80,7 +81,7 @@ def record_faults(record: Mapping[str, Any], key: str, split: str, kits: Collect
 
 
 def sample_faults(sample: PackagedSample) -> Iterator[str]:
-    """What is wrong with a sample beside that: a sentence for each fault."""
+    """Yield a sentence for each further fault of a sample."""
     record, shape = sample.record, sample.shape
     yield from _part_faults(record, shape)
     yield from _count_faults(sample)
@@ -90,37 +91,37 @@ def sample_faults(sample: PackagedSample) -> Iterator[str]:
         yield "its bounds are not those of its parts"
     if not sample.members["txt"].decode().startswith(record["text"]):
         yield "its txt and its json hold different texts"
-    for each in audits().values():
-        yield from _asked(each.faults, sample)
+    for audit in audits().values():
+        yield from _guarded(audit.faults, sample)
 
 
-def array_faults(sample: PackagedSample, described: list[dict[str, Any]]) -> Iterator[str]:
-    """Arrays that are not of the type and shape that the manifest says, or hold what is no number."""
+def array_faults(sample: PackagedSample, declared: list[dict[str, Any]]) -> Iterator[str]:
+    """Yield a fault for each array whose type or shape differs from the manifest's, or that holds NaN or infinity."""
     lengths: dict[str, int] = {"parts": len(sample.record["parts"])}
-    for each in described:
-        if not each["dtype"] or each["name"] not in sample.arrays:
+    for member in declared:
+        if not member["dtype"] or member["name"] not in sample.arrays:
             continue
-        array, name = sample.arrays[each["name"]], each["name"]
-        if array.dtype != np.dtype(each["dtype"]) or array.ndim != len(each["shape"]):
-            yield f"{name} is {array.dtype} of {array.ndim} dimensions, not {each['dtype']} of {len(each['shape'])}"
+        array, name = sample.arrays[member["name"]], member["name"]
+        if array.dtype != np.dtype(member["dtype"]) or array.ndim != len(member["shape"]):
+            yield f"{name} is {array.dtype} of {array.ndim} dimensions, not {member['dtype']} of {len(member['shape'])}"
             continue
-        for wanted, found in zip(each["shape"], array.shape, strict=True):
+        for wanted, found in zip(member["shape"], array.shape, strict=True):
             if (wanted if isinstance(wanted, int) else lengths.setdefault(wanted, found)) != found:
-                yield f"{name} has shape {array.shape}, not ({', '.join(map(str, each['shape']))})"
+                yield f"{name} has shape {array.shape}, not ({', '.join(map(str, member['shape']))})"
         if array.dtype.kind == "f" and not np.isfinite(array).all():
             yield f"{name} holds what is not a number"
 
 
-def empty_values(value: Any, place: str = "") -> Iterator[str]:
-    """Where in a JSON value a null, an empty text, list or mapping stands: `parts[3].label`."""
+def empty_values(value: Any, path: str = "") -> Iterator[str]:
+    """Yield the paths of nulls and empty texts, lists or mappings in a JSON value: `parts[3].label`."""
     if value is None or value in ("", [], {}):
-        yield place or "the whole"
+        yield path or "the whole"
     elif isinstance(value, Mapping):
-        for name, each in value.items():
-            yield from empty_values(each, f"{place}.{name}" if place else name)
+        for name, item in value.items():
+            yield from empty_values(item, f"{path}.{name}" if path else name)
     elif isinstance(value, list):
-        for position, each in enumerate(value):
-            yield from empty_values(each, f"{place}[{position}]")
+        for position, item in enumerate(value):
+            yield from empty_values(item, f"{path}[{position}]")
 
 
 _NOTHING = Shape((), Assembly(np.empty(0, np.int16), np.empty((0, 4, 4)), np.empty((0, 2), np.int32)), "y", ())
@@ -133,12 +134,12 @@ def _array(name: str, content: bytes) -> np.ndarray:
         raise SampleError(f"{name} cannot be read: {error}") from error
 
 
-def _asked(faults: Callable[[PackagedSample], Iterator[str]], sample: PackagedSample) -> Iterator[str]:
-    """The faults; a record in which what is asked for is missing has one."""
+def _guarded(faults: Callable[[PackagedSample], Iterator[str]], sample: PackagedSample) -> Iterator[str]:
+    """Yield the faults of a check; a record without a field that it reads is a fault."""
     try:
         yield from faults(sample)
     except (KeyError, IndexError, TypeError, ValueError) as error:
-        yield f"its json cannot be meant: {type(error).__name__}: {error}"
+        yield f"its json is invalid: {type(error).__name__}: {error}"
 
 
 def _part_faults(record: Mapping[str, Any], shape: Shape) -> Iterator[str]:
@@ -146,12 +147,12 @@ def _part_faults(record: Mapping[str, Any], shape: Shape) -> Iterator[str]:
     if len(parts) != len(shape):
         yield f"its json lists {len(parts)} parts, and its source makes {len(shape)}"
         return
-    for place, (part, name, label, number) in enumerate(
+    for index, (part, name, label, number) in enumerate(
         zip(parts, shape.part_names, shape.part_labels.tolist(), shape.part_classes.tolist(), strict=True)
     ):
         found = part["name"], part["label"], part["class"], part["instance"]
-        if found != (name, shape.labels[label], number, place):
-            yield f"its json calls part {place} {found}, and its source {(name, shape.labels[label], number, place)}"
+        if found != (name, shape.labels[label], number, index):
+            yield f"its json calls part {index} {found}, and its source {(name, shape.labels[label], number, index)}"
             return
     poses = np.array([part["pose"] for part in parts])
     placed = shape.placements
@@ -179,20 +180,19 @@ def _count_faults(sample: PackagedSample) -> Iterator[str]:
 
 
 def _same_mesh(found: bytes, made: bytes, size: float) -> bool:
-    """Whether two GLBs are equal, but for the last digits of positions and matrices: another processor, or another
-    choice of kernels, makes others of the same parameters."""
+    """Whether two GLBs are equal up to the last digits of positions and matrices, which vary by processor."""
     if found == made:
         return True
     if len(found) != len(made) or found[:4] != b"glTF":
         return False
-    starts = [28 + int.from_bytes(each[12:16], "little") for each in (found, made)]
+    starts = [28 + int.from_bytes(content[12:16], "little") for content in (found, made)]
     try:
-        one, two = (json.loads(each[20 : start - 8]) for each, start in zip((found, made), starts, strict=True))
+        one, two = (json.loads(content[20 : start - 8]) for content, start in zip((found, made), starts, strict=True))
     except ValueError:
         return False
     if not _alike(one, two, ROUNDING_SHARE * size):
         return False
-    bodies = [each[start:] for each, start in zip((found, made), starts, strict=True)]
+    bodies = [content[start:] for content, start in zip((found, made), starts, strict=True)]
     placed = {accessor["bufferView"] for accessor in two["accessors"] if "min" in accessor}
     for number, view in enumerate(two["bufferViews"]):
         begin = view.get("byteOffset", 0)
@@ -213,7 +213,7 @@ def _alike(found: Any, made: Any, near: float) -> bool:
     if isinstance(made, dict) and isinstance(found, dict):
         return found.keys() == made.keys() and all(_alike(found[name], made[name], near) for name in made)
     if isinstance(made, list) and isinstance(found, list):
-        return len(found) == len(made) and all(_alike(*each, near) for each in zip(found, made, strict=True))
+        return len(found) == len(made) and all(_alike(*item, near) for item in zip(found, made, strict=True))
     return bool(found == made)
 
 

@@ -1,4 +1,4 @@
-"""One shard of a finished dataset, looked at sample by sample; shards are looked at side by side."""
+"""Verification of one shard of a finished dataset, sample by sample; shards are verified in parallel."""
 
 from __future__ import annotations
 
@@ -37,27 +37,29 @@ def check_shard(
     manifest: Mapping[str, Any],
     schema: str,
     index: Path | None,
-    anew: Collection[int],
+    rechecked: Collection[int],
 ) -> tuple[Findings, list[SampleRow], ClassCounts]:
-    """What is found in one whole shard of the dataset in `folder`, and what all its samples together are held against.
+    """Verify a shard of the dataset in `folder`; return its findings, a row for each sample, and its class counts.
 
-    shard: its entry in the manifest; schema: of the records, as JSON; index: the index, if it can be read; anew: the
-    places of the samples that are held against what they were made from by other means, which takes long.
+    shard: its entry in the manifest
+    schema: schema of the records, as JSON
+    index: path of the index, if it can be read
+    rechecked: indices of the samples that are rechecked by independent means, which is slow
     """
     findings, rows, tally, path = Findings(), list[SampleRow](), ClassCounts(), str(shard["path"])
-    places = DatasetPaths(folder.resolve().parent, folder.resolve().name)
-    spoken = {name: each.rebuild(places) for name, each in languages().items()}
+    paths = DatasetPaths(folder.resolve().parent, folder.resolve().name)
+    rebuild = {name: language.rebuild(paths) for name, language in languages().items()}
     validator = validator_of(schema)
-    wanted = [each["name"] for each in manifest["members"]]
-    made, indexed = _made(places, path), _indexed(index, path)
+    wanted = [member["name"] for member in manifest["members"]]
+    stage_samples, indexed = _stage_samples(paths, path), _indexed(index, path)
     try:
-        for place, (key, offset, members) in enumerate(shard_samples(folder / path)):
+        for number, (key, offset, members) in enumerate(shard_samples(folder / path)):
             findings.look("samples")
             where = f"{path}: {key}"
             if list(members) != wanted:
-                findings.fault("samples", where, f"has members {', '.join(members)}; not as the others")
+                findings.fault("samples", where, f"has members {', '.join(members)}; unlike the others")
                 continue
-            for what in _foreign(key, members, made):
+            for what in _foreign(key, members, stage_samples):
                 findings.fault("samples", where, what)
             row = (indexed or {}).pop(key, None)
             try:
@@ -65,7 +67,7 @@ def check_shard(
                 for what in (
                     *record_faults(record, key, shard["split"], manifest["kits"]),
                     *schema_faults(validator, record),
-                    *_altered(key, record, made),
+                    *_altered(key, record, stage_samples),
                 ):
                     findings.fault("samples", where, what)
                 if indexed is not None:
@@ -74,15 +76,15 @@ def check_shard(
                         findings.fault("index", where, what)
                 rows.append((key, path, str(record.get("split")), str(record.get("kit")), str(record.get("graph"))))
                 tally.update(_classes_of(record, str(shard["split"])))
-                sample = read_packaged(key, record, members, spoken, manifest["config"])
-                if place in anew:
+                sample = read_packaged(key, record, members, rebuild, manifest["config"])
+                if number in rechecked:
                     findings.look("geometry")
-                for check, what in _faults(sample, manifest, places if place in anew else None):
+                for check, what in _faults(sample, manifest, paths if number in rechecked else None):
                     findings.fault(check, where, what)
             except SampleError as error:
                 findings.fault("samples", where, str(error))
             except LookupError as error:
-                findings.skip(f"{error}: make the dataset here to look at its samples")
+                findings.skip(f"{error}: make the dataset here to check its samples")
     except (tarfile.TarError, OSError, ValueError) as error:
         findings.fault("samples", path, f"cannot be read after {findings.checked.get('samples', 0)} samples: {error}")
     for key in indexed or ():
@@ -94,7 +96,7 @@ def check_shard(
 
 
 def shard_samples(path: Path) -> Iterator[tuple[str, int, dict[str, bytes]]]:
-    """The samples of a shard in order: key, offset of the first header, members by name after the key."""
+    """Yield the samples of a shard in order: key, offset of the first header, members by name."""
     with tarfile.open(path, mode="r:") as tar:
         key, offset, members = "", 0, dict[str, bytes]()
         for entry in tar:
@@ -105,36 +107,36 @@ def shard_samples(path: Path) -> Iterator[tuple[str, int, dict[str, bytes]]]:
                 key, offset, members = own, entry.offset, {}
             stored = tar.extractfile(entry)
             members[member] = stored.read() if stored is not None else b""
-            tar.members = []  # type: ignore[attr-defined]  # tarfile would keep every header it has seen
+            tar.members = []  # type: ignore[attr-defined]  # tarfile would keep every header
         if members:
             yield key, offset, members
 
 
 def _faults(
-    sample: PackagedSample, manifest: Mapping[str, Any], places: DatasetPaths | None
+    sample: PackagedSample, manifest: Mapping[str, Any], paths: DatasetPaths | None
 ) -> Iterator[tuple[str, str]]:
-    """The faults of a sample with the checks that find them; with `places` it is looked at by other means, too."""
+    """Yield check and fault of a sample; with `paths` it is also rechecked by independent means."""
     try:
         yield from (("samples", what) for what in array_faults(sample, manifest["members"]))
         yield from (("samples", what) for what in sample_faults(sample))
-        if places is not None:
-            for each in audits().values():
-                yield from (("geometry", what) for what in each.recheck(sample, places))
+        if paths is not None:
+            for audit in audits().values():
+                yield from (("geometry", what) for what in audit.recheck(sample, paths))
     except (KeyError, IndexError, TypeError, ValueError) as error:
-        yield "samples", f"its json cannot be meant: {type(error).__name__}: {error}"
+        yield "samples", f"its json is invalid: {type(error).__name__}: {error}"
 
 
 def _classes_of(record: Mapping[str, Any], split: str) -> ClassCounts:
-    """How many parts of each class a record lists, and that it is one shape with them."""
+    """Count the parts of each class in a record, and one shape for each class."""
     parts = record.get("parts")
-    listed = [each["class"] for each in parts if isinstance(each, dict) and "class" in each] if parts else []
+    listed = [part["class"] for part in parts if isinstance(part, dict) and "class" in part] if parts else []
     counted = Counter({("parts", split, str(number)): count for number, count in Counter(map(str, listed)).items()})
     counted.update({("shapes", split, number): 1 for number in set(map(str, listed))})
     return counted
 
 
 def _indexed(index: Path | None, path: str) -> dict[str, dict[str, Any]] | None:
-    """The rows of the index for the samples of a shard, by key; None where they cannot be read."""
+    """Return the index rows of a shard's samples, by key; None without an index."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -149,11 +151,11 @@ def _indexed(index: Path | None, path: str) -> dict[str, dict[str, Any]] | None:
 def _misplaced(
     found: Mapping[str, Any] | None, record: Mapping[str, Any], path: str, offset: int, size: int
 ) -> Iterator[str]:
-    """What the index says otherwise of a sample."""
+    """Yield a fault where the index row of a sample is missing or wrong."""
     if found is None:
         yield "is not where the index says, or not in it"
         return
-    with suppress(KeyError, TypeError):  # a record without what the index needs is named where it is looked at
+    with suppress(KeyError, TypeError):  # other checks report a record without these fields
         wanted = index_row(record, path, offset, size)
         wrong = [name for name in wanted if found.get(name) != wanted[name]]
         if wrong:
@@ -161,47 +163,50 @@ def _misplaced(
 
 
 @dataclass(frozen=True)
-class Added:
-    """What a stage has made for a sample: the digest of each member, and fields of the record."""
+class StageSample:
+    """A sample of a stage: the digest of each member, and fields of the record."""
 
     digests: Mapping[str, bytes]
     fields: Mapping[str, Any]
 
 
-def _made(places: DatasetPaths, path: str) -> dict[str, dict[str, Added]]:
-    """What each stage has made for the samples of a shard, by key, where the mill's folder still has it."""
+_SamplesByStage = Mapping[str, Mapping[str, StageSample]]
+
+
+def _stage_samples(paths: DatasetPaths, path: str) -> dict[str, dict[str, StageSample]]:
+    """Return the samples of a shard by stage and key, where the work folder still has them."""
     name, _, number = Path(path).stem.rpartition("-")
-    shard = f"{places.dataset}-{name.rpartition('-')[2]}-{number}"
-    made: dict[str, dict[str, Added]] = {}
+    shard = f"{paths.dataset}-{name.rpartition('-')[2]}-{number}"
+    samples: dict[str, dict[str, StageSample]] = {}
     for stage in declared_members():
-        tar = places.stage(stage).root / f"{shard}.tar"
-        with suppress(tarfile.TarError, OSError, ValueError):  # the mill's own check names what is damaged there
+        tar = paths.stage(stage).root / f"{shard}.tar"
+        with suppress(tarfile.TarError, OSError, ValueError):  # the check of the engine reports corrupted shards
             if tar.is_file():
-                made[stage] = {
-                    key: Added(
-                        {each: sha256(content).digest() for each, content in members.items() if each != "json"},
+                samples[stage] = {
+                    key: StageSample(
+                        {member: sha256(content).digest() for member, content in members.items() if member != "json"},
                         json.loads(members.get("json", b"{}")),
                     )
                     for key, members in read_shard(tar)
                 }
-    return made
+    return samples
 
 
-def _foreign(key: str, members: Mapping[str, bytes], made: Mapping[str, Mapping[str, Added]]) -> Iterator[str]:
-    """Members that are not those that a stage has made for this sample."""
-    for stage, samples in made.items():
+def _foreign(key: str, members: Mapping[str, bytes], stage_samples: _SamplesByStage) -> Iterator[str]:
+    """Yield a fault for each member that differs from that of its stage."""
+    for stage, samples in stage_samples.items():
         if key not in samples:
-            yield f"is no sample that stage {stage} knows"
+            yield f"is no sample of stage {stage}"
             continue
         for name, digest in samples[key].digests.items():
             if name in members and sha256(members[name]).digest() != digest:
-                yield f"{name} is not the one that stage {stage} has made for it"
+                yield f"{name} is not the one that stage {stage} made for it"
 
 
-def _altered(key: str, record: Mapping[str, Any], made: Mapping[str, Mapping[str, Added]]) -> Iterator[str]:
-    """Fields of a record that are not those that a stage has made for its sample."""
-    for stage, samples in made.items():
+def _altered(key: str, record: Mapping[str, Any], stage_samples: _SamplesByStage) -> Iterator[str]:
+    """Yield a fault for each field of a record that differs from that of its stage."""
+    for stage, samples in stage_samples.items():
         fields = samples[key].fields if key in samples else {}
         for name, value in fields.items():
             if record.get(name, value) != value:
-                yield f"{name} in its json is not what stage {stage} has made for it"
+                yield f"{name} in its json is not what stage {stage} made for it"

@@ -1,12 +1,12 @@
-"""`make verify`: is a finished dataset what it says it is?
+"""`make verify`: verification of a finished dataset.
 
     shapemill verify --config configs/castle.yaml --out datasets
     shapemill verify datasets/castle
 
 Files: checksums, listings, index, splits, foreign and missing files. Every sample: members, arrays, record, mesh and
-points against what its record says it is, and against what the stages made, where the mill's folder is still there.
-Some samples, chosen at random: contacts, grammar, penetration, statics and drawings by other means than they were made.
-Exit code 1, with names, for any fault.
+points against its record, and against the shards of all stages where the work folder still exists. A random choice of
+samples: contacts, grammar, penetration, statics and drawings, recomputed by independent means. Exit code 1, with names,
+for any fault.
 """
 
 from __future__ import annotations
@@ -43,8 +43,10 @@ def print_findings(folder: Path, samples: int | None, seed: int, workers: int) -
 
 
 def verify_dataset(folder: Path, samples: int | None, seed: int, workers: int = 1) -> Findings:
-    """Look at the dataset in `folder`; at `samples` of its samples, or all for None, by all means. Never raises for
-    what it finds in the files."""
+    """Verify the dataset in `folder`; never raises for faults of its files.
+
+    samples: number of samples rechecked by independent means; None: all
+    """
     findings = Findings()
     known = check_files(folder, findings)
     if known is None:
@@ -59,27 +61,27 @@ def verify_dataset(folder: Path, samples: int | None, seed: int, workers: int = 
     work, first = [], 0
     for shard in manifest["shards"]:
         if shard["path"] in whole:
-            anew = {each - first for each in chosen if first <= each < first + shard["samples"]}
-            work.append((folder, shard, manifest, schema, index, anew))
+            rechecked = {number - first for number in chosen if first <= number < first + shard["samples"]}
+            work.append((folder, shard, manifest, schema, index, rechecked))
         first += shard["samples"]
     rows: list[SampleRow] = []
     tally: ClassCounts = ClassCounts()
-    for found, of_shard, of_classes in _side_by_side(work, workers):
-        findings.add(found)
-        rows += of_shard
-        tally.update(of_classes)
+    for shard_findings, shard_rows, counts in _check_shards(work, workers):
+        findings.add(shard_findings)
+        rows += shard_rows
+        tally.update(counts)
     check_splits(manifest, rows, findings)
     if len(work) == len(manifest["shards"]):
         check_classes(folder, tally, findings)
     return findings
 
 
-def _side_by_side(
+def _check_shards(
     work: Sequence[tuple[Any, ...]], workers: int
 ) -> Iterator[tuple[Findings, list[SampleRow], ClassCounts]]:
     if workers <= 1:
-        yield from (check_shard(*each) for each in work)
+        yield from (check_shard(*arguments) for arguments in work)
         return
     from joblib import Parallel, delayed
 
-    yield from Parallel(n_jobs=workers, return_as="generator")(delayed(check_shard)(*each) for each in work)
+    yield from Parallel(n_jobs=workers, return_as="generator")(delayed(check_shard)(*arguments) for arguments in work)

@@ -63,7 +63,7 @@ def _arguments(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=1, help="where the rounds' randomness starts")
     parser.add_argument("--first", type=int, default=0, help="number of the first round")
     parser.add_argument("--only", choices=sorted(BLOWS), nargs="+", default=sorted(BLOWS), help="these blows alone")
-    whole = sorted(name for name, each in ARENAS.items() if not each.tests)
+    whole = sorted(name for name, item in ARENAS.items() if not item.tests)
     parser.add_argument("--arena", choices=sorted(ARENAS), nargs="+", default=whole, help="these datasets alone")
     parser.add_argument("--folder", type=Path, default=None, help="where to, instead of a temporary folder")
     parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)

@@ -95,7 +95,7 @@ def fill_disk(arena: Sandbox, _: Run, rng: np.random.Generator) -> InjectedFault
 
 
 def take_rights(arena: Sandbox, _: Run, rng: np.random.Generator) -> InjectedFault:
-    folders = [arena.out, *(each for each in arena.out.rglob("*") if each.is_dir())]
+    folders = [arena.out, *(path for path in arena.out.rglob("*") if path.is_dir())]
     folder = sorted(folders)[rng.integers(len(folders))]
     folder.chmod(0o555)
     return InjectedFault(
@@ -124,9 +124,9 @@ def spoil_shard(arena: Sandbox, _: Run, rng: np.random.Generator) -> InjectedFau
         byte = stream.read(1)[0] ^ (1 << int(rng.integers(8)))
         stream.seek(place)
         stream.write(bytes([byte]))
-    linked = [each for each in arena.out.rglob("*") if each.is_file() and each.samefile(path)]
+    linked = [item for item in arena.out.rglob("*") if item.is_file() and item.samefile(path)]
     return InjectedFault(
-        f"a bit of {path.relative_to(arena.work)}", spoilt={str(each.relative_to(arena.out)) for each in linked}
+        f"a bit of {path.relative_to(arena.work)}", spoilt={str(item.relative_to(arena.out)) for item in linked}
     )
 
 

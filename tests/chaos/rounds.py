@@ -62,9 +62,9 @@ def _take_away(arena: Sandbox, rng: np.random.Generator) -> tuple[Step, int]:
     if rng.random() < _ANEW or not all(arena.shards(step) for step in arena.steps):
         arena.begin_anew()
         return arena.steps[0], sum(Path(path).parent.name == "records" for path in arena.calm)
-    chosen = sorted({int(each) for each in rng.integers(len(arena.steps), size=2)})
+    chosen = sorted({int(index) for index in rng.integers(len(arena.steps), size=2)})
     taken = 0
-    for step in (arena.steps[each] for each in chosen):
+    for step in (arena.steps[index] for index in chosen):
         shards = arena.shards(step)
         gone: Sequence[str] = list(rng.permutation(shards)[: rng.integers(1, len(shards) + 1)])
         arena.unmake(step, gone)

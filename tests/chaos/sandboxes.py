@@ -47,7 +47,7 @@ _TINY = {"batch_size": 4, "steps": 3, "max_rounds": 2, "hidden": 16, "latent": 8
 
 def _edits(dataset: str) -> list[dict[str, dict[str, Any]]]:
     changed = [{"points": {"uniform": 100}}, {"sketches": {"size": 40}}, {"package": {"previewed": 1}}]
-    return [{dataset: each} for each in changed]
+    return [{dataset: item} for item in changed]
 
 
 ARENAS: dict[str, Datasets] = {

@@ -25,18 +25,18 @@ def main() -> int:
     asked = parser.parse_args()
     found: list[Outcome] = []
     with tempfile.TemporaryDirectory() as folder:
-        for each in outcomes(Path(folder), asked.count, asked.seed):
-            found.append(each)
-            if each.end in ("stopped", "escaped"):
-                print(f"{each.number} {each.mutation}: {each.end}: {each.message}", flush=True)
+        for outcome in outcomes(Path(folder), asked.count, asked.seed):
+            found.append(outcome)
+            if outcome.end in ("stopped", "escaped"):
+                print(f"{outcome.number} {outcome.mutation}: {outcome.end}: {outcome.message}", flush=True)
     for key in ("mutation", "suffix"):
         print(f"\n| {key} | {' | '.join(ENDS)} |\n|---|{'---:|' * len(ENDS)}")
-        for kind in sorted({getattr(each, key) for each in found}):
-            counts = Counter(each.end for each in found if getattr(each, key) == kind)
+        for kind in sorted({getattr(item, key) for item in found}):
+            counts = Counter(item.end for item in found if getattr(item, key) == kind)
             print(f"| {kind} | {' | '.join(str(counts[end]) for end in ENDS)} |")
-    worst = max(found, key=lambda each: each.cpu)
-    memory = max(resource.getrusage(each).ru_maxrss for each in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1024
-    counts = Counter(each.end for each in found)
+    worst = max(found, key=lambda item: item.cpu)
+    memory = max(resource.getrusage(item).ru_maxrss for item in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1024
+    counts = Counter(item.end for item in found)
     print(f"\n{len(found)} files: {', '.join(f'{counts[end]} {end}' for end in ENDS)}")
     print(
         f"worst: {worst.cpu:.2f} CPU seconds (file {worst.number}, {worst.suffix}, {worst.mutation}), {memory:.0f} MB"

@@ -45,9 +45,9 @@ class Outcome:
 def outcomes(folder: Path, count: int, seed: int) -> Iterator[Outcome]:
     """Make `count` hostile files in `folder`, one after another, and read each."""
     good = write_good(folder)
-    contents = {each: each.read_bytes() for each in good}
-    for each in good:
-        read_model(each)  # what is compiled on a fresh clone is no work on a hostile file
+    contents = {item: item.read_bytes() for item in good}
+    for item in good:
+        read_model(item)  # what is compiled on a fresh clone is no work on a hostile file
     for number in range(count):
         rng = np.random.default_rng([seed, number])
         origin = good[number % len(good)]
@@ -69,7 +69,7 @@ def _read(path: Path) -> tuple[str, str]:
     except ConfigError as error:
         message = str(error)
         message.encode()
-        if not message.startswith(f"{path}") or "\n" in message or any(each in message for each in PYTHONS_OWN):
+        if not message.startswith(f"{path}") or "\n" in message or any(item in message for item in PYTHONS_OWN):
             return "escaped", message
         if time.monotonic() - started > 10 * LIMITS.cpu_seconds:
             return "escaped", "it ran on"
@@ -80,5 +80,5 @@ def _read(path: Path) -> tuple[str, str]:
 
 
 def _cpu() -> float:
-    both = [resource.getrusage(each) for each in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(each.ru_utime + each.ru_stime for each in both)
+    both = [resource.getrusage(item) for item in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(item.ru_utime + item.ru_stime for item in both)

@@ -30,7 +30,7 @@ def write_good(folder: Path) -> list[Path]:
             "o card\nusemtl skin\nv 9 0 0\nv 9 1 0\nv 9 1 1\nv 9 0 1 0.5 0.5 0.5\nf 17/1 18/2 19/3\nf -1 -2 -3 -4\n"
         )
     (folder / "tiles.dae").write_text(textured_dae("skin.png"))
-    mesh = trimesh.util.concatenate([trimesh.Trimesh(each, BOX_FACES, process=False) for each in BOXES.values()])
+    mesh = trimesh.util.concatenate([trimesh.Trimesh(item, BOX_FACES, process=False) for item in BOXES.values()])
     mesh.visual.face_colors = [255, 51, 0, 255]
     mesh.export(folder / "binary.ply")
     (folder / "text.ply").write_bytes(mesh.export(file_type="ply", encoding="ascii"))
@@ -38,15 +38,15 @@ def write_good(folder: Path) -> list[Path]:
     mesh.export(folder / "binary.stl")
     (folder / "text.stl").write_text(
         "".join(
-            trimesh.Trimesh(each, BOX_FACES, process=False)
+            trimesh.Trimesh(item, BOX_FACES, process=False)
             .export(file_type="stl_ascii")
             .replace("solid", f"solid {name}", 1)
             + "\n"
-            for name, each in BOXES.items()
+            for name, item in BOXES.items()
         )
     )
     mesh.export(folder / "boxes.off")
-    return sorted(each for each in folder.iterdir() if each.suffix not in (".png", ".mtl", ".bin"))
+    return sorted(path for path in folder.iterdir() if path.suffix not in (".png", ".mtl", ".bin"))
 
 
 def _glb() -> Glb:

@@ -1,4 +1,4 @@
-"""What the tests of the mill share: a folder with a config, and the bytes of everything that a run has made."""
+"""Shared by the tests of the engine: a config, and the bytes of everything that a run has made."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ import yaml
 
 WriteConfig = Callable[..., Path]
 
-_DIFFERS_BY_NATURE = {"seconds", "peak_bytes", "seal"}
+_DIFFERS_BY_NATURE = {"seconds", "peak_bytes", "checksum"}
 
 
 @pytest.fixture
 def write_config(tmp_path: Path) -> WriteConfig:
-    """Writes `mill.yaml` with the given sections, and answers its path."""
+    """Writes `toys.yaml` with the given sections, and answers its path."""
 
     def write(**sections: Any) -> Path:
-        path = tmp_path / "mill.yaml"
+        path = tmp_path / "toys.yaml"
         flour = {"marks": str(tmp_path / "marks"), **sections.pop("flour", {})}
-        path.write_text(yaml.safe_dump({"name": "mill", "seed": 3, **sections, "flour": flour}))
+        path.write_text(yaml.safe_dump({"name": "toys", "seed": 3, **sections, "flour": flour}))
         return path
 
     return write
@@ -46,5 +46,5 @@ def made(out: Path) -> Mapping[str, bytes]:
 
 def record_times(out: Path) -> Mapping[str, int]:
     """When each record below `out` was written, as `stage/shard`."""
-    paths = (out / ".work" / "mill").glob("*/records/*.json")
+    paths = (out / ".work" / "toys").glob("*/records/*.json")
     return {f"{path.parent.parent.name}/{path.stem}": path.stat().st_mtime_ns for path in paths}

@@ -51,7 +51,7 @@ def test_refusal_keeps_its_class_and_its_words() -> None:
 
 
 @pytest.mark.parametrize(
-    ("work", "told"),
+    ("work", "reported"),
     [
         (down, "it nests too deeply"),
         (lambda: np.zeros(10**10).tobytes(), "it needs more than 200 MB of memory"),
@@ -61,10 +61,10 @@ def test_refusal_keeps_its_class_and_its_words() -> None:
         (lambda: {}["key"], "something is in it that its reader does not know"),
     ],
 )
-def test_escape_is_one_sentence(work: Callable[[], bytes], told: str) -> None:
+def test_escape_is_one_sentence(work: Callable[[], bytes], reported: str) -> None:
     with pytest.raises(ChildFailed) as caught:
         in_child(work, cpu_seconds=10, memory_mb=200)
-    assert str(caught.value).startswith(told)
+    assert str(caught.value).startswith(reported)
     assert "KeyError" not in str(caught.value)
 
 

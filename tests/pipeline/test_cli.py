@@ -13,11 +13,11 @@ from tests.pipeline.conftest import WriteConfig, made
 from tests.pipeline.toy_run import PACKAGE, run_toy_stages
 
 ROOT = Path(__file__).resolve().parents[2]
-WORK = Path(".work/mill")
+WORK = Path(".work/toys")
 
 
 def shapemill(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tests.pipeline.toy_run", *(str(each) for each in arguments)]
+    command = [sys.executable, "-m", "tests.pipeline.toy_run", *(str(argument) for argument in arguments)]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
@@ -27,7 +27,7 @@ def test_stages_are_found_by_folder_and_stand_after_what_they_read() -> None:
     assert [name for name in stages if name != "salt"] == ["grain", "flour", "bread"]
 
 
-def test_run_and_status_show_each_stage(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_run_and_status_show_every_stage(tmp_path: Path, write_config: WriteConfig) -> None:
     options = ("--config", write_config(), "--out", tmp_path / "out")
     assert shapemill("run", "grain", *options, "--workers", 2).returncode == 0
     status = shapemill("status", *options)
@@ -70,7 +70,7 @@ def test_status_names_the_shards_that_are_set_aside(tmp_path: Path, write_config
     config = write_config(flour={"trouble": {"harvest1-1": "fails"}})
     run_toy_stages(config, tmp_path / "out", "salt", "grain", "flour")
     status = shapemill("status", "--config", config, "--out", tmp_path / "out")
-    assert "flour: harvest1-1 is set aside: the stones are blunt" in status.stdout
+    assert "flour: harvest1-1 is quarantined: the stones are blunt" in status.stdout
     assert [line.split()[1:3] for line in status.stdout.splitlines() if line.startswith("flour ")] == [["5/6", "1"]]
 
 
@@ -113,15 +113,15 @@ def test_verify_finds_a_flipped_byte_and_the_next_run_mends_it(tmp_path: Path, w
     whole = made(out)
     options = ("verify", "--config", config, "--out", out)
     good = shapemill(*options, "--samples", 3)
-    assert (good.returncode, good.stdout) == (0, "verify mill 3\n")
-    loaf = out / "mill/loaves/1.bin"
+    assert (good.returncode, good.stdout) == (0, "verify toys 3\n")
+    loaf = out / "toys/loaves/1.bin"
     content = bytearray(loaf.read_bytes())
     content[100] ^= 1
     with open(loaf, "r+b") as stream:
         stream.write(content)
     bad = shapemill(*options)
     assert bad.returncode == 1
-    assert "loaf-harvest0-1.bin is damaged; the next run makes loaf-harvest0-1 again" in bad.stdout
+    assert "loaf-harvest0-1.bin is corrupted; the next run rebuilds loaf-harvest0-1" in bad.stdout
     assert run_toy_stages(config, out)["bread"].made == 1
     assert made(out) == whole
 

@@ -14,13 +14,13 @@ import pytest
 
 from pipeline.errors import ConfigError
 from tests.pipeline.conftest import WriteConfig, made
-from tests.pipeline.test_failures import alive, descendants, mill, wait_until
+from tests.pipeline.test_failures import alive, descendants, run_command, wait_until
 from tests.pipeline.toy_run import run_toy_stages
 
 pytest.importorskip("distributed")
 
 ROOT = Path(__file__).resolve().parents[2]
-WORK = Path(".work/mill")
+WORK = Path(".work/toys")
 
 
 class Cluster:
@@ -65,14 +65,14 @@ def test_cluster_makes_the_same_bytes_though_workers_die_and_a_shard_kills_its_o
     run_toy_stages(write_config(), out, "salt", "grain")
     trouble = {"harvest0-0": "stops once", "harvest1-0": "dies", "harvest2-1": "dies once"}
     config = write_config(flour={"seconds": 0.1, "trouble": trouble})
-    command = [*mill(config, out, "flour"), "--cluster", cluster.address]
+    command = [*run_command(config, out, "flour"), "--cluster", cluster.address]
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as run:
         wait_until(lambda: _with_stopped(cluster.pids("dask_worker")))
         (victim,) = _with_stopped(cluster.pids("dask_worker"))
         os.kill(victim, signal.SIGKILL)
         assert run.wait(timeout=120) == 1
         assert run.stderr is not None
-        assert "set aside: harvest1-0; run again" in run.stderr.read()
+        assert "failed: harvest1-0; mend the cause" in run.stderr.read()
     # Each killer is one that the test knows: a worker killed while it makes the poisoned shard would count for that.
     tried = {shard: (tmp_path / "marks" / shard).read_text() for shard in trouble}
     assert tried["harvest1-0"] == "xxxx", "three times beside others, once alone"
@@ -88,19 +88,19 @@ def test_shard_ends_with_the_run_that_wanted_it_and_the_cluster_stays(
     out, small = tmp_path / "out", {"fields": 1, "wanted": 1}
     config = write_config(grain=small, flour={"trouble": {"harvest0-0": "sleeps"}})
     run_toy_stages(config, out, "salt", "grain", cluster=cluster.address)
-    with subprocess.Popen([*mill(config, out, "flour"), "--cluster", cluster.address], cwd=ROOT) as run:
+    with subprocess.Popen([*run_command(config, out, "flour"), "--cluster", cluster.address], cwd=ROOT) as run:
         wait_until(lambda: (tmp_path / "marks/harvest0-0").exists())
         makers = cluster.pids("LokyProcess")
         run.kill()
     assert makers
     wait_until(lambda: not set(makers) <= set(cluster.pids("LokyProcess")), seconds=30)
     result = run_toy_stages(config, out, "flour", cluster=cluster.address, stall_minutes=0.1, retries=0)["flour"]
-    assert result.failed == {"harvest0-0": "it made no progress for 6s, and its worker was ended"}
+    assert result.failed == {"harvest0-0": "it made no progress for 6s, and its worker was killed"}
     assert not run_toy_stages(write_config(grain=small), out, "flour", cluster=cluster.address)["flour"].failed
 
 
 @pytest.mark.slow
-def test_scheduler_that_goes_away_is_told_and_the_run_goes_on_here(
+def test_lost_scheduler_is_reported_and_the_run_continues_here(
     tmp_path: Path, write_config: WriteConfig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("pipeline.cluster._ANSWERS_WITHIN", 3.0)
@@ -108,14 +108,14 @@ def test_scheduler_that_goes_away_is_told_and_the_run_goes_on_here(
     config = write_config(flour={"seconds": 0.1})
     run_toy_stages(config, out, "salt", "grain")
     with subprocess.Popen(
-        [*mill(config, out, "flour"), "--cluster", mine.address], cwd=ROOT, stderr=subprocess.PIPE, text=True
+        [*run_command(config, out, "flour"), "--cluster", mine.address], cwd=ROOT, stderr=subprocess.PIPE, text=True
     ) as run:
         wait_until(lambda: list((out / WORK / "flour").glob("records/*.json")))
         os.kill(mine.pids("dask_scheduler")[0], signal.SIGKILL)
         assert run.wait(timeout=120) == 3
         assert run.stderr is not None
         said = run.stderr.read()
-        assert f"stopped: the scheduler at {mine.address} does not answer any more" in said
+        assert f"stopped: the scheduler at {mine.address} no longer answers" in said
         assert "run again to go on" in said
         assert "Traceback" not in said
     assert mine.process.wait(timeout=60) == 1
@@ -128,7 +128,7 @@ def test_scheduler_that_goes_away_is_told_and_the_run_goes_on_here(
 
 def _with_stopped(pids: list[int]) -> list[int]:
     """Those of the processes that have started one which is stopped now."""
-    return [pid for pid in pids if any("\nState:\tT" in _read(each, "status") for each in descendants(pid))]
+    return [pid for pid in pids if any("\nState:\tT" in _read(descendant, "status") for descendant in descendants(pid))]
 
 
 def _command(pid: int) -> str:

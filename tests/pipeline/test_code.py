@@ -1,4 +1,4 @@
-"""What code counts as a shard's own: an edit that may change bytes makes shards again, and no other edit does."""
+"""Code of a shard: an edit that may change bytes rebuilds shards, and no other edit does."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
 from pipeline.run import RunResult, run_stage
 
-MILL = '''
+STONE_STAGE = '''
 """Millstones."""
 from __future__ import annotations
 from pipeline.config import StrictModel
@@ -26,15 +26,15 @@ class StoneConfig(StrictModel):
     sharpens: bool = False
 
 def plan(plan: Plan) -> list[Shard]:
-    return [Shard("coarse"), Shard("fine", code=("house.sieves.fine",))]
+    return [Shard("coarse"), Shard("fine", code=("barn.sieves.fine",))]
 
 def run_shard(task: Task) -> Outcome:
     """Grinds."""
-    from house.stone.grit import GRIT
+    from barn.stone.grit import GRIT
     if task.config.section(StoneConfig).sharpens:
         from pathlib import Path
-        import house.stone.grit
-        Path(house.stone.grit.__file__).write_text("GRIT = 8")
+        import barn.stone.grit
+        Path(barn.stone.grit.__file__).write_text("GRIT = 8")
     with task.output(f"{task.shard.name}.txt") as stream:
         stream.write(b"dust" * GRIT)
     return Outcome(1)
@@ -60,39 +60,37 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
         path.write_text(text)
 
     yield write
-    for module in [each for each in sys.modules if each.partition(".")[0] in {"house", "yard"}]:
+    for module in [module for module in sys.modules if module.partition(".")[0] in {"barn", "yard"}]:
         del sys.modules[module]
 
 
 def names(*starts: str) -> set[str]:
-    return {each for each in transitive_imports(starts) if not each.startswith("pipeline")}
+    return {module for module in transitive_imports(starts) if not module.startswith("pipeline")}
 
 
 def test_every_way_of_importing_is_followed_wherever_it_stands(write: Write) -> None:
-    write(
-        "house/hall.py", "import house.stairs.steps\nfrom house import cellar\ndef late():\n    from . import attic\n"
-    )
-    write("house/stairs/steps.py", "from ..garden import *\nfrom yard.gate import Hinge as latch\n")
-    write("house/garden.py", "import numpy, json, nowhere\nif True:\n    import yard.shed as shed\n")
-    for name in ("house/cellar.py", "house/attic.py", "house/unused.py", "yard/gate.py", "yard/shed.py"):
+    write("barn/hall.py", "import barn.stairs.steps\nfrom barn import cellar\ndef late():\n    from . import attic\n")
+    write("barn/stairs/steps.py", "from ..garden import *\nfrom yard.gate import Hinge as latch\n")
+    write("barn/garden.py", "import numpy, json, nowhere\nif True:\n    import yard.shed as shed\n")
+    for name in ("barn/cellar.py", "barn/attic.py", "barn/unused.py", "yard/gate.py", "yard/shed.py"):
         write(name, "")
     rooms = {"hall", "stairs", "stairs.steps", "cellar", "attic", "garden"}
-    assert names("house.hall") == {"house", "yard", "yard.gate", "yard.shed", *(f"house.{room}" for room in rooms)}
+    assert names("barn.hall") == {"barn", "yard", "yard.gate", "yard.shed", *(f"barn.{room}" for room in rooms)}
     assert names("yard.gate") == {"yard", "yard.gate"}
 
 
 def test_package_may_lie_in_several_folders(write: Write, tmp_path: Path) -> None:
-    write("house/__init__.py", f"__path__.append({str(tmp_path / 'annex')!r})")
-    write("house/hall.py", "import house.guests")
+    write("barn/__init__.py", f"__path__.append({str(tmp_path / 'annex')!r})")
+    write("barn/hall.py", "import barn.guests")
     (tmp_path / "annex").mkdir()
     (tmp_path / "annex/guests.py").write_text("BEDS = 2")
-    __import__("house")
-    assert names("house.hall") == {"house", "house.hall", "house.guests"}
+    __import__("barn")
+    assert names("barn.hall") == {"barn", "barn.hall", "barn.guests"}
 
 
-def test_start_that_is_not_there_is_told(write: Write) -> None:
-    with pytest.raises(ValueError, match=r"no Python file of module house\.none"):
-        transitive_imports(["house.none"])
+def test_start_that_is_not_there_is_reported(write: Write) -> None:
+    with pytest.raises(ValueError, match=r"no Python file of module barn\.none"):
+        transitive_imports(["barn.none"])
 
 
 PLAIN = "import os\n\ndef height(steps):\n    return 0.5 * steps\n"
@@ -106,87 +104,91 @@ PLAIN = "import os\n\ndef height(steps):\n    return 0.5 * steps\n"
     ],
 )
 def test_comment_docstring_and_format_change_nothing(write: Write, edited: str) -> None:
-    write("house/stairs.py", PLAIN)
-    before = transitive_imports(["house.stairs"])
-    write("house/stairs.py", edited)
-    assert transitive_imports(["house.stairs"]) == before
+    write("barn/stairs.py", PLAIN)
+    before = transitive_imports(["barn.stairs"])
+    write("barn/stairs.py", edited)
+    assert transitive_imports(["barn.stairs"]) == before
 
 
 def test_import_for_types_alone_does_not_count(write: Write) -> None:
-    text = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from house.hall import Hall\nelse:\n    Hall = 1\n"
-    write("house/stairs.py", text)
-    write("house/hall.py", "")
-    before = transitive_imports(["house.stairs"])
-    assert set(before) == {"house", "house.stairs"}
-    write("house/stairs.py", text.replace("import Hall", "import Hall, Door"))
-    assert transitive_imports(["house.stairs"]) == before
+    text = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from barn.hall import Hall\nelse:\n    Hall = 1\n"
+    write("barn/stairs.py", text)
+    write("barn/hall.py", "")
+    before = transitive_imports(["barn.stairs"])
+    assert set(before) == {"barn", "barn.stairs"}
+    write("barn/stairs.py", text.replace("import Hall", "import Hall, Door"))
+    assert transitive_imports(["barn.stairs"]) == before
 
 
 @pytest.mark.parametrize("edited", ["0.25 * steps", "0.5 * -steps", "'0.5' * steps", "0.5 * step"])
-def test_each_word_of_code_counts(write: Write, edited: str) -> None:
-    write("house/stairs.py", PLAIN)
-    before = transitive_imports(["house.stairs"])
-    write("house/stairs.py", PLAIN.replace("0.5 * steps", edited))
-    after = transitive_imports(["house.stairs"])
-    assert {module for module in before if before[module] != after[module]} == {"house.stairs"}
+def test_every_word_of_code_counts(write: Write, edited: str) -> None:
+    write("barn/stairs.py", PLAIN)
+    before = transitive_imports(["barn.stairs"])
+    write("barn/stairs.py", PLAIN.replace("0.5 * steps", edited))
+    after = transitive_imports(["barn.stairs"])
+    assert {module for module in before if before[module] != after[module]} == {"barn.stairs"}
 
 
 def test_what_a_folder_declares_beside_its_stage_counts(write: Write) -> None:
-    write("house/stone/stage.py", "")
-    write("house/stone/language.py", "import house.words")
-    write("house/stone/other.py", "")
-    write("house/words.py", "")
-    start = entry_points("house.stone.stage")
-    assert names(*start) == {"house", "house.stone", "house.stone.stage", "house.stone.language", "house.words"}
+    write("barn/stone/stage.py", "")
+    write("barn/stone/language.py", "import barn.words")
+    write("barn/stone/other.py", "")
+    write("barn/words.py", "")
+    start = entry_points("barn.stone.stage")
+    assert names(*start) == {"barn", "barn.stone", "barn.stone.stage", "barn.stone.language", "barn.words"}
 
 
 def grind(out: Path, sharpens: bool = False) -> RunResult:
-    stages = find_stages("house")
+    stages = find_stages("barn")
     section = stages["stone"].config.model_validate({"sharpens": sharpens})
-    return run_stage("stone", stages, Config("mill", "1.0.0", 0, {"stone": section}, out), DatasetPaths(out, "mill"), 1)
+    return run_stage("stone", stages, Config("toys", "1.0.0", 0, {"stone": section}, out), DatasetPaths(out, "toys"), 1)
 
 
 @pytest.fixture
-def mill(write: Write) -> Write:
-    write("house/stone/stage.py", MILL)
-    write("house/stone/grit.py", "GRIT = 2")
-    write("house/sieves/fine.py", "MESH = 1")
+def edit(write: Write) -> Write:
+    write("barn/stone/stage.py", STONE_STAGE)
+    write("barn/stone/grit.py", "GRIT = 2")
+    write("barn/sieves/fine.py", "MESH = 1")
     return write
 
 
-def test_edit_makes_again_what_it_reaches_and_the_log_says_so(mill: Write, tmp_path: Path) -> None:
+def test_edit_rebuilds_what_imports_it_and_the_log_names_it(edit: Write, tmp_path: Path) -> None:
     assert grind(tmp_path).made == 2
-    mill("house/stone/grit.py", "GRIT = 2  # rough")
+    edit("barn/stone/grit.py", "GRIT = 2  # rough")
     assert grind(tmp_path).made == 0
-    mill("house/sieves/fine.py", "MESH = 3")
+    edit("barn/sieves/fine.py", "MESH = 3")
     assert grind(tmp_path).made == 1
-    mill("house/stone/grit.py", "GRIT = 4")
+    edit("barn/stone/grit.py", "GRIT = 4")
     assert grind(tmp_path).made == 2
-    assert (tmp_path / ".work/mill/stone/coarse.txt").read_bytes() == b"dust" * 4
-    log = (tmp_path / ".work/mill/log.txt").read_text()
-    assert "1 shard is made again: changed: code (house.sieves.fine)" in log
-    assert "2 shards are made again: changed: code (house.stone.grit)" in log
+    assert (tmp_path / ".work/toys/stone/coarse.txt").read_bytes() == b"dust" * 4
+    log = (tmp_path / ".work/toys/log.txt").read_text()
+    assert "1 shard is rebuilt: changed: code (barn.sieves.fine)" in log
+    assert "2 shards are rebuilt: changed: code (barn.stone.grit)" in log
 
 
-def test_edit_while_a_stage_runs_stops_it_before_a_shard_is_committed(mill: Write, tmp_path: Path) -> None:
-    with pytest.raises(Fatal, match=r"the code was edited while stage stone ran \(house\.stone\.grit\)"):
+def test_edit_while_a_stage_runs_stops_it_before_a_shard_is_committed(edit: Write, tmp_path: Path) -> None:
+    with pytest.raises(Fatal, match=r"the code was edited while stage stone ran \(barn\.stone\.grit\)"):
         grind(tmp_path, sharpens=True)
-    assert not list((tmp_path / ".work/mill/stone").glob("*.txt"))
+    assert not list((tmp_path / ".work/toys/stone").glob("*.txt"))
 
 
-def test_of_the_mill_only_what_makes_bytes_counts() -> None:
+def test_engine_code_counts_only_where_it_makes_bytes() -> None:
     for name, stage in find_stages().items():
-        mill = {each for each in transitive_imports(entry_points(stage.module)) if each.partition(".")[0] == "pipeline"}
+        engine = {
+            module
+            for module in transitive_imports(entry_points(stage.module))
+            if module.partition(".")[0] == "pipeline"
+        }
         # package writes a digest of all code into the manifest, training one of a model's into its weights
         own = {"pipeline.code"} if name in ("package", "training") else set()
-        # files of strangers are read in a child process, by these or by what they are made with
+        # untrusted files are read in a child process, by these or by what they are made with
         reads = ("autoconfig", "exemplars", "grammars", "shapeassembly", "program_sampling", "abstraction", "training")
         own |= {"pipeline.bounded", "pipeline.termination"} if name in reads else set()
-        assert mill == {"pipeline", "pipeline.errors", "pipeline.randomness", "pipeline.shards"} | own, name
+        assert engine == {"pipeline", "pipeline.errors", "pipeline.randomness", "pipeline.shards"} | own, name
 
 
 def test_chair_does_not_know_the_vase() -> None:
-    library = {f"stages.programs.library.{each}" for each in ("cabinet", "ceiling_lamp", "chair", "table", "vase")}
+    library = {f"stages.programs.library.{item}" for item in ("cabinet", "ceiling_lamp", "chair", "table", "vase")}
     assert not library & names(*entry_points("stages.programs.stage"))
     chair = names(*entry_points("stages.programs.stage", ["stages.programs.library.chair"]))
     assert library & chair == {"stages.programs.library.chair"}
@@ -198,44 +200,44 @@ class TestNotes:
     """What a file says is noted beside Python's compiled files, so that the next process need not parse it."""
 
     @pytest.fixture
-    def said(self, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], dict[str, str]]:
+    def digests(self, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], dict[str, str]]:
         monkeypatch.setattr(sys, "dont_write_bytecode", False)
 
-        def said(text: str) -> dict[str, str]:
+        def digests(text: str) -> dict[str, str]:
             """The digests that a process finds which sees the file for the first time."""
             _read.cache_clear()
             if text:
-                write("house/mill.py", text)
-            return transitive_imports(["house.mill"])
+                write("barn/loft.py", text)
+            return transitive_imports(["barn.loft"])
 
-        return said
+        return digests
 
     def note(self, tmp_path: Path) -> Path:
-        (found,) = (tmp_path / "src/house/__pycache__").glob("mill.*.said.json")
+        (found,) = (tmp_path / "src/barn/__pycache__").glob("loft.*.imports.json")
         return found
 
-    def test_says_what_the_file_says(self, said: Callable[[str], dict[str, str]], tmp_path: Path) -> None:
-        first = said("import house.stone\nGRIT = 1")
+    def test_says_what_the_file_says(self, digests: Callable[[str], dict[str, str]], tmp_path: Path) -> None:
+        first = digests("import barn.stone\nGRIT = 1")
         assert self.note(tmp_path).is_file()
-        assert said("") == first
-        assert said("import house.stone\nGRIT = 2") != first
-        assert said("import house.stone\nGRIT = 1") == first
+        assert digests("") == first
+        assert digests("import barn.stone\nGRIT = 2") != first
+        assert digests("import barn.stone\nGRIT = 1") == first
 
-    @pytest.mark.parametrize("spoilt", [b"", b"{", b"[]", b'{"key": 1}', b"\0" * 90])
-    def test_that_are_spoilt_say_nothing(
-        self, said: Callable[[str], dict[str, str]], tmp_path: Path, spoilt: bytes
+    @pytest.mark.parametrize("corrupted", [b"", b"{", b"[]", b'{"key": 1}', b"\0" * 90])
+    def test_corrupted_notes_are_ignored(
+        self, digests: Callable[[str], dict[str, str]], tmp_path: Path, corrupted: bytes
     ) -> None:
-        first = said("GRIT = 1")
+        first = digests("GRIT = 1")
         whole = self.note(tmp_path).read_bytes()
-        self.note(tmp_path).write_bytes(spoilt)
-        assert said("") == first
+        self.note(tmp_path).write_bytes(corrupted)
+        assert digests("") == first
         assert self.note(tmp_path).read_bytes() == whole
 
-    def test_are_not_needed(self, said: Callable[[str], dict[str, str]], tmp_path: Path) -> None:
-        first = said("GRIT = 1")
+    def test_are_not_needed(self, digests: Callable[[str], dict[str, str]], tmp_path: Path) -> None:
+        first = digests("GRIT = 1")
         folder = self.note(tmp_path).parent
-        for each in folder.iterdir():
-            each.unlink()
+        for path in folder.iterdir():
+            path.unlink()
         folder.rmdir()
         folder.write_text("a file stands where the folder would be")
-        assert said("") == first
+        assert digests("") == first

@@ -1,4 +1,4 @@
-"""A mistake in a config is told before any work: file, line, key, what is wrong, what would be right."""
+"""A mistake in a config is reported before any work: file, line, key, what is wrong, what would be right."""
 
 from __future__ import annotations
 
@@ -122,8 +122,11 @@ def test_exponent_without_a_point_is_a_number(tmp_path: Path) -> None:
         ("name: White Bread\n", ["bread.yaml:1: name: string should match pattern"]),
         ("name: bread\nversion: '1.0'\n", ["bread.yaml:2: version: string should match pattern"]),
         ("name: bread\nseed: -1\n", ["bread.yaml:2: seed: must lie in [0, "]),
-        ("name: bread\nname: toast\n", ["bread.yaml:2: key name stands twice; first in line 1"]),
-        ("name: bread\noven:\n  heat: 60\n  heat: 70\n", ["bread.yaml:4: key oven.heat stands twice; first in line 3"]),
+        ("name: bread\nname: toast\n", ["bread.yaml:2: key name is defined twice; first in line 1"]),
+        (
+            "name: bread\noven:\n  heat: 60\n  heat: 70\n",
+            ["bread.yaml:4: key oven.heat is defined twice; first in line 3"],
+        ),
         ("name: bread\n7: x\n", ["bread.yaml:2: key '7' must be text: put it in quotes"]),
         ("name: [bread\n", ["bread.yaml:2: is no YAML: "]),
         ("name: bread\n\toven: 7\n", ["bread.yaml:2: is no YAML: found character '\\t' that cannot start any token"]),
@@ -132,35 +135,35 @@ def test_exponent_without_a_point_is_a_number(tmp_path: Path) -> None:
     ],
 )
 def test_mistake_names_file_line_key_and_the_right_thing(tmp_path: Path, text: str, expected: list[str]) -> None:
-    told = mistakes(tmp_path, text)
-    assert len(told) == len(expected), told
-    for line, start in zip(told, expected, strict=True):
+    reported = mistakes(tmp_path, text)
+    assert len(reported) == len(expected), reported
+    for line, start in zip(reported, expected, strict=True):
         assert line.startswith(start), line
 
 
-def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
+def test_all_mistakes_are_reported_together(tmp_path: Path) -> None:
     assert len(mistakes(tmp_path, "name: B\nseed: x\noven: {heat: 1, mode: 2}\nbakery: {loafs: 1}\n")) == 5
 
 
 def test_missing_file_names_the_nearest_that_is_there(tmp_path: Path) -> None:
     (tmp_path / "sourdough.txt").write_text("wait")
-    told = mistakes(tmp_path, f"name: bread\nbakery:\n  recipe: {tmp_path}/sourdoughs.txt\n")
-    assert told == [
+    reported = mistakes(tmp_path, f"name: bread\nbakery:\n  recipe: {tmp_path}/sourdoughs.txt\n")
+    assert reported == [
         "bread.yaml:3: bakery.recipe: there is no file sourdoughs.txt; the nearest file there is sourdough.txt"
     ]
 
 
 def test_missing_folder_names_the_last_that_is_there(tmp_path: Path) -> None:
-    (told,) = mistakes(tmp_path, f"name: bread\nbakery:\n  recipe: {tmp_path}/a/b/c.txt\n")
-    assert told.endswith(f"there is no file a/b/c.txt; of its folders {tmp_path} is the last that is there")
+    (reported,) = mistakes(tmp_path, f"name: bread\nbakery:\n  recipe: {tmp_path}/a/b/c.txt\n")
+    assert reported.endswith(f"there is no file a/b/c.txt; of its folders {tmp_path} is the last that is there")
 
 
-def test_folder_in_place_of_a_file_is_told(tmp_path: Path) -> None:
-    (told,) = mistakes(tmp_path, f"name: bread\nbakery:\n  recipe: {tmp_path}\n")
-    assert told.endswith("is a folder, not a file")
+def test_folder_in_place_of_a_file_is_reported(tmp_path: Path) -> None:
+    (reported,) = mistakes(tmp_path, f"name: bread\nbakery:\n  recipe: {tmp_path}\n")
+    assert reported.endswith("is a folder, not a file")
 
 
-def test_unreadable_config_is_told(tmp_path: Path) -> None:
+def test_unreadable_config_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"none\.yaml: cannot be read: No such file"):
         load_config(tmp_path / "none.yaml", {})
     (tmp_path / "latin.yaml").write_bytes("name: brötchen".encode("latin-1"))
@@ -195,23 +198,23 @@ HOSTILE = {
 
 @pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
 def test_hostile_config_is_one_short_mistake(tmp_path: Path, text: str) -> None:
-    (told,) = mistakes(tmp_path, text)
-    assert told.startswith(HOSTILE[text])
-    assert len(told) < 600
+    (reported,) = mistakes(tmp_path, text)
+    assert reported.startswith(HOSTILE[text])
+    assert len(reported) < 600
 
 
 @pytest.mark.parametrize("value", ["0", "[]", "''", "false"])
 def test_section_that_holds_another_thing_is_no_default(tmp_path: Path, value: str) -> None:
-    (told,) = mistakes(tmp_path, f"name: bread\noven: {value}\n")
-    assert told.startswith("bread.yaml:2: oven: input should be an object, and is ")
+    (reported,) = mistakes(tmp_path, f"name: bread\noven: {value}\n")
+    assert reported.startswith("bread.yaml:2: oven: input should be an object, and is ")
 
 
 def test_aliases_that_stand_for_little_are_read(tmp_path: Path) -> None:
     text = "name: bread\nbakery:\n  loaves:\n    - &rye {flour: rye}\n    - *rye\n"
-    assert [each.flour for each in load(tmp_path, text).section(Bakery).loaves] == ["rye", "rye"]
+    assert [loaf.flour for loaf in load(tmp_path, text).section(Bakery).loaves] == ["rye", "rye"]
 
 
-def test_of_very_many_mistakes_the_first_are_told(tmp_path: Path) -> None:
-    told = mistakes(tmp_path, "name: bread\nbakery: {small: [" + "{kind: pie}, " * 80 + "]}\n")
-    assert len(told) == 51
-    assert told[-1].endswith("and 30 more mistakes")
+def test_only_the_first_of_many_mistakes_are_reported(tmp_path: Path) -> None:
+    reported = mistakes(tmp_path, "name: bread\nbakery: {small: [" + "{kind: pie}, " * 80 + "]}\n")
+    assert len(reported) == 51
+    assert reported[-1].endswith("and 30 more mistakes")

@@ -19,13 +19,13 @@ def test_keys_of_entries_of_several_kinds_say_whose_they_are() -> None:
         if "`bakery." in line
     ]
     assert ["`bakery.small[]`", "list of keys below", "", "Small things"] in [
-        [each.strip() for each in row] for row in rows
+        [item.strip() for item in row] for row in rows
     ]
     assert [(row[0], row[-1]) for row in rows if row[0].startswith("`bakery.small[].")] == [
-        ("`bakery.small[].kind`", "Of `bun`:"),
-        ("`bakery.small[].seeds`", "Of `bun`: seeds on top"),
-        ("`bakery.small[].kind`", "Of `roll`:"),
-        ("`bakery.small[].butter`", "Of `roll`: whether it is buttered"),
+        ("`bakery.small[].kind`", "For `bun`:"),
+        ("`bakery.small[].seeds`", "For `bun`: seeds on top"),
+        ("`bakery.small[].kind`", "For `roll`:"),
+        ("`bakery.small[].butter`", "For `roll`: whether it is buttered"),
     ]
     assert ("`bakery.loaves[].grams`", "Weight; unit: grams") in [(row[0], row[-1]) for row in rows]
 

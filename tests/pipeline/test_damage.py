@@ -18,7 +18,7 @@ from pipeline.status import status_lines
 from tests.pipeline.conftest import WriteConfig, made, record_times
 from tests.pipeline.toy_run import STAGES, load, run_toy_stages
 
-WORK = Path(".work/mill")
+WORK = Path(".work/toys")
 
 
 def flip(path: Path, place: int = 700) -> None:
@@ -61,7 +61,7 @@ def test_damage_is_named_and_mended_and_the_bytes_are_those_of_an_undisturbed_ru
     log = (out / WORK / "log.txt").read_text()
     for shard in damaged:
         named = next((out / WORK).glob(f"{shard}.*")).relative_to(out / WORK)
-        assert f"{named} is damaged: its sha256 is not the one in its record; {named.stem} is made again" in log
+        assert f"{named} is corrupted: its sha256 is not the one in its record; {named.stem} is rebuilt" in log
     assert again(before, out) == {*damaged, *(name for name in before if name.startswith(remade))}
     run_toy_stages(config, tmp_path / "calm")
     assert made(out) == made(tmp_path / "calm")
@@ -94,7 +94,7 @@ def test_input_that_comes_back_with_other_bytes_is_read_again(tmp_path: Path, wr
     files = {"bag-0.txt": {"sha256": file_digest(out / WORK / "salt/bag-0.txt"), "bytes": 5}}
     path.write_bytes(replace(record, files=files).to_bytes())
     assert run_toy_stages(write_config(), out)["bread"].made == 6
-    assert "6 shards are made again: what it is made from has other bytes" in (out / WORK / "log.txt").read_text()
+    assert "6 shards are rebuilt: an input has other bytes" in (out / WORK / "log.txt").read_text()
 
 
 def test_record_with_a_flipped_byte_has_its_shard_made_again(tmp_path: Path, write_config: WriteConfig) -> None:
@@ -116,7 +116,7 @@ def write_file(task: Task) -> Outcome:
 
 
 def rot_and_read(task: Task) -> Outcome:
-    path = Path(task.config.path).parent / ".work/mill/first/a.txt"
+    path = Path(task.config.path).parent / ".work/toys/first/a.txt"
     flip(path)
     return Outcome(len(task.input("first", "a.txt").read_bytes()))
 
@@ -132,58 +132,63 @@ def test_disk_that_damages_what_was_made_again_just_now_stops_everything(tmp_pat
             "second", __name__, Other, ("first",), lambda _: [Shard("b", {}, ("first/a",))], rot_and_read, lambda _: 0
         ),
     }
-    config = Config("mill", "1.0.0", 0, {"first": StrictModel(), "second": Other()}, tmp_path / "mill.yaml")
-    run_stage("first", stages, config, DatasetPaths(tmp_path, "mill"), workers=1)
-    with pytest.raises(Fatal, match=r"first/a\.txt is damaged: .*, and a was made again just now: disk or memory"):
-        run_stage("second", stages, config, DatasetPaths(tmp_path, "mill"), workers=1)
+    config = Config("toys", "1.0.0", 0, {"first": StrictModel(), "second": Other()}, tmp_path / "toys.yaml")
+    run_stage("first", stages, config, DatasetPaths(tmp_path, "toys"), workers=1)
+    with pytest.raises(Fatal, match=r"first/a\.txt is corrupted: .*, and a was just rebuilt: disk or memory"):
+        run_stage("second", stages, config, DatasetPaths(tmp_path, "toys"), workers=1)
 
 
 def in_place_of(path: Path, what: str) -> None:
-    """Spoil a file of the mill's own."""
+    """Corrupt a file of the engine's own."""
     whole = path.read_bytes()
     path.unlink()
     if what == "a folder":
         (path / "with").mkdir(parents=True)
         (path / "with/a file").write_text("in it")
     else:
-        content = {"half": whole[:-40], "not UTF-8": b'{"seal": "\xff\xfe"}', "a list": b"[]", "text": b'"seal"'}
+        content = {
+            "half": whole[:-40],
+            "not UTF-8": b'{"checksum": "\xff\xfe"}',
+            "a list": b"[]",
+            "text": b'"checksum"',
+        }
         content |= {"deep": b"[" * 100_000, "long number": b"9" * 10_000, "empty": b""}
         content["other types"] = json.dumps(dict.fromkeys(json.loads(whole), 7)).encode() if whole[:1] == b"{" else b"7"
         path.write_bytes(content[what])
 
 
-SPOILT = ("half", "not UTF-8", "a list", "text", "deep", "long number", "empty", "other types", "a folder")
+CORRUPTED = ("half", "not UTF-8", "a list", "text", "deep", "long number", "empty", "other types", "a folder")
 
 
-def test_record_that_is_none_any_more_has_its_shard_made_again(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_corrupted_record_has_its_shard_rebuilt(tmp_path: Path, write_config: WriteConfig) -> None:
     out = tmp_path / "out"
-    run_toy_stages(write_config(salt={"bags": len(SPOILT)}), out, "salt")
+    run_toy_stages(write_config(salt={"bags": len(CORRUPTED)}), out, "salt")
     whole = made(out)
-    for number, what in enumerate(SPOILT):
+    for number, what in enumerate(CORRUPTED):
         in_place_of(out / WORK / f"salt/records/bag-{number}.json", what)
-    in_place_of(out / WORK / "salt/mill/manifest.json", "a folder")
-    assert run_toy_stages(write_config(salt={"bags": len(SPOILT)}), out, "salt")["salt"].made == len(SPOILT)
+    in_place_of(out / WORK / "salt/engine/manifest.json", "a folder")
+    assert run_toy_stages(write_config(salt={"bags": len(CORRUPTED)}), out, "salt")["salt"].made == len(CORRUPTED)
     assert made(out) == whole
 
 
-def test_other_notes_of_the_mill_may_be_spoilt_too(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_corrupted_files_of_the_engine_are_replaced(tmp_path: Path, write_config: WriteConfig) -> None:
     out, config = tmp_path / "out", write_config(salt={"bags": 2})
     run_toy_stages(config, out, "salt")
     whole, stage = made(out), out / WORK / "salt"
-    for what in SPOILT:
-        (stage / "mill/published.json").write_bytes(b"[]")
+    for what in CORRUPTED:
+        (stage / "engine/published.json").write_bytes(b"[]")
         (stage / "failed/bag-1.json").write_bytes(b"{}")
-        for note in ("mill/manifest.json", "mill/published.json", "failed/bag-1.json"):
+        for note in ("engine/manifest.json", "engine/published.json", "failed/bag-1.json"):
             in_place_of(stage / note, what)
-        list(status_lines(load(config), STAGES, DatasetPaths(out, "mill"), workers=1))
+        list(status_lines(load(config), STAGES, DatasetPaths(out, "toys"), workers=1))
         run_toy_stages(config, out, "salt")
-        remove(stage / "mill/published.json")
+        remove(stage / "engine/published.json")
         assert made(out) == whole, what
     (stage / "records/bag-1.json").unlink()
-    for what in SPOILT:
+    for what in CORRUPTED:
         (stage / "failed/bag-1.json").write_bytes(b"{}")
         in_place_of(stage / "failed/bag-1.json", what)
-        lines = list(status_lines(load(config), STAGES, DatasetPaths(out, "mill"), workers=1))
+        lines = list(status_lines(load(config), STAGES, DatasetPaths(out, "toys"), workers=1))
         assert any(line.split()[:3] == ["salt", "1/2", "0"] for line in lines), what
         remove(stage / "failed/bag-1.json")
 
@@ -197,13 +202,11 @@ def test_folder_in_place_of_a_shard_is_taken_for_damage(tmp_path: Path, write_co
     assert made(out) == whole
 
 
-def test_listing_that_names_a_file_elsewhere_takes_nothing_away_there(
-    tmp_path: Path, write_config: WriteConfig
-) -> None:
+def test_listing_of_a_file_elsewhere_deletes_nothing_there(tmp_path: Path, write_config: WriteConfig) -> None:
     out, outside, small = tmp_path / "out", tmp_path / "precious.txt", {"fields": 1, "wanted": 1}
     run_toy_stages(write_config(grain=small), out)
     outside.write_text("mine")
-    (out / WORK / "bread/mill/published.json").write_text('["../precious.txt"]')
+    (out / WORK / "bread/engine/published.json").write_text('["../precious.txt"]')
     run_toy_stages(write_config(grain=small), out)
     assert outside.read_text() == "mine"
-    assert json.loads((out / WORK / "bread/mill/published.json").read_bytes()) == ["mill/loaves/0.bin"]
+    assert json.loads((out / WORK / "bread/engine/published.json").read_bytes()) == ["toys/loaves/0.bin"]

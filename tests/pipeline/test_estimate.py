@@ -61,32 +61,32 @@ STAGES = {"idle": IDLE, "corn": CORN, "flour": FLOUR}
 
 def config(wanted: int = 400) -> Config:
     sections = {"idle": StrictModel(), "corn": CornConfig(wanted=wanted), "flour": StrictModel()}
-    return Config("mill", "1.0.0", 3, sections, Path("mill.yaml"))
+    return Config("toys", "1.0.0", 3, sections, Path("toys.yaml"))
 
 
 def planned(places: DatasetPaths, asked: Config) -> tuple[dict[str, list[str]], list[str]]:
     """The table's rows by stage, without their times, and the lines about it."""
     lines = list(plan_lines(asked, STAGES, places, workers=2))
     first = next(number for number, line in enumerate(lines) if line.startswith("stage"))
-    last = next(number for number, line in enumerate(lines) if line.startswith("all"))
+    last = next(number for number, line in enumerate(lines) if line.startswith("total"))
     rows = [line.split() for line in lines[first + 1 : last + 1]]
     return {row[0]: [row[1], row[2], " ".join(row[3:5])] for row in rows}, [*lines[:first], *lines[last + 1 :]]
 
 
 def test_a_trial_of_few_samples_is_scaled_to_what_is_asked_and_leaves_nothing(tmp_path: Path) -> None:
-    rows, notes = planned(DatasetPaths(tmp_path, "mill"), config())
+    rows, notes = planned(DatasetPaths(tmp_path, "toys"), config())
     assert rows == {
         "corn": ["4", "400", "400.0 kB"],
         "flour": ["5", "400", "401.0 kB"],  # a label is written once, for twenty samples or for 400
-        "all": ["9", "400", "801.0 kB"],
+        "total": ["9", "400", "801.0 kB"],
     }
-    assert notes[0].startswith("a short trial first")
+    assert notes[0].startswith("running a short trial")
     assert notes[-1].endswith(f"are free at {tmp_path}")
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
 def test_what_is_made_is_counted_and_needs_no_trial(tmp_path: Path) -> None:
-    places, asked = DatasetPaths(tmp_path, "mill"), config(250)
+    places, asked = DatasetPaths(tmp_path, "toys"), config(250)
     for name in STAGES:
         run_stage(name, STAGES, asked, places, workers=1)
     rows, notes = planned(places, asked)
@@ -95,7 +95,7 @@ def test_what_is_made_is_counted_and_needs_no_trial(tmp_path: Path) -> None:
 
 
 def test_what_is_made_of_a_stage_tells_what_the_rest_will_take(tmp_path: Path) -> None:
-    places, asked = DatasetPaths(tmp_path, "mill"), config(250)
+    places, asked = DatasetPaths(tmp_path, "toys"), config(250)
     for name in STAGES:
         run_stage(name, STAGES, asked, places, workers=1)
     for name in ("corn-1", "label"):
@@ -105,11 +105,11 @@ def test_what_is_made_of_a_stage_tells_what_the_rest_will_take(tmp_path: Path) -
     assert not any("trial" in note for note in notes)
 
 
-def test_a_trial_that_fails_is_told_as_what_the_run_would_meet(tmp_path: Path) -> None:
+def test_failing_trial_is_reported_as_the_failure_of_the_run(tmp_path: Path) -> None:
     def fail(task: Task) -> Outcome:
         raise ValueError("the stones are blunt")
 
     stages = {**STAGES, "flour": Stage("flour", __name__, StrictModel, ("corn",), flour_plan, fail, lambda _: 0)}
     with pytest.raises(ConfigError, match="the trial of flour failed, as the run would: ValueError: the stones are"):
-        list(plan_lines(config(), stages, DatasetPaths(tmp_path, "mill"), workers=2))
+        list(plan_lines(config(), stages, DatasetPaths(tmp_path, "toys"), workers=2))
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]

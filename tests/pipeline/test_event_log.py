@@ -26,16 +26,16 @@ from tests.pipeline.toy_run import run_toy_stages
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def told(worked: Callable[[float], float], work: float, seconds: int) -> Iterator[tuple[float, float | None]]:
+def reported(worked: Callable[[float], float], work: float, seconds: int) -> Iterator[tuple[float, float | None]]:
     """What is said of the time left, twice a second, of work that goes on like `worked`."""
     watch = TimeLeft()
     for now in np.arange(0.0, seconds, 0.5):
         yield float(now), watch.after(worked(float(now)), work, float(now))
 
 
-def test_nothing_is_told_while_workers_start_and_then_what_is_true() -> None:
+def test_time_left_is_unknown_while_workers_start_and_then_right() -> None:
     # Thirty seconds of imports, then ten samples a second: 1,000 samples are there after 130 seconds.
-    for now, left in told(lambda now: max(now - 30, 0) * 10, 1000, 130):
+    for now, left in reported(lambda now: max(now - 30, 0) * 10, 1000, 130):
         if now < 35:
             assert left is None
         elif now > 40:
@@ -47,36 +47,36 @@ def test_time_left_does_not_jump_when_shards_end_together() -> None:
     def worked(now: float) -> float:
         return 50.0 * int(now / 15 if int(now / 45) % 2 else now / 7.5)
 
-    answers = [left for _, left in told(worked, 2000, 240) if left is not None]
+    answers = [left for _, left in reported(worked, 2000, 240) if left is not None]
     assert len(answers) > 300
     steps = [after - before for before, after in itertools.pairwise(answers)]
     assert max(map(abs, steps)) < 0.1 * max(answers)
 
 
 def test_what_was_done_before_the_start_says_nothing_of_the_pace() -> None:
-    answers = dict(told(lambda now: 900 + now, 1000, 60))
+    answers = dict(reported(lambda now: 900 + now, 1000, 60))
     assert answers[50.0] == pytest.approx(50, abs=1)
 
 
-def test_nothing_is_told_of_work_that_is_not_counted_or_is_over() -> None:
-    assert all(left is None for _, left in told(lambda _: 0.0, 0.0, 100))
+def test_time_left_is_unknown_without_a_count_and_at_the_end() -> None:
+    assert all(left is None for _, left in reported(lambda _: 0.0, 0.0, 100))
     assert TimeLeft().after(5.0, 5.0, 10.0) is None
 
 
 def test_figures_count_samples_where_the_plan_says_how_many_there_will_be() -> None:
     known = Progress(planned=24, done=12, failed=1, work=1200, worked=512.6, samples=500, rejects=7)
     assert progress_text(known, 41.0, 58.2) == (
-        "512 of 1,200 samples, 12 of 24 shards, 7 rejects, 1 set aside, 41s gone, about 58s left"
+        "512 of 1,200 samples, 12 of 24 shards, 7 rejects, 1 quarantined, 41s elapsed, about 58s left"
     )
     grows = Progress(planned=8, done=6.4, failed=0, work=0, worked=0.0, samples=0, rejects=0)
-    assert progress_text(grows, 41.0, None) == "6.4 of 8 shards, 41s gone"
+    assert progress_text(grows, 41.0, None) == "6.4 of 8 shards, 41s elapsed"
 
 
 def seen_on_a_terminal(*arguments: object) -> str:
-    """All that the mill of the tests writes to a terminal."""
+    """Return all that a run of the toy stages writes to a terminal."""
     ours, theirs = pty.openpty()
     termios.tcsetwinsize(theirs, (40, 120))
-    command = [sys.executable, "-m", "tests.pipeline.toy_run", *(str(each) for each in arguments)]
+    command = [sys.executable, "-m", "tests.pipeline.toy_run", *(str(argument) for argument in arguments)]
     running = subprocess.Popen(command, cwd=ROOT, stdout=theirs, stderr=theirs)
     os.close(theirs)
     written = bytearray()
@@ -99,13 +99,13 @@ def test_a_terminal_shows_a_bar_with_samples_while_it_works_and_none_afterwards(
     assert "of 24 samples" in shown
     assert "% |" in shown
     left = [line.rpartition("\r")[2] for line in shown.replace("\r\n", "\n").split("\n")]
-    assert left[0] == "flour: 6 shards to make, about 100.0 kB of disk (4.2 kB a sample)"
+    assert left[0] == "flour: 6 shards to make, about 100.0 kB of disk (4.2 kB per sample)"
     assert left[1].startswith("flour: 6 of 6 shards, 24 samples, 61.4 kB, 6 shards made now")
     assert left[2:] == [""]
 
 
 def test_a_stage_without_a_plan_says_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     idle = Stage("idle", 1, StrictModel, (), lambda _: [], lambda _: Outcome(0), lambda _: 0)
-    config = Config("mill", "1.0.0", 0, {"idle": StrictModel()}, tmp_path / "mill.yaml")
-    assert run_stage("idle", {"idle": idle}, config, DatasetPaths(tmp_path, "mill"), workers=1).left == 0
+    config = Config("toys", "1.0.0", 0, {"idle": StrictModel()}, tmp_path / "toys.yaml")
+    assert run_stage("idle", {"idle": idle}, config, DatasetPaths(tmp_path, "toys"), workers=1).left == 0
     assert capfd.readouterr() == ("", "")

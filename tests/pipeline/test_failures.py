@@ -21,10 +21,10 @@ from tests.pipeline.conftest import WriteConfig, made
 from tests.pipeline.toy_run import run_toy_stages
 
 ROOT = Path(__file__).resolve().parents[2]
-WORK = Path(".work/mill")
+WORK = Path(".work/toys")
 
 
-def mill(config: Path, out: Path, stage: str, workers: int = 1) -> list[str]:
+def run_command(config: Path, out: Path, stage: str, workers: int = 1) -> list[str]:
     command = [sys.executable, "-m", "tests.pipeline.toy_run", "run", stage]
     return [*command, "--config", str(config), "--out", str(out), "--workers", str(workers)]
 
@@ -54,7 +54,7 @@ def test_killed_run_goes_on_to_the_same_bytes_and_leaves_no_worker(tmp_path: Pat
     run_toy_stages(config, tmp_path / "whole", workers=2)
     out = tmp_path / "killed"
     run_toy_stages(config, out, "salt", "grain")
-    with subprocess.Popen(mill(config, out, "flour", workers=2), cwd=ROOT, stderr=subprocess.DEVNULL) as run:
+    with subprocess.Popen(run_command(config, out, "flour", workers=2), cwd=ROOT, stderr=subprocess.DEVNULL) as run:
         flour = out / WORK / "flour"
         wait_until(lambda: list(flour.glob("records/*.json")) and list(flour.glob(".*.tmp")))
         workers = descendants(run.pid)
@@ -84,10 +84,10 @@ def test_shard_that_keeps_killing_its_worker_is_set_aside_and_the_rest_is_made(
     config = write_config(flour={"trouble": {"harvest0-1": "dies"}})
     run_toy_stages(config, tmp_path / "out", "salt", "grain")
     run = subprocess.run(
-        mill(config, tmp_path / "out", "flour", workers=2), cwd=ROOT, capture_output=True, text=True, check=False
+        run_command(config, tmp_path / "out", "flour", workers=2), cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert run.returncode == 1
-    assert "flour: set aside: harvest0-1" in run.stderr
+    assert "flour: failed: harvest0-1" in run.stderr
     assert (tmp_path / "marks/harvest0-1").read_text() == "xxxx", "three times beside others, once alone"
     flour = tmp_path / "out" / WORK / "flour"
     assert len(list(flour.glob("*.tar"))) == 5
@@ -140,7 +140,7 @@ def test_file_over_the_limit_of_the_machine_stops_everything(tmp_path: Path, wri
     config = write_config(flour={"trouble": {"harvest0-1": "big"}})
     run_toy_stages(config, tmp_path / "out", "salt", "grain")
     run = subprocess.run(
-        mill(config, tmp_path / "out", "flour"),
+        run_command(config, tmp_path / "out", "flour"),
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -159,9 +159,9 @@ def test_full_disk_stops_everything_and_the_next_run_goes_on(tmp_path: Path, wri
     disk, config = tmp_path / "disk", write_config(flour={"trouble": {"harvest0-1": "big"}})
     disk.mkdir()
     run_toy_stages(config, tmp_path / "out", "salt", "grain")
-    flour = " ".join(mill(config, disk / "out", "flour"))
+    flour = " ".join(run_command(config, disk / "out", "flour"))
     script = f"mount -t tmpfs -o size=8m none {disk} || exit 77; cp -a {tmp_path}/out {disk}/out; {flour}; code=$?; "
-    script += f"find {disk}/out -name '*.tmp'; ls {disk}/out/.work/mill/flour; exit $code"
+    script += f"find {disk}/out -name '*.tmp'; ls {disk}/out/.work/toys/flour; exit $code"
     run = subprocess.run(
         ["unshare", "--map-root-user", "--mount", "sh", "-c", script],
         cwd=ROOT,
@@ -173,7 +173,7 @@ def test_full_disk_stops_everything_and_the_next_run_goes_on(tmp_path: Path, wri
         pytest.skip("this machine lets nobody mount a small disk")
     assert run.returncode == 3, run.stderr
     assert "No space left on device" in run.stderr
-    assert run.stdout.split() == ["failed", "harvest0-0.tar", "mill", "progress", "records", "rejects"]
+    assert run.stdout.split() == ["engine", "failed", "harvest0-0.tar", "progress", "records", "rejects"]
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
@@ -183,7 +183,7 @@ def test_folder_that_cannot_be_written_stops_everything(tmp_path: Path, write_co
         run_toy_stages(write_config(), tmp_path / "out", "salt")
 
 
-def test_out_that_is_a_file_is_told(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_out_that_is_a_file_is_reported(tmp_path: Path, write_config: WriteConfig) -> None:
     (tmp_path / "out").write_text("not a folder")
     with pytest.raises(Fatal, match=r"cannot make folders under .*out"):
         run_toy_stages(write_config(), tmp_path / "out", "salt")
@@ -193,9 +193,9 @@ def test_second_run_in_the_same_place_is_refused(tmp_path: Path, write_config: W
     config = write_config(flour={"seconds": 0.5})
     out = tmp_path / "out"
     run_toy_stages(config, out, "salt", "grain")
-    with subprocess.Popen(mill(config, out, "flour"), cwd=ROOT, stderr=subprocess.DEVNULL) as run:
+    with subprocess.Popen(run_command(config, out, "flour"), cwd=ROOT, stderr=subprocess.DEVNULL) as run:
         wait_until(lambda: list((out / WORK / "flour").glob(".*.tmp")))
-        with pytest.raises(ConfigError, match="another run is at work"):
+        with pytest.raises(ConfigError, match="another run works"):
             run_toy_stages(config, out, "flour")
         run.kill()
 
@@ -208,7 +208,7 @@ def test_signal_ends_the_run_with_its_workers_stopped_ones_too_and_leaves_whole_
     out = tmp_path / "out"
     run_toy_stages(config, out, "salt", "grain")
     with subprocess.Popen(
-        mill(config, out, "flour"),
+        run_command(config, out, "flour"),
         cwd=ROOT,
         stderr=subprocess.DEVNULL,
         start_new_session=True,

@@ -31,17 +31,17 @@ def stage(name: str, *shards: Shard, inputs: tuple[str, ...] = (), config: type[
     return Stage(name, __name__, config, inputs, lambda _: list(shards), nothing, lambda _: 0)
 
 
-def survey(out: Path, *stages: Stage) -> Inventory:
-    config = Config("toy", "1.0.0", 0, {each.name: each.config() for each in stages}, Path("toy.yaml"))
-    return Inventory(config, {each.name: each for each in stages}, DatasetPaths(out, "toy"))
+def inventory(out: Path, *stages: Stage) -> Inventory:
+    config = Config("toy", "1.0.0", 0, {stage.name: stage.config() for stage in stages}, Path("toy.yaml"))
+    return Inventory(config, {stage.name: stage for stage in stages}, DatasetPaths(out, "toy"))
 
 
 def prints(out: Path, *stages: Stage) -> dict[str, str]:
-    surveyed = survey(out, *stages)
+    surveyed = inventory(out, *stages)
     return {
-        f"{each.name}/{shard}": value
-        for each in stages
-        for shard, value in surveyed.stage(each.name).fingerprints.items()
+        f"{stage.name}/{shard}": value
+        for stage in stages
+        for shard, value in surveyed.stage(stage.name).fingerprints.items()
     }
 
 
@@ -49,7 +49,7 @@ FIRST = stage("first", Shard("a", {"size": 1}), Shard("b", {"size": 1}))
 SECOND = stage("second", Shard("c", {}, ("first/a",)), Shard("d", {}, ("second/c",)), inputs=("first",))
 
 
-def test_fingerprint_depends_on_each_thing_that_bytes_depend_on() -> None:
+def test_fingerprint_depends_on_everything_that_bytes_depend_on() -> None:
     shard = Shard("a", {"size": 1})
 
     def of(stage: str = "s", shard: Shard = shard, code: str = "c", key: int = 1, **other: Any) -> str:
@@ -80,23 +80,23 @@ def test_changed_shard_changes_what_reads_it_and_nothing_else(tmp_path: Path) ->
 
 
 def test_unread_record_of_an_own_shard_keeps_its_reader_waiting(tmp_path: Path) -> None:
-    surveyed = survey(tmp_path, FIRST, SECOND).stage("second")
+    surveyed = inventory(tmp_path, FIRST, SECOND).stage("second")
     assert [surveyed.ready(shard) for shard in surveyed.shards] == [True, False]
 
 
 @pytest.mark.parametrize(
     ("shards", "message"),
     [
-        ((Shard("a"), Shard("a")), "malformed or stands twice"),
-        ((Shard("a.b"),), "malformed or stands twice"),
-        ((Shard(""),), "malformed or stands twice"),
-        ((Shard("a", {}, ("first/none",)),), "first/none, which is not planned before it"),
-        ((Shard("a", {}, ("second/b",)), Shard("b")), "second/b, which is not planned before it"),
+        ((Shard("a"), Shard("a")), "malformed or duplicate"),
+        ((Shard("a.b"),), "malformed or duplicate"),
+        ((Shard(""),), "malformed or duplicate"),
+        ((Shard("a", {}, ("first/none",)),), "first/none, which is not planned earlier"),
+        ((Shard("a", {}, ("second/b",)), Shard("b")), "second/b, which is not planned earlier"),
         ((Shard("a", {}, ("third/x",)),), "third is no input of second"),
     ],
 )
 def test_plan_that_breaks_its_contract_is_refused(tmp_path: Path, shards: tuple[Shard, ...], message: str) -> None:
-    surveyed = survey(tmp_path, FIRST, stage("third", Shard("x")), stage("second", *shards, inputs=("first",)))
+    surveyed = inventory(tmp_path, FIRST, stage("third", Shard("x")), stage("second", *shards, inputs=("first",)))
     with pytest.raises(ValueError, match=message):
         surveyed.stage("second")
 
@@ -109,7 +109,7 @@ def test_plan_sees_only_the_stages_and_sections_that_it_reads(tmp_path: Path) ->
         return []
 
     second = replace(stage("second", inputs=("first",)), plan=plan)
-    survey(tmp_path, FIRST, second, stage("third", config=Other)).stage("second")
+    inventory(tmp_path, FIRST, second, stage("third", config=Other)).stage("second")
     assert seen[0].shards("first") == ["a", "b"]
     assert set(seen[0].config.sections) == {"first", "second"}
     with pytest.raises(ValueError, match="stage third, which is not among its inputs"):

@@ -1,4 +1,4 @@
-"""The Makefile: its targets call the mill with what the user said, and nothing that a user says is ever run."""
+"""The Makefile: its targets call the engine with the values of variables, and never run a value."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def nasty(folder: Path) -> str:
 OPTIONS = ["--config", "c.yaml", "--out", "/data", "--seed", "7", "--workers", "3"]
 
 
-def test_dataset_is_one_call_and_each_stage_runs_after_its_inputs() -> None:
+def test_dataset_is_one_call_and_every_stage_runs_after_its_inputs() -> None:
     given = ("CONFIG=c.yaml", "OUT=/data", "WORKERS=3", "SEED=7")
     assert calls("dataset", *given) == [["-m", "pipeline", "run", *OPTIONS]]
     runs = calls("package", *given)

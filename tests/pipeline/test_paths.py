@@ -30,7 +30,7 @@ def test_a_file_that_cannot_be_written_is_named_and_leaves_nothing(tmp_path: Pat
     (tmp_path / "file").touch()
     with pytest.raises(ConfigError, match=f"{name}: cannot be written there: "):
         write_file(tmp_path / name, b"x")
-    assert sorted(each.name for each in tmp_path.rglob("*")) == ["file", "folder"]
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "folder"]
 
 
 @pytest.mark.parametrize("file", ["", "/etc/passwd", "../other/file", "a/../b", "a//b", ".work/a/file", "./a"])

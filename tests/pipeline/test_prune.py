@@ -1,4 +1,4 @@
-"""`keep: dataset`: what lies between is taken away at the end, and made again where something is to be made of it."""
+"""`keep: dataset` prunes intermediate files at the end, and rebuilds them on demand."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pipeline.status import status_lines
 from tests.pipeline.conftest import WriteConfig, made, record_times
 from tests.pipeline.toy_run import STAGES, load, run_toy_stages
 
-WORK = Path(".work/mill")
+WORK = Path(".work/toys")
 LAST = "bread"
 
 
@@ -64,7 +64,7 @@ def test_what_is_needed_again_is_made_again_and_goes_again(
     assert not between(out)
     again = {name.partition("/")[0] for name, at in record_times(out).items() if before[name] != at}
     assert {"salt", "bread", "flour", "grain"} <= again
-    assert "was let go of" in (out / WORK / "log.txt").read_text()
+    assert "was pruned" in (out / WORK / "log.txt").read_text()
 
 
 def test_keep_all_brings_it_back(tmp_path: Path, write_config: WriteConfig) -> None:
@@ -72,7 +72,7 @@ def test_keep_all_brings_it_back(tmp_path: Path, write_config: WriteConfig) -> N
     out = tmp_path / "out"
     run_toy_stages(write_config(keep="dataset"), out)
     run_toy_stages(write_config(keep="all"), out)
-    kept = {path: content for path, content in made(out).items() if not path.endswith("let-go.json")}
+    kept = {path: content for path, content in made(out).items() if not path.endswith("pruned.json")}
     assert kept == made(tmp_path / "all")
 
 
@@ -88,11 +88,11 @@ def test_a_kill_while_files_go_leaves_records_that_count(tmp_path: Path, write_c
     assert not between(out)
 
 
-def test_a_note_that_is_spoilt_costs_time_and_nothing_else(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_corrupted_listing_costs_time_and_nothing_else(tmp_path: Path, write_config: WriteConfig) -> None:
     config, out = write_config(keep="dataset"), tmp_path / "out"
     run_toy_stages(config, out)
     before = finished(out)
-    note = out / WORK / "grain/mill/let-go.json"
+    note = out / WORK / "grain/engine/pruned.json"
     os.truncate(note, 7)
     loaded = load(config)
     assert Inventory(loaded, STAGES, DatasetPaths(out, loaded.name)).stage("grain").missing

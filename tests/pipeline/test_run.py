@@ -20,7 +20,7 @@ from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from tests.pipeline.conftest import WriteConfig, made, record_times
 from tests.pipeline.toy_run import run_toy_stages
 
-WORK = Path(".work/mill")
+WORK = Path(".work/toys")
 
 
 def test_one_and_two_workers_make_the_same_bytes(tmp_path: Path, write_config: WriteConfig) -> None:
@@ -70,7 +70,7 @@ def test_rejects_are_counted_by_reason_and_listed(tmp_path: Path, write_config: 
     lines = [json.loads(line) for line in (grain / "rejects/harvest0-1.jsonl").read_text().splitlines()]
     assert [line["item"] for line in lines] == ["harvest0-1-2", "harvest0-1-5"]
     assert lines[0] == {"item": "harvest0-1-2", "reason": "hollow", "detail": "grain 2", "count": 1}
-    assert json.loads((grain / "mill/manifest.json").read_bytes())["rejects"] == {"hollow": 12}
+    assert json.loads((grain / "engine/manifest.json").read_bytes())["rejects"] == {"hollow": 12}
 
 
 def test_config_edit_rebuilds_the_stages_that_read_it_and_nothing_else(
@@ -165,15 +165,15 @@ def test_shards_that_read_nothing_of_other_stages_do_not_wait_for_them(tmp_path:
         lambda _: 0,
         uses_input=lambda _, only: only != "stone",
     )
-    stages, places = {"dough": dough, "oven": oven}, DatasetPaths(tmp_path, "mill")
-    config = Config("mill", "1.0.0", 3, {"dough": LoomsConfig(), "oven": LoomsConfig()}, tmp_path / "mill.yaml")
+    stages, places = {"dough": dough, "oven": oven}, DatasetPaths(tmp_path, "toys")
+    config = Config("toys", "1.0.0", 3, {"dough": LoomsConfig(), "oven": LoomsConfig()}, tmp_path / "toys.yaml")
     with pytest.raises(ConfigError, match="run stage dough first"):
         run_stage("oven", stages, config, places, 1)
     assert run_stage("oven", stages, config, places, 1, only="stone").made == 1
 
 
-def test_disk_too_small_is_told_before_the_start(tmp_path: Path, write_config: WriteConfig) -> None:
-    with pytest.raises(ConfigError, match=r"salt needs about 900\.0 TB .* a sample.*are free"):
+def test_disk_too_small_is_reported_before_the_start(tmp_path: Path, write_config: WriteConfig) -> None:
+    with pytest.raises(ConfigError, match=r"salt needs about 900\.0 TB .* per sample.*are free"):
         run_toy_stages(write_config(salt={"spoons": 900_000}), tmp_path / "out", "salt")
     assert not list((tmp_path / "out" / WORK / "salt").glob("*.txt"))
 
@@ -184,7 +184,7 @@ def test_parts_of_a_job_array_together_make_the_whole(tmp_path: Path, write_conf
     first = run_toy_stages(config, tmp_path / "parts", "salt", part=Slice(1, 2))["salt"]
     assert (first.made, first.left) == (3, 2)
     salt = tmp_path / "parts" / WORK / "salt"
-    assert not (salt / "mill/manifest.json").exists()
+    assert not (salt / "engine/manifest.json").exists()
     second = run_toy_stages(config, tmp_path / "parts", "salt", part=Slice(2, 2))["salt"]
     assert (second.made, second.left) == (2, 0)
     assert made(tmp_path / "parts") == made(tmp_path / "whole")
@@ -194,19 +194,19 @@ def write_nothing(task: Task) -> Outcome:
     return Outcome(0)
 
 
-def test_plan_that_answers_differently_each_time_is_refused(tmp_path: Path) -> None:
+def test_plan_that_changes_every_time_is_refused(tmp_path: Path) -> None:
     ticks = itertools.count()
     restless = Stage(
         "restless", __name__, StrictModel, (), lambda _: [Shard("a", {"tick": next(ticks)})], write_nothing, lambda _: 0
     )
-    config = Config("mill", "1.0.0", 0, {"restless": StrictModel()}, tmp_path / "mill.yaml")
-    with pytest.raises(ValueError, match="shard a was made just now, and is planned otherwise since"):
-        run_stage("restless", {"restless": restless}, config, DatasetPaths(tmp_path, "mill"), workers=1)
+    config = Config("toys", "1.0.0", 0, {"restless": StrictModel()}, tmp_path / "toys.yaml")
+    with pytest.raises(ValueError, match="shard a was just made, and its plan has changed since"):
+        run_stage("restless", {"restless": restless}, config, DatasetPaths(tmp_path, "toys"), workers=1)
 
 
 def test_published_files_follow_the_config(tmp_path: Path, write_config: WriteConfig) -> None:
     run_toy_stages(write_config(), tmp_path / "out")
-    loaves = tmp_path / "out/mill/loaves"
+    loaves = tmp_path / "out/toys/loaves"
     assert sorted(path.name for path in loaves.iterdir()) == ["0.bin", "1.bin", "2.bin", "3.bin"]
     assert loaves.joinpath("1.bin").samefile(tmp_path / "out" / WORK / "bread/loaf-harvest0-1.bin")
     (loaves / "mine.txt").write_text("a user's own")
@@ -218,7 +218,7 @@ def test_published_file_that_went_missing_is_put_back(tmp_path: Path, write_conf
     config = write_config()
     run_toy_stages(config, tmp_path / "out")
     whole = made(tmp_path / "out")
-    (tmp_path / "out/mill/loaves/0.bin").unlink()
+    (tmp_path / "out/toys/loaves/0.bin").unlink()
     run_toy_stages(config, tmp_path / "out", "bread")
     assert made(tmp_path / "out") == whole
 
@@ -237,11 +237,11 @@ def stage_of(shards: list[Shard], **more: Any) -> dict[str, Stage]:
 
 
 def weave(folder: Path, stages: dict[str, Stage], workers: int = 1, only: str = "", **section: str) -> int:
-    return run_stage("looms", stages, woven(folder, **section), DatasetPaths(folder, "mill"), workers, only=only).made
+    return run_stage("looms", stages, woven(folder, **section), DatasetPaths(folder, "toys"), workers, only=only).made
 
 
 def woven(folder: Path, **section: str) -> Config:
-    return Config("mill", "1.0.0", 0, {"looms": LoomsConfig(**section)}, folder / "mill.yaml")
+    return Config("toys", "1.0.0", 0, {"looms": LoomsConfig(**section)}, folder / "toys.yaml")
 
 
 class LoomsConfig(StrictModel):
@@ -256,15 +256,15 @@ def test_nothing_runs_beside_a_shard_that_takes_all_threads(tmp_path: Path) -> N
     spans = {name: json.loads((tmp_path / WORK / f"looms/{name}.json").read_text()) for name in threads}
     for wide in ("b", "e"):
         began, ended = spans[wide]
-        assert all(each[1] <= began or ended <= each[0] for name, each in spans.items() if name != wide)
+        assert all(span[1] <= began or ended <= span[0] for name, span in spans.items() if name != wide)
 
 
 def test_only_what_was_asked_for_is_made_with_what_it_reads(tmp_path: Path) -> None:
     shards = [Shard("wool"), Shard("sock-0", inputs=("looms/wool",)), Shard("sock-1", inputs=("looms/sock-0",))]
     stages = stage_of([*shards, Shard("sock2"), Shard("hat")])
     assert weave(tmp_path, stages, only="sock") == 3
-    assert not (tmp_path / WORK / "looms/mill/manifest.json").exists()
-    with pytest.raises(ConfigError, match=r"looms has no shards so or so-\.\.\.; there are wool, sock-0"):
+    assert not (tmp_path / WORK / "looms/engine/manifest.json").exists()
+    with pytest.raises(ConfigError, match=r"looms has no shards so or so-\.\.\.; it has wool, sock-0"):
         weave(tmp_path, stages, only="so")
     assert weave(tmp_path, stages) == 2
 
@@ -276,7 +276,7 @@ def test_stage_may_publish_what_is_whole_before_all_is_made(tmp_path: Path) -> N
     stages = stage_of([Shard("a"), Shard("b")], publish=whole, publishes_incomplete=True)
     weave(tmp_path, stages, only="a")
     assert [path.name for path in (tmp_path / "woven").iterdir()] == ["a"]
-    places = DatasetPaths(tmp_path, "mill")
+    places = DatasetPaths(tmp_path, "toys")
     assert list(corrupted_shards(woven(tmp_path), stages, places)) == [], "what nobody has asked for is no damage"
     (tmp_path / "woven/a").unlink()
     (altered,) = corrupted_shards(woven(tmp_path), stages, places)
@@ -285,7 +285,7 @@ def test_stage_may_publish_what_is_whole_before_all_is_made(tmp_path: Path) -> N
     assert sorted(path.name for path in (tmp_path / "woven").iterdir()) == ["a", "b"]
 
 
-def test_shards_that_do_not_see_their_section_are_not_made_anew_for_it(tmp_path: Path) -> None:
+def test_shards_without_their_section_are_not_rebuilt_for_it(tmp_path: Path) -> None:
     stages = stage_of([Shard("a", {"dye": "red"})], whole_section=False)
     assert weave(tmp_path, stages) == 1
     assert weave(tmp_path, stages, colour="blue") == 0

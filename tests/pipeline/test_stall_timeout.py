@@ -1,4 +1,4 @@
-"""Nothing hangs unseen: a shard without a sign of work is noticed, ended, tried again and set aside."""
+"""A stalled shard is detected, killed, retried and quarantined."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from tests.pipeline.conftest import WriteConfig
 from tests.pipeline.test_failures import alive, descendants, wait_until
 from tests.pipeline.toy_run import STAGES, load, run_toy_stages
 
-WORK = Path(".work/mill")
+WORK = Path(".work/toys")
 
 
 @pytest.fixture
 def bag(tmp_path: Path, write_config: WriteConfig) -> Job:
-    places = DatasetPaths(tmp_path / "out", "mill")
+    places = DatasetPaths(tmp_path / "out", "toys")
     places.stage("salt").make()
-    survey = Inventory(load(write_config()), STAGES, places)
-    survey.stage("salt")
-    return survey.job("salt", Shard("bag-0", {"samples": 1}))
+    inventory = Inventory(load(write_config()), STAGES, places)
+    inventory.stage("salt")
+    return inventory.job("salt", Shard("bag-0", {"samples": 1}))
 
 
 def test_shard_without_progress_is_ended_tried_again_and_set_aside_and_the_rest_is_made(
@@ -43,7 +43,7 @@ def test_shard_without_progress_is_ended_tried_again_and_set_aside_and_the_rest_
     results = run_toy_stages(
         config, tmp_path / "out", "salt", "grain", "flour", workers=2, stall_minutes=0.12, retries=1
     )
-    message = "it made no progress for 7s, and its worker was ended"
+    message = "it made no progress for 7s, and its worker was killed"
     assert results["flour"].failed == {"harvest0-1": message}
     assert results["flour"].made == 1
     assert [(tmp_path / "marks" / name).read_text() for name in ("harvest0-0", "harvest0-1")] == ["xx", "xx"]
@@ -61,34 +61,34 @@ def test_what_counts_as_progress_is_that_something_changes(bag: Job) -> None:
     (places.progress / "bag-0").write_text("1 4")
     while time.monotonic() - start < 4:
         growing.write_bytes(b"a" * int(10 * (time.monotonic() - start)))
-        assert not watch.lost_with([bag])
+        assert not watch.stalled([bag])
         time.sleep(0.1)
-    while not watch.lost_with([bag]):
+    while not watch.stalled([bag]):
         (places.progress / "bag-0").write_text("1 4")
         assert time.monotonic() - start < 20, "the same words again are no progress"
         time.sleep(0.1)
-    watch.begin_anew("bag-0")
+    watch.restart("bag-0")
     start = time.monotonic()
-    while not watch.lost_with([bag]):
+    while not watch.stalled([bag]):
         time.sleep(0.1)
-    assert time.monotonic() - start >= 1.4, "a shard that is tried again has all its time again"
+    assert time.monotonic() - start >= 1.4, "a retried shard has its full time"
 
 
 def test_timeout_of_0_never_ends_a_shard(bag: Job) -> None:
     watch = StallWatch(0, bag.paths.stage("salt"))
     time.sleep(0.6)
-    assert not watch.lost_with([bag])
+    assert not watch.stalled([bag])
 
 
-def test_time_in_which_the_mill_was_stopped_is_not_counted(bag: Job) -> None:
+def test_time_in_which_the_engine_was_stopped_does_not_count(bag: Job) -> None:
     watch = StallWatch(0.05, bag.paths.stage("salt"))
-    watch.lost_with([bag])
+    watch.stalled([bag])
     time.sleep(4)
-    assert not watch.lost_with([bag])
+    assert not watch.stalled([bag])
 
 
 def test_idle_worker_that_was_stopped_does_not_hold_the_end(bag: Job, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(workers, "_SECONDS_TO_GO", 0.5)
+    monkeypatch.setattr(workers, "_EXIT_SECONDS", 0.5)
     crew, before = Workers(1, bag.paths.worker_output), descendants(os.getpid())
     crew.submit(bag)
     assert [report and report.status for _, report in crew.finished(None)] == ["done"]

@@ -77,9 +77,7 @@ def test_record_names_the_bytes_that_were_read(make: Callable[[Body], Report], t
     assert record.inputs == {"earlier/in.txt": FLOUR_DIGEST}
 
 
-def test_damaged_input_is_named_and_nothing_is_committed_whatever_the_stage_makes_of_it(
-    make: Callable[[Body], Report], tmp_path: Path
-) -> None:
+def test_corrupted_input_is_named_and_nothing_is_committed(make: Callable[[Body], Report], tmp_path: Path) -> None:
     def reads(task: Task) -> Outcome:
         return Outcome(len(task.input("earlier", "in.txt").read_bytes()))
 
@@ -92,10 +90,10 @@ def test_damaged_input_is_named_and_nothing_is_committed_whatever_the_stage_make
     source.write_text("floor")
     for body in (reads, goes_on):
         report = make(body)
-        assert (report.status, report.damaged) == ("damaged", "earlier/in")
-        assert report.message == "earlier/in.txt is damaged: its sha256 is not the one in its record"
+        assert (report.status, report.corrupted) == ("corrupted", "earlier/in")
+        assert report.message == "earlier/in.txt is corrupted: its sha256 is not the one in its record"
     source.unlink()
-    assert make(reads).message == "earlier/in.txt is damaged: the file is gone"
+    assert make(reads).message == "earlier/in.txt is corrupted: the file is missing"
     assert not [path for path in own(tmp_path).rglob("*") if path.is_file()]
 
 
@@ -147,7 +145,7 @@ def test_random_stream_depends_on_the_decision_alone(make: Callable[[Body], Repo
         (FileNotFoundError(errno.ENOENT, "none"), "failed"),
     ],
 )
-def test_each_failure_has_its_status_and_leaves_nothing(
+def test_every_failure_has_its_status_and_leaves_nothing(
     make: Callable[[Body], Report], tmp_path: Path, error: BaseException, status: str
 ) -> None:
     def body(task: Task) -> Outcome:

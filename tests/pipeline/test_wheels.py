@@ -57,10 +57,10 @@ def dynamic_names(path: Path) -> tuple[set[str], set[str]]:
     table, size, count = *struct.unpack_from("<Q", content, 32), *struct.unpack_from("<HH", content, 54)
     headers = [struct.unpack_from("<IIQQQQQQ", content, table + size * index) for index in range(count)]
     known, needed = {path.name}, set()
-    for _, _, start, _, _, length, *_ in (each for each in headers if each[0] == 2):
+    for _, _, start, _, _, length, *_ in (header for header in headers if header[0] == 2):
         entries = [struct.unpack_from("<QQ", content, start + 16 * index) for index in range(length // 16)]
         address = dict(entries)[5]
-        segment = next(each for each in headers if each[0] == 1 and each[3] <= address < each[3] + each[5])
+        segment = next(header for header in headers if header[0] == 1 and header[3] <= address < header[3] + header[5])
         names = segment[2] + address - segment[3]
         for tag, value in entries:
             text = content[names + value : content.find(b"\0", names + value)].decode() if tag in (1, 14) else ""
@@ -74,7 +74,7 @@ def dynamic_names(path: Path) -> tuple[set[str], set[str]]:
 def test_what_is_pinned_is_all_that_the_code_asks_for_and_all_that_this_needs() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"].values()
-    asked = [Requirement(each) for each in (*project["dependencies"], *(each for extra in extras for each in extra))]
+    asked = [Requirement(item) for item in (*project["dependencies"], *(item for extra in extras for item in extra))]
     versions, reached = pinned(), set()
     while asked:
         requirement = asked.pop()
@@ -83,11 +83,11 @@ def test_what_is_pinned_is_all_that_the_code_asks_for_and_all_that_this_needs() 
         found = distribution(name)
         assert found.version.partition("+")[0] == versions[name]
         assert requirement.specifier.contains(found.version), f"{requirement}, and {found.version} is installed"
-        for extra in {"", *requirement.extras} - {each for known, each in reached if known == name}:
+        for extra in {"", *requirement.extras} - {item for known, item in reached if known == name}:
             reached.add((name, extra))
-            wanted = [Requirement(each) for each in found.requires or ()]
-            wanted = [each for each in wanted if each.marker is None or each.marker.evaluate({"extra": extra})]
-            asked += [each for each in wanted if not each.name.startswith(FOR_CARDS)]
+            wanted = [Requirement(item) for item in found.requires or ()]
+            wanted = [item for item in wanted if item.marker is None or item.marker.evaluate({"extra": extra})]
+            asked += [item for item in wanted if not item.name.startswith(FOR_CARDS)]
     assert {name for name, _ in reached} == set(versions), "requirements.lock pins what nothing asks for"
 
 

@@ -77,7 +77,7 @@ def test_report_names_config_sections_changed_since_the_dataset(tmp_path: Path) 
     facts = {"name": "d", "version": "1.0.0", "seed": 1, "samples": 3, "kits": {"castle": 3}, "splits": {"train": 3}}
     for edges, is_changed in (("all", False), ("tree", True)):
         sections["strings"]["edges"] = edges
-        manifest = {**facts, "made_with": {"shapemill": "0.1.0+abc"}, "config": sections}
+        manifest = {**facts, "software": {"shapemill": "0.1.0+abc"}, "config": sections}
         (run.folder / "manifest.json").write_text(json.dumps(manifest))
         page = report_html(load_dataset_run(run.config.path, tmp_path), [], {}, datetime.now(UTC))
         assert ("Changed since then" in page and "sections of the config: strings" in page) == is_changed

@@ -1,1 +1,1 @@
-"""Four stages of a real mill, small enough to see through, that fail in every way when their config says so."""
+"""Four small stages of a pipeline that fail in every way when their config asks for it."""

@@ -29,10 +29,10 @@ def members(root: Path) -> dict[str, bytes]:
     found = {}
     for path in sorted(root.glob("*.tar")):
         with tarfile.open(path) as archive:
-            for each in archive:
-                stream = archive.extractfile(each)
+            for item in archive:
+                stream = archive.extractfile(item)
                 assert stream is not None
-                found[each.name] = stream.read()
+                found[item.name] = stream.read()
     return found
 
 

@@ -37,7 +37,7 @@ def tally(*legs: int) -> dict[str, dict[str, Any]]:
 
 def test_shapes_and_parts_are_added_up_by_split() -> None:
     table = count_classes(CLASSES, [("train", tally(3, 4)), ("train", tally(3)), ("test", tally(5))])
-    assert [(each["shapes"], each["parts"]) for each in table] == [
+    assert [(item["shapes"], item["parts"]) for item in table] == [
         ({"train": 3, "test": 1}, {"train": 10, "test": 5}),
         ({"train": 3, "test": 1}, {"train": 3, "test": 1}),
         ({"train": 0, "test": 0}, {"train": 0, "test": 0}),
@@ -47,7 +47,7 @@ def test_shapes_and_parts_are_added_up_by_split() -> None:
 
 def test_a_class_has_the_colour_of_its_source_or_of_its_first_part() -> None:
     table = count_classes(CLASSES, [("train", tally(3))])
-    assert [each["color"] for each in table] == ["#966432", "#00c800", "#a0a0a0", "#0102ff"]
+    assert [item["color"] for item in table] == ["#966432", "#00c800", "#a0a0a0", "#0102ff"]
 
 
 def test_the_table_is_json_with_a_line_for_each_class() -> None:

@@ -66,7 +66,7 @@ def test_tar_entries_carry_neither_time_nor_user(toy_folder: Path) -> None:
 def test_the_json_has_the_same_fields_in_each_sample_and_nothing_empty(toy_folder: Path) -> None:
     def shape(value: object) -> object:
         if isinstance(value, dict):
-            return {name: shape(each) for name, each in value.items()}
+            return {name: shape(item) for name, item in value.items()}
         return [shape(value[0])] if isinstance(value, list) else type(value).__name__
 
     records = [json.loads(members["json"]) for members in all_samples(toy_folder).values()]
@@ -101,11 +101,11 @@ def test_the_json_says_what_the_collection_holds(toy_folder: Path) -> None:
 def test_classes_are_listed_with_what_has_them_by_split(toy_folder: Path) -> None:
     """Counted anew from the records; the ids are the places in the list, the colours those of the kits' types."""
     table = json.loads((toy_folder / "classes.json").read_text())
-    assert [each["id"] for each in table] == list(range(4))
-    assert [(each["name"], each["kit"]) for each in table] == [
+    assert [item["id"] for item in table] == list(range(4))
+    assert [(item["name"], item["kit"]) for item in table] == [
         (name, kit) for kit in ("blocks", "planks") for name in ("tower", "long.wall")
     ]
-    assert [each["color"] for each in table] == ["#c82828", "#2828c8"] * 2
+    assert [item["color"] for item in table] == ["#c82828", "#2828c8"] * 2
     shapes, parts = Counter[tuple[int, str]](), Counter[tuple[int, str]]()
     for members in all_samples(toy_folder).values():
         record = json.loads(members["json"])
@@ -115,9 +115,9 @@ def test_classes_are_listed_with_what_has_them_by_split(toy_folder: Path) -> Non
         shapes.update((number, record["split"]) for number in set(own))
         parts.update((number, record["split"]) for number in own)
         assert set(bytes_array(members["labels.npy"]).tolist()) <= set(own)
-    for each in table:
-        assert each["shapes"] == {split: shapes[each["id"], split] for split in SPLITS}
-        assert each["parts"] == {split: parts[each["id"], split] for split in SPLITS}
+    for item in table:
+        assert item["shapes"] == {split: shapes[item["id"], split] for split in SPLITS}
+        assert item["parts"] == {split: parts[item["id"], split] for split in SPLITS}
     named = json.loads((toy_folder / "manifest.json").read_text())["classes"]
     assert named == {"path": "classes.json", "count": 4, "sha256": file_digest(toy_folder / "classes.json")}
 
@@ -188,7 +188,7 @@ def test_the_card_has_what_hugging_face_asks_for(toy_folder: Path) -> None:
     assert {"task_categories", "tags"} <= set(header)
     (only,) = header["configs"]
     assert only["config_name"] == "default"
-    assert {each["split"]: each["path"] for each in only["data_files"]} == {
+    assert {item["split"]: item["path"] for item in only["data_files"]} == {
         split: f"data/{split}/*.tar" for split in SPLITS
     }
     assert "](preview.png)" in text

@@ -120,7 +120,7 @@ def test_the_shape_in_a_glb_is_the_one_that_was_written() -> None:
     assert set(read.labels) == {"tower", "long.wall"}
     for part, name in enumerate(shape.part_names):
         found = read.part_names.index(name)
-        mesh, written = (each.meshes[each.assembly.types[at]] for each, at in ((read, found), (shape, part)))
+        mesh, written = (item.meshes[item.assembly.types[at]] for item, at in ((read, found), (shape, part)))
         assert mesh.name == written.name
         np.testing.assert_allclose(mesh.face_colors.astype(int), written.face_colors, atol=2)
         triangles = transform_points(read.assembly.poses[found], mesh.vertices)[mesh.faces]

@@ -105,7 +105,7 @@ def test_hugging_face_datasets_loads_every_split_with_typed_members(toy_folder: 
     assert features["labels.npy"] == features["instances.npy"] == "List(Value('int16'))"
     assert features["contacts.npy"] == found["types"] == "List(List(Value('int32')))"
     stored = {key: members for path in toy_folder.rglob("*.tar") for key, members in read_shard(path)}
-    assert found["contacts"] == {key: bytes_array(each["contacts.npy"]).tolist() for key, each in stored.items()}
+    assert found["contacts"] == {key: bytes_array(item["contacts.npy"]).tolist() for key, item in stored.items()}
     assert [[], []] in found["contacts"].values()
     assert features["txt"] == "Value('string')"
     assert "null" not in features["json"]
@@ -151,7 +151,7 @@ def test_mlcroissant_validates_without_error_or_warning_and_yields_every_member(
     assert croissant["issues"] == []
     assert croissant["version"].endswith("V_1_1")
     listed = json.loads((toy_folder / "classes.json").read_text())
-    known = [{name: each[name] for name in ("id", "name", "kit", "color")} for each in listed]
+    known = [{name: item[name] for name in ("id", "name", "kit", "color")} for item in listed]
     assert croissant["records"]["classes"] == known
     stored = {key: members for path in toy_folder.rglob("*.tar") for key, members in read_shard(path)}
     members = {member.partition(".")[0]: member for member in next(iter(stored.values()))}
@@ -163,7 +163,7 @@ def test_mlcroissant_validates_without_error_or_warning_and_yields_every_member(
         *(f"{name}-of-samples" for name in members),
     }
     for name, member in members.items():
-        records = {each["key"]: each["content"] for each in croissant["records"][name]}
+        records = {item["key"]: item["content"] for item in croissant["records"][name]}
         assert set(records) == set(stored)
         for key, content in records.items():
             size = len(stored[key][member])
@@ -172,13 +172,15 @@ def test_mlcroissant_validates_without_error_or_warning_and_yields_every_member(
 
 def test_mlcroissant_knows_splits_types_and_shapes(toy_folder: Path, croissant: dict[str, Any]) -> None:
     records = croissant["records"]
-    assert {each["name"] for each in records["splits"]} == set(SPLITS)
+    assert {record["name"] for record in records["splits"]} == set(SPLITS)
     split_of = {key: split for split in SPLITS for key in toy_keys(split)}
-    assert {each["key"]: each["split"] for each in records["samples"]} == split_of
+    assert {record["key"]: record["split"] for record in records["samples"]} == split_of
     rows = pyarrow.parquet.read_table(toy_folder.parent / "toy-index" / "toy.parquet").to_pylist()
-    assert {each["key"]: each["rooted"] for each in records["samples"]} == {row["key"]: row["rooted"] for row in rows}
+    assert {record["key"]: record["rooted"] for record in records["samples"]} == {
+        row["key"]: row["rooted"] for row in rows
+    }
     for joined in ("points-of-samples", "sketch0-of-samples", "json-of-samples"):
-        assert {each["key"]: each["split"] for each in records[joined]} == split_of
+        assert {record["key"]: record["split"] for record in records[joined]} == split_of
     shape, (text, element) = croissant["shapes"]["points/content"]
     assert (shape, text.rpartition("/")[2], element.rpartition("/")[2]) == ([POINTS, 3], "Text", "Float32")
     assert croissant["shapes"]["contacts-of-samples/content"][0] == [2, -1]

@@ -62,4 +62,4 @@ def test_what_breaks_it_is_named(
 
 @pytest.mark.parametrize("record", [[], None, "x", 3])
 def test_what_is_no_record_at_all_is_named(toy_folder: Path, record: object) -> None:
-    assert any("the whole" in each for each in faults(toy_folder, record))
+    assert any("the whole" in fault for fault in faults(toy_folder, record))

@@ -114,7 +114,12 @@ REFUSED = "planks-00011"
 
 def toy_keys(split: str, shards: int = 4) -> list[str]:
     """The keys of a split of the finished dataset, in order."""
-    return [each.key for index in range(shards) for each in toy_samples(split, index, 2) if each.key != REFUSED]
+    return [
+        toy_sample.key
+        for index in range(shards)
+        for toy_sample in toy_samples(split, index, 2)
+        if toy_sample.key != REFUSED
+    ]
 
 
 class ToyConfig(StrictModel):

@@ -384,9 +384,9 @@ def reseal(folder: Path) -> None:
         croissant = json.loads((folder / "croissant.json").read_text())
         digests = {shard["path"]: shard["sha256"] for shard in manifest["shards"]}
         digests[INDEX] = manifest["index"]["sha256"]
-        for each in croissant["distribution"]:
-            if each["@id"] in digests:
-                each["sha256"] = digests[each["@id"]]
+        for item in croissant["distribution"]:
+            if item["@id"] in digests:
+                item["sha256"] = digests[item["@id"]]
         (folder / "croissant.json").write_text(json.dumps(croissant, indent=1, ensure_ascii=False) + "\n")
         manifest["files"]["croissant.json"] = file_digest(folder / "croissant.json")
         (folder / "manifest.json").write_text(json.dumps(manifest, indent=1, ensure_ascii=False) + "\n")
@@ -411,7 +411,7 @@ def forge(folder: Path, name: str, rng: np.random.Generator) -> str:
     places = [(path, key) for path, samples in shards.items() for key in samples]
     path, key = places[int(rng.integers(len(places)))]
     members, others = shards[path][key], [shards[p][k] for p, k in places if k != key]
-    differing = [each for each in others if each["txt"] != members["txt"] and each["glb"] != members["glb"]]
+    differing = [other for other in others if other["txt"] != members["txt"] and other["glb"] != members["glb"]]
     it = Forged(dict(members), differing[int(rng.integers(len(differing)))], rng)
     FORGERIES[name](it)
     if it.members == members:

@@ -48,7 +48,7 @@ def rewrite(folder: Path, file: str, change: Callable[[str], str]) -> None:
 def test_a_finished_dataset_is_good(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert verified(folder, "--samples", "0") == 0
     printed = capsys.readouterr().out
-    assert "23 looked at   good" in printed
+    assert "23 checked   good" in printed
     assert "faults" not in printed
 
 
@@ -129,7 +129,7 @@ def test_geometry_of_random_samples_is_computed_again_from_their_meshes(
     toy_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert verified(toy_folder, "--samples", "10") == 0
-    assert "geometry              10 looked at   good" in capsys.readouterr().out
+    assert "geometry              10 checked   good" in capsys.readouterr().out
 
 
 def test_a_contact_that_the_meshes_do_not_have_is_found(toy_folder: Path, tmp_path: Path) -> None:
@@ -142,7 +142,7 @@ def test_a_contact_that_the_meshes_do_not_have_is_found(toy_folder: Path, tmp_pa
     from tests.stages.package.toy import toy_kit
 
     samples = [members for path in toy_folder.rglob("*.tar") for _, members in read_shard(path)]
-    members = next(each for each in samples if json.loads(each["json"])["counts"]["parts"] == 3)
+    members = next(sample for sample in samples if json.loads(sample["json"])["counts"]["parts"] == 3)
     record = json.loads(members["json"])
     kit = toy_kit(record["kit"])
     assert geometry_faults(kit, members) == []
@@ -159,7 +159,7 @@ def test_the_dataset_can_be_named_by_its_config(
     config.write_text("name: toy\nprograms: {program: chair}\n")
     verified("--config", config, "--out", toy_folder.parent, "--samples", "0")
     printed = capsys.readouterr().out
-    assert "looked at   good" in printed
+    assert "checked   good" in printed
     assert "faults" not in printed
 
 
@@ -186,9 +186,7 @@ def test_what_the_stages_made_gives_away_what_no_look_at_the_sample_could(toy_fo
     assert not verify_dataset(folder, 0, 0).faults
     key = forge(folder, "the sketch of another sample", np.random.default_rng(1))
     faults = verify_dataset(folder, 0, 0).faults["samples"]
-    assert any(
-        each.endswith(f"{key}: sketch0.png is not the one that stage sketches has made for it") for each in faults
-    )
+    assert any(fault.endswith(f"{key}: sketch0.png is not the one that stage sketches made for it") for fault in faults)
 
 
 def test_a_dataset_without_its_kits_says_what_it_could_not_look_at(
@@ -197,7 +195,7 @@ def test_a_dataset_without_its_kits_says_what_it_could_not_look_at(
     for name in ("toy", "toy-index"):
         shutil.copytree(toy_folder.parent / name, tmp_path / name)
     assert verified(tmp_path / "toy") == 0
-    assert "not looked at: 12 samples: kit blocks is not beside the dataset" in capsys.readouterr().out
+    assert "not checked: 12 samples: kit blocks is not beside the dataset" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("moved", "same"), [(1e-7, True), (1e-4, False)])

@@ -27,7 +27,7 @@ def run_shard(task: Task) -> Outcome:
 
     def masses(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
         shape = collection.shape(sample)
-        volumes = np.array([np.ptp(each.vertices, axis=0).prod() for each in shape.meshes])
+        volumes = np.array([np.ptp(mesh.vertices, axis=0).prod() for mesh in shape.meshes])
         mass = (density * volumes[shape.assembly.types]).astype(np.float32)
         return {"mass.npy": array_bytes(mass), "json": json_bytes({"total_mass": round(float(mass.sum()), 4)})}
 

@@ -20,7 +20,7 @@ LABELS = ("foot", "pebble")
 
 def heap(text: str) -> Shape:
     """The heap of a text."""
-    heights = np.array([float(each) for each in text.split()])
+    heights = np.array([float(word) for word in text.split()])
     color = np.full((12, 3), 120, np.uint8)
     meshes = tuple(PartMesh(LABELS[min(k, 1)], CORNERS * (1, h, 1), FACES, color) for k, h in enumerate(heights))
     poses = np.tile(np.eye(4), (len(heights), 1, 1))
