@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 import trimesh
 
-from shipped_kits.kit_shape import Layout, glb_bytes
+from shipped_kits.kit_shape import KitShape, glb_bytes
 from shipped_kits.solids import box, revolved
 
 BROWN, DARK = (146, 103, 66), (66, 62, 70)
 
 
-def small_shape() -> Layout:
+def small_shape() -> KitShape:
     post = revolved([(0.5, 0.0), (0.5, 1.0), (0.0, 2.0)], 6, [BROWN, DARK])
-    layout = Layout({"post": post, "slab": box((2.0, 0.5, 1.0), (0.0, 0.0, 0.0), DARK)})
-    layout.put("post", 0.0, 0.0, 0.0)
-    layout.put("slab", 0.0, -0.5, 0.0)
-    layout.put("post", 3.0, 1.0, 0.0, 90.0)
-    return layout
+    shape = KitShape({"post": post, "slab": box((2.0, 0.5, 1.0), (0.0, 0.0, 0.0), DARK)})
+    shape.put("post", 0.0, 0.0, 0.0)
+    shape.put("slab", 0.0, -0.5, 0.0)
+    shape.put("post", 3.0, 1.0, 0.0, 90.0)
+    return shape
 
 
 def test_parts_are_nodes_named_by_type_that_share_one_mesh_a_type() -> None:
@@ -48,6 +48,6 @@ def test_the_same_shape_gives_the_same_bytes() -> None:
     assert glb_bytes(small_shape()) == glb_bytes(small_shape())
 
 
-def test_a_part_of_an_unknown_type_is_refused() -> None:
+def test_part_of_unknown_type_is_rejected() -> None:
     with pytest.raises(KeyError, match="tower"):
         small_shape().put("tower", 0.0, 0.0, 0.0)

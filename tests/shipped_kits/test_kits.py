@@ -1,4 +1,4 @@
-"""What the shipped kits promise, measured with FCL and trimesh instead of the project's own contact test."""
+"""Properties of the shipped kits, measured with FCL and trimesh instead of the project's own contact test."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 import trimesh
 
 from shipped_kits.catalogue import KITS, write_kits
-from shipped_kits.kit_shape import Layout
+from shipped_kits.kit_shape import KitShape
 from stages.exemplars.congruence import comparable_mesh, congruences
 from stages.shape.arrays import FloatArray, IntArray
 
@@ -22,13 +22,13 @@ COMMITTED = Path(__file__).parents[2] / "datasets" / "exemplars"
 
 
 @cache
-def kit_shapes(kit: str) -> dict[str, Layout]:
+def kit_shapes(kit: str) -> dict[str, KitShape]:
     return KITS[kit]()
 
 
 @cache
 def part_mesh(kit: str, name: str) -> tuple[FloatArray, IntArray]:
-    """Vertices merged by position, as a reader of the file merges them."""
+    """Return vertices merged by position, as a reader of the file merges them."""
     solid = next(iter(kit_shapes(kit).values())).types[name]
     vertices, faces, _ = solid.mesh()
     distinct, inverse = np.unique(vertices.astype(np.float32), axis=0, return_inverse=True)
@@ -37,7 +37,7 @@ def part_mesh(kit: str, name: str) -> tuple[FloatArray, IntArray]:
 
 @cache
 def shape_graph(kit: str, shape: str) -> tuple[nx.Graph, float, list[float]]:
-    """The contact graph with types as node attributes, the contact tolerance, and distances of pairs out of contact."""
+    """Return the contact graph with types as node attributes, the tolerance, and distances of other pairs."""
     placed = kit_shapes(kit)[shape].placed
     diagonals = [float(np.linalg.norm(np.ptp(part_mesh(kit, name)[0], axis=0))) for name, _ in placed]
     tolerance = 1e-3 * float(np.median(diagonals))
@@ -69,7 +69,7 @@ def shape_graph(kit: str, shape: str) -> tuple[nx.Graph, float, list[float]]:
 
 
 def neighbourhoods(graph: nx.Graph) -> set[tuple[str, tuple[tuple[str, int], ...]]]:
-    """What was seen around the parts: each part's type with the multiset of its neighbours' types."""
+    """Return the type of each part with the multiset of its neighbours' types."""
     types = nx.get_node_attributes(graph, "type")
     return {(types[i], tuple(sorted(Counter(types[j] for j in graph[i]).items()))) for i in graph}
 
@@ -92,10 +92,10 @@ def test_every_shell_of_a_part_is_closed_and_right_side_out(kit: str, name: str)
 
 
 @pytest.mark.parametrize(("kit", "name"), PARTS)
-def test_no_part_looks_the_same_upside_down_or_on_its_side(kit: str, name: str) -> None:
+def test_no_part_equals_itself_upside_down_or_on_its_side(kit: str, name: str) -> None:
     own = comparable_mesh(*part_mesh(kit, name))
-    for motion in congruences(own, own, 1e-3, reflections=False):
-        assert motion[:3, 1] == pytest.approx([0.0, 1.0, 0.0], abs=1e-3)
+    for transform in congruences(own, own, 1e-3, reflections=False):
+        assert transform[:3, 1] == pytest.approx([0.0, 1.0, 0.0], abs=1e-3)
 
 
 @pytest.mark.parametrize(("kit", "shape"), SHAPES)
@@ -109,13 +109,13 @@ def test_a_shape_is_one_piece_with_loops_and_branches_and_no_hub(kit: str, shape
 
 
 @pytest.mark.parametrize(("kit", "shape"), SHAPES)
-def test_parts_either_touch_or_stand_well_clear_of_each_other(kit: str, shape: str) -> None:
+def test_parts_touch_or_keep_a_clear_distance(kit: str, shape: str) -> None:
     _, tolerance, gaps = shape_graph(kit, shape)
     assert min(gaps, default=np.inf) >= 10 * tolerance
 
 
 @pytest.mark.parametrize("kit", KITS)
-def test_two_shapes_share_most_types_and_each_shows_something_of_its_own(kit: str) -> None:
+def test_two_shapes_share_most_types_and_have_own_neighbourhoods(kit: str) -> None:
     (_, first), (_, second) = ((shape, shape_graph(kit, shape)[0]) for shape in kit_shapes(kit))
     types = [set(nx.get_node_attributes(graph, "type").values()) for graph in (first, second)]
     all_types = types[0] | types[1]
@@ -128,9 +128,9 @@ def test_two_shapes_share_most_types_and_each_shows_something_of_its_own(kit: st
     assert seen[1] - seen[0]
 
 
-def test_the_committed_files_are_what_the_code_makes(tmp_path: Path) -> None:
-    made = {path.relative_to(tmp_path): path.read_bytes() for path in write_kits(tmp_path)}
+def test_committed_files_equal_those_of_the_code(tmp_path: Path) -> None:
+    written = {path.relative_to(tmp_path): path.read_bytes() for path in write_kits(tmp_path)}
     committed = {path.relative_to(COMMITTED): path.read_bytes() for path in sorted(COMMITTED.rglob("*.glb"))}
-    assert sorted(made) == sorted(committed)
-    assert [path for path in made if made[path] != committed[path]] == []
+    assert sorted(written) == sorted(committed)
+    assert [path for path in written if written[path] != committed[path]] == []
     assert sum(map(len, committed.values())) < 1_500_000

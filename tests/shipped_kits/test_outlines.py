@@ -15,7 +15,7 @@ def area(outline: FloatArray) -> float:
 
 
 def triangle_areas(points: FloatArray, triangles: list[tuple[int, int, int]]) -> FloatArray:
-    return np.array([area(points[list(each)]) for each in triangles])
+    return np.array([area(points[list(triangle)]) for triangle in triangles])
 
 
 def test_outlines_are_counter_clockwise_and_of_the_size_they_say() -> None:
@@ -58,7 +58,7 @@ def test_holes_in_a_row_are_all_left_open() -> None:
     assert areas.sum() == pytest.approx(8.0 - 4 * 0.25)
 
 
-def test_holes_beside_each_other_in_a_corner_are_all_left_open() -> None:
+def test_neighbouring_holes_in_a_corner_are_all_left_open() -> None:
     triangle = np.array([(-1.5, 0.0), (1.5, 0.0), (0.0, 0.8)])
     holes = [regular(8, 0.2) + np.array([0.0, 0.3]), regular(6, 0.11) + np.array([-0.58, 0.14])]
     holes.append(holes[1] + np.array([1.16, 0.0]))
@@ -69,7 +69,7 @@ def test_holes_beside_each_other_in_a_corner_are_all_left_open() -> None:
     assert areas.sum() == pytest.approx(area(triangle) - sum(area(hole) for hole in holes))
 
 
-def test_an_outline_that_crosses_itself_or_runs_clockwise_is_refused() -> None:
+def test_outline_that_crosses_itself_or_runs_clockwise_is_rejected() -> None:
     bow_tie = np.array([(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)])
     for points in (bow_tie, rectangle(1.0, 1.0)[::-1]):
         with pytest.raises(ValueError, match="crosses itself or runs clockwise"):

@@ -16,13 +16,13 @@ def volume(solid: Solid) -> float:
 
 
 def is_closed(solid: Solid) -> bool:
-    """Whether every directed edge is met by exactly one in the other direction."""
+    """Return whether every directed edge meets exactly one in the other direction."""
     _, faces, _ = solid.mesh()
     edges = [tuple(edge) for face in faces.tolist() for edge in zip(face, face[1:] + face[:1], strict=True)]
     return len(set(edges)) == len(edges) and all((b, a) in set(edges) for a, b in edges)
 
 
-def test_a_box_stands_on_the_point_it_is_put_at() -> None:
+def test_box_rests_on_its_position() -> None:
     solid = box((2.0, 3.0, 4.0), (1.0, 5.0, -1.0), RED)
     assert solid.points.min(axis=0) == pytest.approx([0.0, 5.0, -3.0])
     assert solid.points.max(axis=0) == pytest.approx([2.0, 8.0, 1.0])
@@ -51,7 +51,7 @@ def test_a_swept_bend_keeps_its_width() -> None:
     assert volume(elbow) == pytest.approx(4.0, abs=1e-5)
 
 
-def test_an_inset_takes_away_what_it_is_deep_and_a_boss_adds_it() -> None:
+def test_inset_removes_its_volume_and_boss_adds_it() -> None:
     block = box((2.0, 2.0, 2.0), (0.0, 0.0, 0.0), RED)
     pocket = block.inset((0.0, 1.0, 1.0), rectangle(1.0, 0.5), 0.5, BLUE)
     assert is_closed(pocket)
@@ -69,12 +69,12 @@ def test_an_inset_may_lie_in_the_floor_of_another() -> None:
     assert volume(deeper) == pytest.approx(64.0 - 4.0 - 1.0)
 
 
-def test_an_inset_beside_the_solid_is_refused() -> None:
+def test_inset_outside_the_solid_is_rejected() -> None:
     with pytest.raises(ValueError, match="no face"):
         box((2.0, 2.0, 2.0), (0.0, 0.0, 0.0), RED).inset((0.0, 1.0, 1.5), rectangle(1.0, 0.5), 0.5, BLUE)
 
 
-def test_an_outline_stands_upright_and_to_the_right_as_seen_from_outside() -> None:
+def test_outline_is_upright_and_to_the_right_as_seen_from_outside() -> None:
     block = box((2.0, 2.0, 2.0), (0.0, 0.0, 0.0), RED)
     outline = np.array([(0.1, 0.2), (0.5, 0.2), (0.5, 0.3)])
     front = block.inset((0.0, 1.0, 1.0), outline, -0.25, BLUE).points[-3:]
@@ -83,13 +83,13 @@ def test_an_outline_stands_upright_and_to_the_right_as_seen_from_outside() -> No
     assert top == pytest.approx(np.array([(0.1, 2.25, -0.2), (0.5, 2.25, -0.2), (0.5, 2.25, -0.3)]))
 
 
-def test_each_band_has_its_colour_and_caps_have_that_of_their_band() -> None:
+def test_bands_have_their_colours_and_caps_that_of_their_band() -> None:
     _, faces, colors = revolved([(1.0, 0.0), (1.0, 1.0), (0.5, 2.0)], 4, [RED, BLUE]).mesh()
     assert len(faces) == len(colors) == 8 + 8 + 2 + 2
     assert sorted(map(tuple, colors.tolist())) == [BLUE] * 10 + [RED] * 10
 
 
-def test_too_few_colours_are_refused() -> None:
+def test_too_few_colours_are_rejected() -> None:
     with pytest.raises(ValueError, match="1 colours for 2 bands"):
         revolved([(1.0, 0.0), (1.0, 1.0), (0.5, 2.0)], 4, [RED])
 

@@ -6,7 +6,7 @@ from shipped_kits.strictness_figure import DOOR, FLOOR, OBSERVED, REFUSED, WALL,
 from stages.shape.graphs.neighbourhoods import STRICTNESS
 
 
-def test_each_level_shows_what_it_adds_and_none_shows_what_is_refused() -> None:
+def test_levels_show_what_they_add_and_nothing_that_is_refused() -> None:
     levels = dict(newly_admitted())
     assert tuple(levels) == STRICTNESS
     assert set(levels["multiset"]) == set(OBSERVED)

@@ -15,7 +15,7 @@ from stages.symmetry.surface.grid import CELLS_PER_RADIUS, SurfaceGrid, surface_
 from tests.stages.grammars.scanned import scanned
 from tests.stages.symmetry.planted import area, box, shift, wall
 
-SHARE = 0.03
+RADIUS_SHARE = 0.03
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -49,7 +49,7 @@ class TestRows:
         Grids are cut from the left or the right, and from above or below.
         """
         whole = area(wall(windows, storeys))
-        grid = surface_grid(wall(windows, storeys), SHARE)
+        grid = surface_grid(wall(windows, storeys), RADIUS_SHARE)
         pieces = find_docked_pieces(grid, candidate_transforms(grid, 24, UP))
         bay = (whole - area(wall(windows - 1, storeys))) / whole
         wanted = [(bay, windows, 2)]
@@ -75,7 +75,7 @@ class TestRows:
 
 class TestSites:
     def test_site_moved_by_a_bay_separates_one_bay_more(self) -> None:
-        grid = surface_grid(wall(4), SHARE)
+        grid = surface_grid(wall(4), RADIUS_SHARE)
         cells = cut_at(grid, 2.6)
         after = separated_cells(grid, cells, surrounding_cells(grid, cells), shift(-1, 0, 0))
         assert after is not None
@@ -94,7 +94,7 @@ class TestSites:
         bar = box((-4.0, 0.0, 0.0), (-1.0, 0.2, 0.2))
         ring = [box((0, 0, 0), (3, 0.2, 0.2)), box((0, 0, 2), (3, 0.2, 2.2))]
         sides = [box((0, 0, 0.2), (0.2, 0.2, 2)), box((2.8, 0, 0.2), (3, 0.2, 2))]
-        grid = surface_grid(np.concatenate([bar, *ring, *sides]), SHARE)
+        grid = surface_grid(np.concatenate([bar, *ring, *sides]), RADIUS_SHARE)
         x = grid.origin[0] + grid.cell_size * (grid.cells[:, 0] + 0.5)
         cells = np.flatnonzero((x > -2.5) & (x < -0.5)).astype(np.int32)
         border = surrounding_cells(grid, cells)
@@ -112,13 +112,13 @@ class TestSites:
         assert len(corner_cells(surface_grid(sheet, 0.2))) == 4
 
     def test_translation_of_margins_onto_margins_maps_no_corners(self) -> None:
-        grid = surface_grid(wall(3), SHARE)
+        grid = surface_grid(wall(3), RADIUS_SHARE)
         corners = corner_cells(grid)
         assert maps_enough_corners(grid, corners, shift(2, 0, 0))
         assert not maps_enough_corners(grid, corners, shift(3, 0, 0))
 
     def test_weak_items_of_a_scan_make_no_corners(self) -> None:
-        grid = scan_grid(wall(4, 3), SHARE, 250_000)
+        grid = scan_grid(wall(4, 3), RADIUS_SHARE, 250_000)
         corners = corner_cells(grid)
         assert maps_enough_corners(grid, corners, shift(3, 0, 0))
         assert not maps_enough_corners(grid, corners, shift(4, 0, 0))

@@ -32,7 +32,7 @@ from tests.stages.symmetry.planted import (
     wall,
 )
 
-SHARE = 0.03
+RADIUS_SHARE = 0.03
 
 
 def sites_of(grid: SurfaceGrid, transform: np.ndarray) -> list[DockingSite]:
@@ -46,7 +46,7 @@ def has_transform(transforms: np.ndarray, wanted: np.ndarray) -> bool:
 
 @pytest.fixture(scope="module")
 def four_windows() -> SurfaceGrid:
-    return surface_grid(wall(4), SHARE)
+    return surface_grid(wall(4), RADIUS_SHARE)
 
 
 class TestSurface:
@@ -126,18 +126,18 @@ class TestTransforms:
             assert has_transform(transforms, shift(count, 0, 0))
 
     def test_the_screw_of_a_spiral_stair_is_found(self) -> None:
-        assert has_transform(candidate_transforms(surface_grid(spiral_stair(6), SHARE), 32), screw(0.5, 0.35))
+        assert has_transform(candidate_transforms(surface_grid(spiral_stair(6), RADIUS_SHARE), 32), screw(0.5, 0.35))
 
     def test_turned_wall_has_turned_transforms(self) -> None:
         turn = screw(0.7, 0.0)
-        transforms = candidate_transforms(surface_grid(moved(wall(3), turn), SHARE), 64)
+        transforms = candidate_transforms(surface_grid(moved(wall(3), turn), RADIUS_SHARE), 64)
         assert has_transform(transforms, turn @ shift(1, 0, 0) @ np.linalg.inv(turn))
 
 
 class TestDockingSites:
     @pytest.mark.parametrize("windows", [3, 4, 6])
     def test_wall_can_gain_and_lose_a_window(self, windows: int) -> None:
-        grid = surface_grid(wall(windows), SHARE)
+        grid = surface_grid(wall(windows), RADIUS_SHARE)
         sites = sites_of(grid, shift(1, 0, 0))
         assert [site.kind for site in sites] == ["delete", "insert"]
         delete, insert = sites

@@ -15,7 +15,7 @@ from stages.symmetry.matching.candidate_transforms import candidate_transforms
 from stages.symmetry.surface.grid import SurfaceGrid, surface_grid
 from tests.stages.symmetry.planted import area, screw, spiral_stair, wall
 
-SHARE = 0.03
+RADIUS_SHARE = 0.03
 
 
 class Planted:
@@ -23,7 +23,7 @@ class Planted:
 
     def __init__(self, triangles: np.ndarray) -> None:
         self.triangles = triangles
-        self.grid: SurfaceGrid = surface_grid(triangles, SHARE)
+        self.grid: SurfaceGrid = surface_grid(triangles, RADIUS_SHARE)
         self.docked_pieces: list[DockedPiece] = find_docked_pieces(self.grid, candidate_transforms(self.grid, 40))
         self.seams = seams_by_site(self.grid, self.docked_pieces)
         self.rows = find_rows(self.grid, self.docked_pieces, self.seams)

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipped_kits.kit_shape import Layout
+from shipped_kits.kit_shape import KitShape
 from shipped_kits.outlines import arch, chamfered, mirrored, rectangle, regular
 from shipped_kits.solids import Color, Solid, bar, box, extruded, joined, revolved, stacked
 
-PITCH = 5.0
-BITE = 0.03
-"""How deep a part reaches into the part that it is joined to."""
+TOWER_SPACING = 5.0
+JOINT_OVERLAP = 0.03
+"""Depth of a part inside the part that it is joined to."""
 
 STONE, STONE_LIGHT, STONE_DARK = (196, 184, 164), (219, 209, 190), (150, 139, 124)
 SLIT, PLASTER, TIMBER, WOOD = (66, 62, 70), (238, 226, 200), (112, 76, 52), (146, 103, 66)
@@ -22,8 +22,8 @@ SLATE, SLATE_DARK, TILE, TILE_DARK = (78, 112, 150), (62, 92, 128), (190, 88, 66
 GOLD, BANNER, GLASS = (228, 178, 74), (206, 62, 62), (120, 152, 170)
 
 
-def shapes() -> dict[str, Layout]:
-    """The two example castles by name."""
+def shapes() -> dict[str, KitShape]:
+    """Return the two example castles by name."""
     return {"keep": _keep(), "ward": _ward()}
 
 
@@ -75,7 +75,7 @@ def _tower_crown() -> Solid:
 
 
 def _roof_cone() -> Solid:
-    """Stands on the floor of the crown, half a unit above the crown's foot."""
+    """Build a roof on the floor of the crown, half a unit above the crown's foot."""
     outline = chamfered(1.4, 1.4, 0.38)
     drum = [(0.0, 0.0), (0.0, 0.86)]
     eaves = [(0.5, 0.78), (0.52, 0.86), (0.2, 1.34), (0.22, 1.4), (-0.1, 1.94), (-0.08, 2.0)]
@@ -99,13 +99,13 @@ def _roof_spire() -> Solid:
 
 
 def _gable(width: float, height: float, length: float, color: Color) -> Solid:
-    """A small roof with its ridge along x."""
+    """Build a small roof with its ridge along x."""
     outline = np.array([[-width / 2, 0.0], [width / 2, 0.0], [0.0, height]])
     return extruded(outline, -length / 2, length / 2, color).rotated(90.0)
 
 
 def _flag() -> Solid:
-    """A gilt ball, a pole and a swallow-tailed banner; its foot goes over the tip of a roof."""
+    """Build a gilt ball, a pole and a swallow-tailed banner; its foot goes over the tip of a roof."""
     ball = revolved([(0.0, -0.06), (0.13, 0.0), (0.17, 0.14), (0.13, 0.28), (0.05, 0.33)], 8, GOLD)
     pole = revolved([(0.035, 0.3), (0.035, 1.46), (0.0, 1.56)], 6, TIMBER)
     cloth = np.array([[0.0, 0.82], [0.86, 0.86], [0.62, 1.1], [0.86, 1.34], [0.0, 1.38]])
@@ -114,7 +114,7 @@ def _flag() -> Solid:
 
 
 def _turret() -> Solid:
-    """A bartizan on a slanted corner of a shaft: its axis is 1.27 from the shaft's, outward along x."""
+    """Build a bartizan on a slanted corner of a shaft; its axis is 1.27 from the shaft's, outward along x."""
     foot = [(0.0, 0.12), (0.2, 0.24), (0.26, 0.34), (0.34, 0.44)]
     colors = [STONE_DARK, STONE_DARK, STONE_LIGHT, PLASTER, TIMBER, SLATE_DARK, SLATE]
     turret = revolved([*foot, (0.34, 0.84), (0.44, 0.82), (0.45, 0.88), (0.0, 1.4)], 8, colors)
@@ -123,7 +123,7 @@ def _turret() -> Solid:
 
 
 def _wall() -> Solid:
-    half = PITCH / 2 - 1.0 + BITE
+    half = TOWER_SPACING / 2 - 1.0 + JOINT_OVERLAP
     plinth, parapet = ((0.43, 0.0), (0.43, 0.3), (0.35, 0.38)), ((0.43, 1.7), (0.43, 2.06), (0.25, 2.06), (0.25, 1.82))
     wall = extruded(mirrored(*plinth, (0.35, 1.6), *parapet), -half, half, STONE).rotated(90.0)
     wall = wall.tinted(STONE_DARK, lambda _, corners: bool(corners[:, 1].max() < 0.39))
@@ -137,7 +137,7 @@ def _wall() -> Solid:
 
 
 def _wall_gate() -> Solid:
-    half = PITCH / 2 - 1.0 + BITE
+    half = TOWER_SPACING / 2 - 1.0 + JOINT_OVERLAP
     head = arch(1.0, 1.5, 0.55, 8)[2:]
     outline = mirrored((0.5, 0.0), (half, 0.0), (half, 2.06), (1.04, 2.06), (0.94, 2.18), (0.94, 2.78))
     gate = extruded(np.concatenate([outline, head[::-1]]), -0.5, 0.5, STONE)
@@ -157,7 +157,7 @@ def _wall_gate() -> Solid:
 
 
 def _hall() -> Solid:
-    half = PITCH / 2 - 1.0 + BITE
+    half = TOWER_SPACING / 2 - 1.0 + JOINT_OVERLAP
     hall = box((2 * half, 0.5, 1.16), (0.0, 0.0, 0.0), STONE)
     upper = box((2 * half - 0.02, 1.04, 1.3), (0.0, 0.48, 0.0), PLASTER)
     for x in (-0.99, -0.33, 0.33, 0.99):
@@ -172,7 +172,7 @@ def _hall() -> Solid:
 
 
 def _cottage() -> Solid:
-    """Leans on a wall: the wall's axis is the line z = 0, the cottage stands at positive z."""
+    """Build a cottage that leans on a wall: the wall's axis is the line z = 0, the cottage is at positive z."""
     body = box((1.1, 0.86, 0.78), (0.0, 0.0, 0.79), PLASTER)
     body = body.inset((0.0, 0.36, 1.18), rectangle(0.26, 0.6), -0.03, TIMBER, WOOD, shrink=0.03)
     for x in (-0.36, 0.36):
@@ -187,8 +187,8 @@ def _cottage() -> Solid:
 
 
 def _bridge_span() -> Solid:
-    """Lies along z; the gate or pier faces are 4.0 apart."""
-    half = 2.0 + BITE
+    """Build a span along z; the faces of gates or piers are at a distance of 4.0."""
+    half = 2.0 + JOINT_OVERLAP
     under = arch(2.8, 0.46, 0.4, 8, y=-0.12)[2:]
     outline = np.concatenate([mirrored((1.4, -0.1), (half, -0.1), (half, 0.38)), under[-2:0:-1]])
     span = extruded(outline, -0.42, 0.42, STONE).rotated(90.0)
@@ -210,8 +210,8 @@ def _bridge_pier() -> Solid:
 
 
 def _bridge_ramp() -> Solid:
-    """Comes down from a gate or a pier: its face is the plane z = 0, the ramp runs towards positive z."""
-    outline = np.array([(BITE, -0.1), (BITE, 0.38), (-0.3, 0.38), (-1.6, -0.04), (-1.6, -0.1)])
+    """Build a ramp from a gate or a pier, whose face is the plane z = 0, towards positive z."""
+    outline = np.array([(JOINT_OVERLAP, -0.1), (JOINT_OVERLAP, 0.38), (-0.3, 0.38), (-1.6, -0.04), (-1.6, -0.1)])
     ramp = extruded(outline, -0.42, 0.42, STONE).rotated(90.0)
     for t in (0.2, 0.4, 0.6, 0.8):
         tread = box((0.7, 0.05, 0.1), (0.0, 0.35 - 0.42 * t, 0.3 + 1.3 * t), STONE_LIGHT)
@@ -222,15 +222,15 @@ def _bridge_ramp() -> Solid:
     return ramp + post + post.translated(-0.72)
 
 
-class _Castle(Layout):
-    """Places castle parts by lattice coordinates: (i, j) stands at x = 5 i, z = 5 j."""
+class _Castle(KitShape):
+    """Places castle parts by lattice coordinates: (i, j) is at x = 5 i, z = 5 j."""
 
     def __init__(self) -> None:
         super().__init__(_types())
 
     def tower(self, i: float, j: float, shafts: int, top: str = "", turrets: tuple[int, ...] = ()) -> None:
-        """A tower of so many shafts; `top` is a roof, with `+flag` behind it; turrets are corners of the top shaft."""
-        x, z = PITCH * i, PITCH * j
+        """Place a tower; `top` is a roof, `+flag` adds a flag; turrets are corners of the top shaft."""
+        x, z = TOWER_SPACING * i, TOWER_SPACING * j
         self.put("tower_base", x, 0.0, z)
         for level in range(shafts):
             self.put("tower_shaft", x, 2.5 + 1.5 * level, z)
@@ -245,12 +245,12 @@ class _Castle(Layout):
             self.put("flag", x, height + 0.5 + {"cone": 2.9, "spire": 3.9}[roof], z)
 
     def join(self, name: str, i: float, j: float, k: float, m: float) -> None:
-        """A wall, gate or hall between two neighbouring towers."""
-        self.put(name, PITCH * (i + k) / 2, 0.0, PITCH * (j + m) / 2, 0.0 if j == m else 90.0)
+        """Place a wall, gate or hall between two neighbouring towers."""
+        self.put(name, TOWER_SPACING * (i + k) / 2, 0.0, TOWER_SPACING * (j + m) / 2, 0.0 if j == m else 90.0)
 
 
-def _ward() -> Layout:
-    """Two wards on either side of a river, a bridge between their gates, a wall running out to a watchtower."""
+def _ward() -> KitShape:
+    """Build two wards on both sides of a river, a bridge between their gates, and a wall to a watchtower."""
     castle = _Castle()
     castle.tower(0, 0, 1, "cone")
     castle.tower(1, 0, 2, "spire+flag", (0, 2))
@@ -282,8 +282,8 @@ def _ward() -> Layout:
     return castle
 
 
-def _keep() -> Layout:
-    """Three wards around a high keep, a gate with a ramp, and a bridge on a pier to a gatehouse on the far bank."""
+def _keep() -> KitShape:
+    """Build three wards around a high keep, a gate with a ramp, and a bridge on a pier to a gatehouse."""
     castle = _Castle()
     castle.tower(1, 1, 3, "spire+flag")
     castle.tower(0, 0, 2, "cone", (2,))

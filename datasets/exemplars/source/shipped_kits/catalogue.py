@@ -7,9 +7,9 @@ from pathlib import Path
 
 from pipeline.paths import write_file
 from shipped_kits import castle, facade, playground, space_base, temple
-from shipped_kits.kit_shape import Layout, glb_bytes
+from shipped_kits.kit_shape import KitShape, glb_bytes
 
-KITS: Mapping[str, Callable[[], dict[str, Layout]]] = {
+KITS: Mapping[str, Callable[[], dict[str, KitShape]]] = {
     "castle": castle.shapes,
     "playground": playground.shapes,
     "space-base": space_base.shapes,
@@ -17,14 +17,17 @@ KITS: Mapping[str, Callable[[], dict[str, Layout]]] = {
 }
 
 
-MESHES: Mapping[str, Callable[[], dict[str, Layout]]] = {"facade": facade.shapes}
+MESHES: Mapping[str, Callable[[], dict[str, KitShape]]] = {"facade": facade.shapes}
 """Shapes that are one mesh without parts."""
 
 
 def write_kits(out: Path) -> list[Path]:
-    """Every shape of every kit, and every mesh, as `<out>/<kit>/<shape>.glb`, the same bytes each time; their paths."""
+    """Write every shape of every kit, and every mesh, as `<out>/<kit>/<shape>.glb`; return the paths.
+
+    The bytes are the same each time.
+    """
     written = []
     for kit, shapes in {**KITS, **MESHES}.items():
-        for shape, layout in shapes().items():
-            written.append(write_file(out / kit / f"{shape}.glb", glb_bytes(layout)))
+        for name, shape in shapes().items():
+            written.append(write_file(out / kit / f"{name}.glb", glb_bytes(shape)))
     return written

@@ -1,4 +1,4 @@
-"""An example shape: part types, where their parts stand, and its GLB file."""
+"""An example shape: part types, poses of their parts, and its GLB file."""
 
 from __future__ import annotations
 
@@ -17,14 +17,18 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class Layout:
-    """Parts put on a lattice: `types` by name, `placed` in order as (type name, pose float64 (4, 4))."""
+class KitShape:
+    """Parts on a lattice.
+
+    types: solids by type name
+    placed: type name and pose float64 (4, 4) of each part, in order
+    """
 
     types: Mapping[str, Solid]
     placed: list[tuple[str, FloatArray]] = field(default_factory=list)
 
     def put(self, name: str, x: float, y: float, z: float, turn: float = 0.0) -> None:
-        """One more part of type `name` at (x, y, z), turned about the up axis by `turn` degrees."""
+        """Add a part of type `name` at (x, y, z), turned about the up axis by `turn` degrees."""
         if name not in self.types:
             raise KeyError(name)
         pose = np.eye(4)
@@ -33,20 +37,20 @@ class Layout:
         self.placed.append((name, pose))
 
 
-def glb_bytes(layout: Layout) -> bytes:
-    """The shape as GLB, Y up: one node a part, named `<type>.<nnn>`, one mesh a type.
+def glb_bytes(shape: KitShape) -> bytes:
+    """Return the shape as GLB, Y up: one node per part, named `<type>.<nnn>`, one mesh per type.
 
-    COLOR_0 is linear, as glTF has it. Corners are shared only between triangles of one colour, so colours stay
-    crisp; there are no normals, which glTF reads as flat shading.
+    COLOR_0 is linear, as in glTF. Corners are shared only between triangles of one colour, so colours stay crisp. There
+    are no normals, which glTF reads as flat shading.
     """
     import trimesh
 
     scene = trimesh.Scene()
     counts: dict[str, int] = {}
-    for name, pose in layout.placed:
+    for name, pose in shape.placed:
         node = f"{name}.{counts.get(name, 0):03d}"
         if name not in counts:
-            scene.add_geometry(_mesh(layout.types[name]), node_name=node, geom_name=name, transform=pose)
+            scene.add_geometry(_mesh(shape.types[name]), node_name=node, geom_name=name, transform=pose)
         else:
             scene.graph.update(node, matrix=pose, geometry=name)
         counts[name] = counts.get(name, 0) + 1

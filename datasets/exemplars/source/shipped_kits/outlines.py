@@ -1,4 +1,4 @@
-"""Plane polygons: outlines that kit parts are built from, and their triangulation by ear clipping."""
+"""Plane polygons: outlines of kit parts, and their triangulation by ear clipping."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-FLAT = 1e-9
-"""Areas below this are taken for nothing, so that the last bits of a sine never choose a diagonal."""
+FLAT_AREA = 1e-9
+"""Smaller areas count as zero, so that the last bits of a sine never choose a diagonal."""
 
 
 def rectangle(width: float, height: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
-    """Corners (4, 2), counter-clockwise, of a rectangle with centre (x, y)."""
+    """Return the corners (4, 2), counter-clockwise, of a rectangle with centre (x, y)."""
     a, b = width / 2, height / 2
     return np.array([[x - a, y - b], [x + a, y - b], [x + a, y + b], [x - a, y + b]])
 
 
 def chamfered(width: float, height: float, cut: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
-    """Corners (8, 2) of a rectangle whose corners are cut off at 45 degrees, `cut` from each corner."""
+    """Return the corners (8, 2) of a rectangle whose corners are cut off at 45 degrees, `cut` from each corner."""
     a, b = width / 2, height / 2
     corners = [(a, cut - b), (a, b - cut), (a - cut, b), (cut - a, b)]
     corners += [(-u, -v) for u, v in corners]
@@ -28,14 +28,14 @@ def chamfered(width: float, height: float, cut: float, x: float = 0.0, y: float 
 
 
 def regular(sides: int, apothem: float, turn: float = 0.0) -> FloatArray:
-    """Corners (sides, 2) of a regular polygon with the middle of one side at angle `turn` (degrees)."""
+    """Return the corners (sides, 2) of a regular polygon with the middle of one side at angle `turn` (degrees)."""
     angles = np.radians(turn + (np.arange(sides) - 0.5) * 360.0 / sides)
     corners: FloatArray = np.stack([np.cos(angles), np.sin(angles)], axis=1) * (apothem / np.cos(np.pi / sides))
     return corners
 
 
 def arch(width: float, height: float, rise: float, segments: int = 6, y: float = 0.0) -> FloatArray:
-    """Corners of an opening with its sill centred on (0, y): upright sides under an elliptic head of height `rise`."""
+    """Return the corners of an opening: sill centred on (0, y), upright sides, elliptic head of height `rise`."""
     angles = np.linspace(0.0, np.pi, segments + 1)
     head = np.stack([np.cos(angles) * width / 2, np.sin(angles) * rise + height - rise], axis=1)
     sill = np.array([[-width / 2, 0.0], [width / 2, 0.0]])
@@ -44,12 +44,12 @@ def arch(width: float, height: float, rise: float, segments: int = 6, y: float =
 
 
 def mirrored(*right: tuple[float, float]) -> FloatArray:
-    """The outline that is its own mirror image in x, from its right half, listed from the bottom to the top."""
+    """Return the outline that is symmetric in x, from its right half, listed from the bottom to the top."""
     return np.array([*right, *[(-x, y) for x, y in right[::-1]]])
 
 
 def grown(outline: FloatArray, distance: float) -> FloatArray:
-    """A convex counter-clockwise outline with every side moved outward by `distance` (inward where negative)."""
+    """Move every side of a convex counter-clockwise outline outward by `distance` (inward if negative)."""
     along = np.roll(outline, -1, axis=0) - outline
     normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
     before = np.roll(normals, 1, axis=0)
@@ -59,10 +59,12 @@ def grown(outline: FloatArray, distance: float) -> FloatArray:
 
 
 def triangulate(points: FloatArray, loops: Sequence[Sequence[int]]) -> list[tuple[int, int, int]]:
-    """Triangles, as triples of indices into `points` (n, 2), of a polygon with holes.
+    """Return the triangles of a polygon with holes, as triples of indices into `points` (n, 2).
 
-    `loops[0]` runs counter-clockwise around the outside, the others clockwise around the holes. Of all ears the one
-    with the shortest diagonal is cut first.
+    loops: the first runs counter-clockwise around the outside, the others clockwise around the holes
+
+    The ear with the shortest diagonal is cut first. Raises ValueError for a loop that crosses itself or runs the wrong
+    way round.
     """
     ring = list(loops[0])
     holes = sorted(loops[1:], key=lambda hole: (-max(round(float(points[i][0]), 6) for i in hole), list(hole)))
@@ -77,14 +79,14 @@ def triangulate(points: FloatArray, loops: Sequence[Sequence[int]]) -> list[tupl
         best = min(ears, key=lambda k: (round(_gap(points, ring[k - 1], ring[(k + 1) % size]), 6), k))
         triangles.append((ring[best - 1], ring[best], ring[(best + 1) % size]))
         del ring[best]
-    if _side(points, *ring) < -FLAT:
+    if _side(points, *ring) < -FLAT_AREA:
         raise ValueError("the outline crosses itself or runs clockwise")
     triangles.append((ring[0], ring[1], ring[2]))
     return triangles
 
 
 def _bridged(points: FloatArray, ring: list[int], hole: Sequence[int], holes: Sequence[Sequence[int]]) -> list[int]:
-    """The ring cut open to the hole along the shortest segment that crosses nothing."""
+    """Connect a ring to a hole along the shortest segment that crosses nothing."""
     loops = [ring, *holes]
     sides = [(loop[k - 1], loop[k]) for loop in loops for k in range(len(loop))]
     candidates = sorted(
@@ -93,8 +95,8 @@ def _bridged(points: FloatArray, ring: list[int], hole: Sequence[int], holes: Se
     for _, r, h in candidates:
         start, end = ring[r], hole[h]
         before, after = ring[r - 1], ring[(r + 1) % len(ring)]
-        left = _side(points, before, start, end) > FLAT, _side(points, start, after, end) > FLAT
-        inward = all(left) if _side(points, before, start, after) > FLAT else any(left)
+        left = _side(points, before, start, end) > FLAT_AREA, _side(points, start, after, end) > FLAT_AREA
+        inward = all(left) if _side(points, before, start, after) > FLAT_AREA else any(left)
         if inward and not any(_crosses(points, start, end, a, b) for a, b in sides):
             return [*ring[: r + 1], *hole[h:], *hole[: h + 1], *ring[r:]]
     raise ValueError("a hole cannot be reached from the outline")
@@ -102,26 +104,26 @@ def _bridged(points: FloatArray, ring: list[int], hole: Sequence[int], holes: Se
 
 def _is_ear(points: FloatArray, ring: list[int], k: int) -> bool:
     a, b, c = ring[k - 1], ring[k], ring[(k + 1) % len(ring)]
-    if _side(points, a, b, c) <= FLAT:
+    if _side(points, a, b, c) <= FLAT_AREA:
         return False
     for other in ring:
-        at_corner = other in (a, b, c) or any(_gap(points, other, each) < 1e-7 for each in (a, b, c))
-        if not at_corner and min(_side(points, *side, other) for side in ((a, b), (b, c), (c, a))) >= -FLAT:
+        at_corner = other in (a, b, c) or any(_gap(points, other, corner) < 1e-7 for corner in (a, b, c))
+        if not at_corner and min(_side(points, *side, other) for side in ((a, b), (b, c), (c, a))) >= -FLAT_AREA:
             return False
     return True
 
 
 def _crosses(points: FloatArray, a: int, b: int, c: int, d: int) -> bool:
-    """Whether the open segment a-b meets c-d; sides that end in a or b do not count."""
+    """Return whether the open segment a-b meets c-d; sides that end in a or b do not count."""
     if a in (c, d) or b in (c, d):
         return False
     first, second = _side(points, a, b, c), _side(points, a, b, d)
     third, fourth = _side(points, c, d, a), _side(points, c, d, b)
-    return (first > FLAT) != (second > FLAT) and (third > FLAT) != (fourth > FLAT)
+    return (first > FLAT_AREA) != (second > FLAT_AREA) and (third > FLAT_AREA) != (fourth > FLAT_AREA)
 
 
 def _side(points: FloatArray, a: int, b: int, c: int) -> float:
-    """Twice the signed area of the triangle a, b, c."""
+    """Return twice the signed area of the triangle a, b, c."""
     p, q, r = points[a], points[b], points[c]
     return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
 

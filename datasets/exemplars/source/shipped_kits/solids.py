@@ -1,4 +1,4 @@
-"""Closed coloured polyhedra, and the few ways in which kit parts are built: loft, extrude, turn, inset, sweep.
+"""Closed coloured polyhedra, and the operations that build kit parts: loft, extrude, revolve, inset, sweep.
 
 Y is up. Faces are plane polygons, possibly with holes, counter-clockwise as seen from outside; a solid may consist of
 several closed shells. Plan outlines (n, 2) are read as (x, -z): counter-clockwise as seen from above.
@@ -19,8 +19,8 @@ Color = tuple[int, int, int]
 
 Point = tuple[float, float, float]
 
-DIGITS = 6
-"""Decimal places of coordinates: far finer than any detail, far coarser than the last bits of a sine."""
+COORDINATE_DECIMALS = 6
+"""Far finer than any detail, far coarser than the last bits of a sine."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,11 @@ class Face:
 
 @dataclass(frozen=True)
 class Solid:
-    """points: float64 (n, 3); faces: plane polygons that close one or more shells."""
+    """A polyhedron of one or more closed shells.
+
+    points: float64 (n, 3)
+    faces: plane polygons
+    """
 
     points: FloatArray
     faces: tuple[Face, ...]
@@ -46,15 +50,15 @@ class Solid:
         return Solid(np.concatenate([self.points, other.points]), self.faces + joined)
 
     def translated(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Solid:
-        """The solid moved by (x, y, z)."""
+        """Return the solid moved by (x, y, z)."""
         return Solid(self.points + np.array([x, y, z]), self.faces)
 
     def rotated(self, degrees: float, axis: str = "y") -> Solid:
-        """The solid rotated about a coordinate axis."""
+        """Return the solid rotated about a coordinate axis."""
         return Solid(self.points @ rotation(degrees, axis).T, self.faces)
 
     def tinted(self, color: Color, where: Callable[[int, FloatArray], bool]) -> Solid:
-        """The faces for which `where(index, corners of the outer loop)` holds, in another colour."""
+        """Recolour the faces for which `where(index, corners of the outer loop)` is true."""
         faces = tuple(
             replace(face, color=color) if where(index, self.points[list(face.loops[0])]) else face
             for index, face in enumerate(self.faces)
@@ -62,7 +66,7 @@ class Solid:
         return Solid(self.points, faces)
 
     def around(self, count: int) -> Solid:
-        """`count` copies of the solid, evenly rotated about the up axis."""
+        """Return `count` copies of the solid, evenly rotated about the up axis."""
         copies = self
         for k in range(1, count):
             copies = copies + self.rotated(360.0 * k / count)
@@ -78,7 +82,7 @@ class Solid:
         shrink: float = 0.0,
         copies: int = 1,
     ) -> Solid:
-        """The face at the point `at` pushed in by `depth` (pulled out where negative) within `outline`.
+        """Push in the face at the point `at` by `depth` (pull it out if negative) within `outline`.
 
         `outline` is counter-clockwise, in the plane of the face: x to the right and y up as seen from outside, or
         (x, -z) on a face that looks up. The floor is `outline` shrunk by `shrink`, of colour `floor` or else
@@ -91,8 +95,8 @@ class Solid:
         return result
 
     def mesh(self) -> tuple[FloatArray, IntArray, ByteArray]:
-        """vertices float64 (v, 3), faces int32 (f, 3) and face colours uint8 (f, 3)."""
-        points = np.round(self.points, DIGITS) + 0.0
+        """Return vertices float64 (v, 3), faces int32 (f, 3) and face colours uint8 (f, 3)."""
+        points = np.round(self.points, COORDINATE_DECIMALS) + 0.0
         triangles: list[tuple[int, int, int]] = []
         colors: list[Color] = []
         for face in self.faces:
@@ -130,7 +134,7 @@ class Solid:
         return Solid(np.concatenate([self.points, rim, end]), faces)
 
     def _face_at(self, at: FloatArray) -> int:
-        """The face whose plane holds the point and whose outer loop goes around it; the newest where there are two."""
+        """Return the newest face whose plane contains the point and whose outer loop goes around it."""
         for index in range(len(self.faces) - 1, -1, -1):
             face = self.faces[index]
             right, up, normal = _face_axes(self.points, face)
@@ -143,7 +147,7 @@ class Solid:
 
 
 def joined(*solids: Solid) -> Solid:
-    """All shells of the solids as one solid."""
+    """Return all shells of the solids as one solid."""
     whole = solids[0]
     for solid in solids[1:]:
         whole = whole + solid
@@ -151,7 +155,7 @@ def joined(*solids: Solid) -> Solid:
 
 
 def loft(rings: Sequence[FloatArray], colors: Color | Sequence[Color]) -> Solid:
-    """The solid between rings (k, 3) of equally many corners, counter-clockwise as seen from the last one.
+    """Return the solid between rings (k, 3) of equally many corners, counter-clockwise as seen from the last one.
 
     A first or last ring of one point is a tip. `colors`: one for each band between two rings; the caps have the
     colours of the bands that they close.
@@ -175,24 +179,24 @@ def loft(rings: Sequence[FloatArray], colors: Color | Sequence[Color]) -> Solid:
 
 
 def stacked(outline: FloatArray, levels: Sequence[tuple[float, float]], colors: Color | Sequence[Color]) -> Solid:
-    """A convex plan `outline`, grown by the first number of each level at the height that is its second."""
+    """Stack a convex plan `outline`: each level has its growth and its height."""
     return loft([_at_height(grown(outline, growth), height) for growth, height in levels], colors)
 
 
 def revolved(profile: Sequence[tuple[float, float]], sides: int, colors: Color | Sequence[Color]) -> Solid:
-    """A regular many-sided column: apothem and height of each level; apothem 0 is a tip."""
+    """Return a column with regular sides, by apothem and height of each level; apothem 0 is a tip."""
     plans = [regular(sides, apothem) if apothem else np.zeros((1, 2)) for apothem, _ in profile]
     return loft([_at_height(plan, height) for plan, (_, height) in zip(plans, profile, strict=True)], colors)
 
 
 def extruded(outline: FloatArray, z0: float, z1: float, color: Color) -> Solid:
-    """An upright outline (n, 2) in (x, y), counter-clockwise as seen from +z, drawn from z0 to z1."""
+    """Extrude an upright outline (n, 2) in (x, y), counter-clockwise as seen from +z, from z0 to z1."""
     rings = [np.column_stack([outline, np.full(len(outline), z)]) for z in (z0, z1)]
     return loft(rings, color)
 
 
 def box(size: Point, at: Point, color: Color, bevel: float = 0.0) -> Solid:
-    """A box with the centre of its bottom at `at`; `bevel` slants the edges of its top."""
+    """Return a box with the centre of its bottom at `at`; `bevel` slants the edges of its top."""
     outline = rectangle(size[0], size[2])
     levels = [(0.0, 0.0), (0.0, size[1])]
     if bevel:
@@ -201,12 +205,12 @@ def box(size: Point, at: Point, color: Color, bevel: float = 0.0) -> Solid:
 
 
 def bar(start: Point, end: Point, radius: float, color: Color, sides: int = 6) -> Solid:
-    """A straight round bar between two points."""
+    """Return a straight round bar between two points."""
     return swept([start, end], regular(sides, radius), color)
 
 
 def swept(path: Sequence[Point], section: FloatArray, color: Color) -> Solid:
-    """A section (k, 2), counter-clockwise, drawn along a path that never runs straight up next to a slanted piece.
+    """Sweep a section (k, 2), counter-clockwise, along a path without a vertical piece next to a slanted one.
 
     The section's x points to the left of the path, its y upward as far as the path lets it.
     """
@@ -231,7 +235,7 @@ def swept(path: Sequence[Point], section: FloatArray, color: Color) -> Solid:
 
 
 def rotation(degrees: float, axis: str) -> FloatArray:
-    """The rotation (3, 3) about a coordinate axis, exact to 15 places at quarter turns."""
+    """Return the rotation (3, 3) about a coordinate axis, exact to 15 places at quarter turns."""
     angle = np.radians(degrees)
     c, s = np.round([np.cos(angle), np.sin(angle)], 12) + 0.0
     i = "xyz".index(axis)
@@ -242,11 +246,11 @@ def rotation(degrees: float, axis: str) -> FloatArray:
 
 
 def _bands(colors: Color | Sequence[Color], count: int) -> list[Color]:
-    each = [color for color in colors if not isinstance(color, int)]
-    if each:
-        if len(each) != count:
-            raise ValueError(f"{len(each)} colours for {count} bands")
-        return each
+    bands = [color for color in colors if not isinstance(color, int)]
+    if bands:
+        if len(bands) != count:
+            raise ValueError(f"{len(bands)} colours for {count} bands")
+        return bands
     red, green, blue = (value for value in colors if isinstance(value, int))
     return [(red, green, blue)] * count
 
@@ -256,7 +260,7 @@ def _at_height(outline: FloatArray, height: float) -> FloatArray:
 
 
 def _face_axes(points: FloatArray, face: Face) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Right, up and outward normal of a face; on a face that looks up, right is x and up is -z."""
+    """Return right, up and outward normal of a face; on a face that faces up, right is x and up is -z."""
     corners = points[list(face.loops[0])]
     normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
     normal /= np.linalg.norm(normal)
@@ -267,7 +271,7 @@ def _face_axes(points: FloatArray, face: Face) -> tuple[FloatArray, FloatArray, 
 
 
 def _winds_around_origin(loop: FloatArray) -> bool:
-    """Whether a plane loop goes around the origin, by the crossings of a ray to the right."""
+    """Return whether a plane loop goes around the origin, by the crossings of a ray to the right."""
     inside = False
     for (x0, y0), (x1, y1) in zip(loop, np.roll(loop, -1, axis=0), strict=True):
         if (y0 > 0.0) != (y1 > 0.0) and x0 - y0 * (x1 - x0) / (y1 - y0) > 0.0:

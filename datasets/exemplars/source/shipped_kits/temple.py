@@ -1,28 +1,26 @@
 """The temple precinct: columns on a square lattice, each bay closed by a stylobate span below and a beam above.
 
-Columns are 3.0 apart. Every bay is a cycle of four parts, every cell of four bays may be floored, and roofed by a
-gable that runs on to the next cell, by a dome, or by a second storey. Roofs rest on beams alone: they clear the heads
-of the columns, so that a roof never has to know what stands around it.
+The distance of columns is 3.0. Every bay is a cycle of four parts. A cell of four bays may have a floor, and as a
+roof a gable that continues in the next cell, a dome, or a second storey. Roofs rest on beams alone and clear the
+columns, so that a roof does not depend on its surroundings.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from shipped_kits.kit_shape import Layout
+from shipped_kits.kit_shape import KitShape
 from shipped_kits.outlines import arch, chamfered, mirrored, rectangle, regular
 from shipped_kits.solids import Color, Solid, box, extruded, joined, loft, revolved, stacked
 from stages.shape.arrays import FloatArray
 
-PITCH = 3.0
-BITE = 0.03
-"""How deep a part reaches into the part that it is joined to."""
-HEAD = 4.0
-"""Height of a column."""
-REST = 4.08
-"""Height of the top of a beam, on which roofs, domes and balustrades rest."""
-UPPER = 3.0
-"""Height of a column of an upper storey."""
+COLUMN_SPACING = 3.0
+JOINT_OVERLAP = 0.03
+"""Depth of a part inside the part that it is joined to."""
+COLUMN_HEIGHT = 4.0
+BEAM_TOP = 4.08
+"""Height of the top of a beam, which carries roofs, domes and balustrades."""
+UPPER_COLUMN_HEIGHT = 3.0
 
 MARBLE, MARBLE_WARM, MARBLE_SHADE = (240, 234, 222), (228, 216, 196), (203, 189, 168)
 TILE, TILE_DARK, GOLD, BRONZE = (201, 108, 78), (172, 86, 62), (226, 180, 86), (150, 112, 70)
@@ -30,8 +28,8 @@ BLUE, BLUE_DARK, RED, WATER = (86, 132, 172), (62, 100, 140), (184, 76, 64), (10
 FLAME, SHADOW = (244, 150, 62), (96, 84, 82)
 
 
-def shapes() -> dict[str, Layout]:
-    """The two example precincts by name."""
+def shapes() -> dict[str, KitShape]:
+    """Return the two example precincts by name."""
     return {"peripteros": _peripteros(), "stoa": _stoa()}
 
 
@@ -72,7 +70,7 @@ def _column() -> Solid:
     shaft = _fluted([(0.38, 0.52), (0.37, 1.5), (0.31, 3.1)], 12, MARBLE)
     neck = revolved([(0.3, 3.06), (0.33, 3.1), (0.33, 3.14), (0.43, 3.28)], 12, [GOLD, GOLD, MARBLE])
     abacus = box((0.92, 0.15, 0.92), (0.0, 3.27, 0.0), MARBLE_WARM)
-    head = stacked(rectangle(0.8, 0.8), [(0.0, 3.4), (0.0, 3.94), (-0.06, HEAD)], MARBLE)
+    head = stacked(rectangle(0.8, 0.8), [(0.0, 3.4), (0.0, 3.94), (-0.06, COLUMN_HEIGHT)], MARBLE)
     head = head.inset((0.4, 3.68, 0.0), rectangle(0.5, 0.34), -0.03, MARBLE_WARM, BLUE, shrink=0.02, copies=4)
     return foot + base + shaft + neck + abacus + head
 
@@ -83,14 +81,14 @@ def _column_upper() -> Solid:
     foot = foot.inset((0.34, 0.34, 0.0), rectangle(0.4, 0.3), -0.02, MARBLE, RED, shrink=0.02, copies=4)
     shaft = _fluted([(0.27, 0.64), (0.26, 1.2), (0.22, 2.24)], 8, MARBLE)
     bell = revolved([(0.21, 2.2), (0.24, 2.24), (0.24, 2.28), (0.34, 2.42)], 8, [GOLD, GOLD, MARBLE])
-    head = stacked(rectangle(0.8, 0.8), [(-0.02, 2.4), (0.0, 2.46), (0.0, 2.94), (-0.06, UPPER)], MARBLE)
+    head = stacked(rectangle(0.8, 0.8), [(-0.02, 2.4), (0.0, 2.46), (0.0, 2.94), (-0.06, UPPER_COLUMN_HEIGHT)], MARBLE)
     head = head.inset((0.4, 2.7, 0.0), rectangle(0.5, 0.3), -0.03, MARBLE_WARM, BLUE, shrink=0.02, copies=4)
     return foot + shaft + bell + head
 
 
 def _span() -> Solid:
     """Lies along x between the feet of two columns."""
-    half = PITCH / 2 - 0.5 + BITE
+    half = COLUMN_SPACING / 2 - 0.5 + JOINT_OVERLAP
     section = mirrored((0.4, 0.0), (0.4, 0.16), (0.36, 0.2), (0.36, 0.32), (0.32, 0.36))
     span = extruded(section, -half, half, MARBLE_WARM).rotated(90.0)
     for x in (-0.5, 0.5):
@@ -100,7 +98,7 @@ def _span() -> Solid:
 
 def _beam() -> Solid:
     """Lies along x between the heads of two columns; its own foot is at the height of their abacus."""
-    half = PITCH / 2 - 0.4 + BITE
+    half = COLUMN_SPACING / 2 - 0.4 + JOINT_OVERLAP
     frieze, cornice = ((0.25, 0.0), (0.25, 0.2), (0.28, 0.22)), ((0.32, 0.58), (0.32, 0.63), (0.29, 0.66))
     lintel = mirrored(*frieze, (0.28, 0.54), *cornice)
     beam = extruded(lintel, -half, half, MARBLE).rotated(90.0)
@@ -111,7 +109,7 @@ def _beam() -> Solid:
 
 def _balustrade() -> Solid:
     """Rests on a beam, between the feet of two upper columns."""
-    half = PITCH / 2 - 0.34 + BITE
+    half = COLUMN_SPACING / 2 - 0.34 + JOINT_OVERLAP
     foot = box((2 * half, 0.12, 0.36), (0.0, 0.0, 0.0), MARBLE_WARM)
     rail = box((2 * half, 0.12, 0.3), (0.0, 0.44, 0.0), MARBLE, 0.03)
     baluster = revolved([(0.07, 0.1), (0.1, 0.2), (0.05, 0.36), (0.08, 0.46)], 6, MARBLE)
@@ -156,7 +154,7 @@ def _gable(reach: float, eave: float, ridge: float) -> FloatArray:
 
 def _roof() -> Solid:
     """Covers one cell, ridge along x; rests on the beams at z = -1.5 and z = 1.5 and ends flush with the cell."""
-    half = PITCH / 2
+    half = COLUMN_SPACING / 2
     vault = extruded(_gable(2.05, 0.24, 1.28), -half, half, TILE).rotated(90.0)
     slope = np.hypot(1.95, 1.04)
     for x in (-1.2, -0.6, 0.0, 0.6, 1.2):
@@ -244,7 +242,7 @@ def _statue() -> Solid:
 def _stairs() -> Solid:
     """Leads up to a span: its face is the plane z = 0, the stairs come down towards positive z."""
     treads = [(-0.14 * k, 0.32 - 0.08 * (k - side)) for k in (1, 2, 3) for side in (1, 0)]
-    outline = [(BITE, 0.0), (BITE, 0.32), *treads, (-0.6, 0.08), (-0.6, 0.0)]
+    outline = [(JOINT_OVERLAP, 0.0), (JOINT_OVERLAP, 0.32), *treads, (-0.6, 0.08), (-0.6, 0.0)]
     flight = extruded(np.array(outline), -0.58, 0.58, MARBLE).rotated(90.0)
     cheek = box((0.2, 0.42, 0.52), (0.67, 0.0, 0.25), MARBLE_WARM, 0.03)
     return flight + cheek + cheek.translated(-1.34)
@@ -257,7 +255,7 @@ def _path() -> Solid:
 
 
 def _altar() -> Solid:
-    """A fire bowl on a round step, at the end of a way: its slab docks like a paving slab."""
+    """Build a fire bowl on a round step, at the end of a path; its slab docks like a paving slab."""
     slab = stacked(chamfered(1.0, 1.0, 0.18), [(0.0, 0.0), (0.0, 0.06), (-0.04, 0.1)], MARBLE_SHADE)
     step = revolved([(0.4, 0.08), (0.4, 0.2), (0.3, 0.2), (0.3, 0.32)], 12, MARBLE)
     profile = [(0.2, 0.3), (0.2, 0.38), (0.07, 0.46), (0.07, 0.82), (0.26, 1.0), (0.28, 1.1), (0.22, 1.1), (0.18, 1.02)]
@@ -266,46 +264,52 @@ def _altar() -> Solid:
     return joined(slab, step, bowl, flame)
 
 
-class _Precinct(Layout):
-    """Places temple parts by lattice coordinates: the column (i, j) stands at x = 3 i, z = 3 j."""
+class _Precinct(KitShape):
+    """Places temple parts by lattice coordinates: the column (i, j) is at x = 3 i, z = 3 j."""
 
     def __init__(self) -> None:
         super().__init__(_types())
 
     def column(self, i: float, j: float) -> None:
-        """A column of the ground storey."""
-        self.put("column", PITCH * i, 0.0, PITCH * j)
+        """Place a column of the ground storey."""
+        self.put("column", COLUMN_SPACING * i, 0.0, COLUMN_SPACING * j)
 
     def bay(self, i: float, j: float, k: float, m: float, between: str = "") -> None:
-        """The span and the beam between two neighbouring columns, and what closes the bay, if anything does."""
-        x, z, turn = PITCH * (i + k) / 2, PITCH * (j + m) / 2, 0.0 if j == m else 90.0
+        """Place the span and the beam between two neighbouring columns, and what closes the bay, if anything."""
+        x, z, turn = COLUMN_SPACING * (i + k) / 2, COLUMN_SPACING * (j + m) / 2, 0.0 if j == m else 90.0
         self.put("span", x, 0.0, z, turn)
-        self.put("beam", x, REST - 0.66, z, turn)
+        self.put("beam", x, BEAM_TOP - 0.66, z, turn)
         if between:
             self.put(between, x, 0.36, z, turn)
 
     def storey(self, i: int, j: int, level: int) -> None:
-        """An upper storey over the cell (i, j): four columns, four balustrades, four beams."""
-        foot = HEAD + UPPER * (level - 1)
+        """Place an upper storey over the cell (i, j): four columns, four balustrades, four beams."""
+        foot = COLUMN_HEIGHT + UPPER_COLUMN_HEIGHT * (level - 1)
         for a, b in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)):
-            self.put("column_upper", PITCH * a, foot, PITCH * b)
+            self.put("column_upper", COLUMN_SPACING * a, foot, COLUMN_SPACING * b)
         for x, z, turn in ((i + 0.5, j, 0.0), (i + 1, j + 0.5, 90.0), (i + 0.5, j + 1, 0.0), (i, j + 0.5, 90.0)):
-            self.put("balustrade", PITCH * x, foot + REST - HEAD, PITCH * z, turn)
-            self.put("beam", PITCH * x, foot + UPPER + REST - HEAD - 0.66, PITCH * z, turn)
+            self.put("balustrade", COLUMN_SPACING * x, foot + BEAM_TOP - COLUMN_HEIGHT, COLUMN_SPACING * z, turn)
+            self.put(
+                "beam",
+                COLUMN_SPACING * x,
+                foot + UPPER_COLUMN_HEIGHT + BEAM_TOP - COLUMN_HEIGHT - 0.66,
+                COLUMN_SPACING * z,
+                turn,
+            )
 
     def cell(self, name: str, i: int, j: int, height: float = 0.0, turn: float = 0.0) -> None:
-        """A floor, pool, dome or roof in the cell between the columns (i, j) and (i + 1, j + 1)."""
-        self.put(name, PITCH * (i + 0.5), height, PITCH * (j + 0.5), turn)
+        """Place a floor, pool, dome or roof in the cell between the columns (i, j) and (i + 1, j + 1)."""
+        self.put(name, COLUMN_SPACING * (i + 0.5), height, COLUMN_SPACING * (j + 0.5), turn)
 
-    def gable(self, x: float, z: float, turn: float, height: float = REST) -> None:
-        """A pediment with its back at (x, z), facing `turn`, and its palmette."""
+    def gable(self, x: float, z: float, turn: float, height: float = BEAM_TOP) -> None:
+        """Place a pediment with its back at (x, z), facing `turn`, and its palmette."""
         self.put("pediment", x, height, z, turn)
         outward = np.radians(turn)
         self.put("acroterion", x + 0.18 * float(np.sin(outward)), height + 1.4, z + 0.18 * float(np.cos(outward)), turn)
 
 
-def _peripteros() -> Layout:
-    """A long hall with a gabled roof; beside it a court with a pool, and a way to a domed belvedere."""
+def _peripteros() -> KitShape:
+    """Build a long hall with a gabled roof, a court with a pool next to it, and a way to a domed belvedere."""
     precinct = _Precinct()
     for j in range(4):
         precinct.column(0, j)
@@ -320,7 +324,7 @@ def _peripteros() -> Layout:
         precinct.bay(0, j, 0, j + 1, left)
         precinct.bay(1, j, 1, j + 1, right)
         precinct.cell("floor", 0, j)
-        precinct.cell("roof", 0, j, REST, 90.0)
+        precinct.cell("roof", 0, j, BEAM_TOP, 90.0)
     precinct.gable(1.5, 0.0, 180.0)
     precinct.gable(1.5, 9.0, 0.0)
     precinct.put("statue", 1.5, 0.3, 1.5)
@@ -336,8 +340,8 @@ def _peripteros() -> Layout:
     precinct.bay(4, 1, 4, 2)
     precinct.cell("floor", 3, 1)
     precinct.storey(3, 1, 1)
-    precinct.cell("dome", 3, 1, REST + UPPER)
-    precinct.put("finial", 10.5, REST + UPPER + 2.08, 4.5)
+    precinct.cell("dome", 3, 1, BEAM_TOP + UPPER_COLUMN_HEIGHT)
+    precinct.put("finial", 10.5, BEAM_TOP + UPPER_COLUMN_HEIGHT + 2.08, 4.5)
     precinct.put("stairs", 1.5, 0.0, 9.4)
     precinct.put("path", 1.5, 0.0, 10.5)
     precinct.put("altar", 1.5, 0.0, 11.5)
@@ -345,8 +349,8 @@ def _peripteros() -> Layout:
     return precinct
 
 
-def _stoa() -> Layout:
-    """A tower of three storeys and a small temple, joined by colonnades around an open court."""
+def _stoa() -> KitShape:
+    """Build a tower of three storeys and a small temple, joined by colonnades around an open court."""
     precinct = _Precinct()
     for i in range(5):
         for j in range(3):
@@ -359,8 +363,8 @@ def _stoa() -> Layout:
     precinct.storey(0, 0, 1)
     precinct.storey(0, 0, 2)
     precinct.cell("floor", 0, 0)
-    precinct.cell("dome", 0, 0, REST + 2 * UPPER)
-    precinct.put("finial", 1.5, REST + 2 * UPPER + 2.08, 1.5)
+    precinct.cell("dome", 0, 0, BEAM_TOP + 2 * UPPER_COLUMN_HEIGHT)
+    precinct.put("finial", 1.5, BEAM_TOP + 2 * UPPER_COLUMN_HEIGHT + 2.08, 1.5)
     precinct.bay(1, 0, 2, 0)
     precinct.bay(2, 0, 3, 0)
     precinct.bay(1, 1, 1, 2)
@@ -373,7 +377,7 @@ def _stoa() -> Layout:
         precinct.bay(3, j, 3, j + 1)
         precinct.bay(4, j, 4, j + 1, right)
         precinct.cell("floor", 3, j)
-        precinct.cell("roof", 3, j, REST, 90.0)
+        precinct.cell("roof", 3, j, BEAM_TOP, 90.0)
     precinct.gable(10.5, 0.0, 180.0)
     precinct.gable(10.5, 6.0, 0.0)
     precinct.put("statue", 10.5, 0.3, 4.5)
