@@ -46,12 +46,12 @@ def known_exchanges(kit: Kit) -> list[Exchange]:
     moves = find_region_swaps(kit, {"y": 1, "z": 2}[kit.up], (assembly, graph), (assembly, graph))
     area = _areas(kit, assembly)
     exchanges: dict[frozenset[bytes], Exchange] = {}
-    for motion in range(len(moves.motions)):
+    for motion in range(len(moves.transforms)):
         for chosen in _elementary(kit, assembly, moves, motion):
             move = moves.along(motion, chosen)
             pair = move.taken, move.piece
             if max(area[parts].sum() for parts in pair) <= MAX_PIECE_SHARE and (pair[0] != pair[1]).any():
-                exchanges.setdefault(frozenset(parts.tobytes() for parts in pair), Exchange(*pair, move.motion))
+                exchanges.setdefault(frozenset(parts.tobytes() for parts in pair), Exchange(*pair, move.transform))
     return list(exchanges.values())
 
 

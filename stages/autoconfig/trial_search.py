@@ -19,7 +19,8 @@ from stages.variations.novelty.copied_pieces import CopyDetector
 from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
 from stages.variations.requirements.hub_restoration import HUBS_NOT_RESTORED, HubRestorer
 from stages.variations.requirements.required_labels import LABELS_MISSING, labels_test, spanning_labels
-from stages.variations.search.search import Search, Variant
+from stages.variations.search.search import Search
+from stages.variations.search.variant import Variant
 from stages.variations.selection.farthest_first import farthest_first
 from stages.variations.settings import SearchConfig
 
@@ -151,7 +152,7 @@ class TrialSearch:
             left[number] = left[number] - used if variants else 0
             complete = [variant for variant in variants if self._is_complete(variant.assembly)]
             hits = [variant for variant in complete if _copied_share(variant) <= self._max_copied_share]
-            keys = [search.key(variant.assembly.types, variant.graph, variant.graph) for variant in hits]
+            keys = [search.maker.key(variant.assembly.types, variant.graph, variant.graph) for variant in hits]
             self.variants.extend(hit for hit, key in zip(hits, keys, strict=True) if key not in self._known_keys)
             self._known_keys.update(keys)
 

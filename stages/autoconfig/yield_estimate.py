@@ -15,7 +15,7 @@ from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.patterns import observed_patterns, unique_pattern_share
 from stages.shape.kit import Kit
 from stages.variations.report.advice import another_model, what_keeps
-from stages.variations.search.search import DUPLICATE, Variant
+from stages.variations.search.variant import DUPLICATE, Variant
 
 MAX_ESTIMATE_GRAPHS = 300
 """Distinct graphs at which the trial search of an estimate ends."""

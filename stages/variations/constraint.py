@@ -1,7 +1,7 @@
-"""A global constraint: what holds of a shape as a whole and no neighbourhood tells (substructures §5.3).
+"""Global constraints: properties of a whole shape that no neighbourhood tells (substructures §5.3).
 
-A constraint is a module of `stages.variations.constraints`, which is called what the constraint is called and holds
-`CONSTRAINT = Constraint(...)`. A config asks for it by name, with the part labels that it speaks of.
+A constraint is a module of `stages.variations.constraints` with the constraint's name that defines
+`CONSTRAINT = GlobalConstraint(...)`. A config asks for it by name, with the part labels that it concerns.
 """
 
 from __future__ import annotations
@@ -18,18 +18,22 @@ from stages.variations.requirements.resizing import Resizer
 from stages.variations.requirements.stretched_contacts import broken_contact
 
 Labels = Mapping[str, Sequence[str]]
-"""What a config says of a constraint: labels of parts, by what they are to it."""
+"""The labels of parts that a config gives a constraint, by role."""
 Test = Callable[[Assembly], str | None]
-"""The reason why an assembly is refused, None if it is not."""
+"""Returns why an assembly is refused, or None."""
 Repair = Callable[[Assembly], Assembly | None]
-"""An assembly of which parts are resized so that it is not refused; None where there is none."""
+"""Returns an assembly with resized parts that is not refused, or None."""
 
 
 @dataclass(frozen=True)
 class GlobalConstraint:
-    """needs: the names of the lists of labels without which it says nothing; may: those that may be left out; test:
-    makes the test of a kit's assemblies, with what is known of its exemplars; mend: where resizing parts may help,
-    makes what tries it."""
+    """A property that a config can require of every variant.
+
+    needs: names of the lists of labels that must be given
+    may: names of those that can be left out
+    test: makes the test of a kit's assemblies
+    repair: makes what tries to meet the constraint by resizing parts, where that can help
+    """
 
     needs: tuple[str, ...]
     may: tuple[str, ...]
@@ -38,9 +42,9 @@ class GlobalConstraint:
 
 
 def find_constraints(package: str = "stages.variations.constraints") -> dict[str, GlobalConstraint]:
-    """All constraints there are, by name. Raises TypeError for a module that declares none."""
+    """Return all constraints by name. Raise TypeError for a module that declares none."""
     found: dict[str, GlobalConstraint] = {}
-    for name in sorted(each.name for each in iter_modules(importlib.import_module(package).__path__)):
+    for name in sorted(module.name for module in iter_modules(importlib.import_module(package).__path__)):
         declared = getattr(importlib.import_module(f"{package}.{name}"), "CONSTRAINT", None)
         if not isinstance(declared, GlobalConstraint):
             raise TypeError(f"{package.replace('.', '/')}/{name}.py must hold CONSTRAINT = Constraint(...)")
@@ -49,35 +53,36 @@ def find_constraints(package: str = "stages.variations.constraints") -> dict[str
 
 
 def module_of(name: str) -> str:
-    """The module that holds a constraint."""
+    """Return the module that holds a constraint."""
     return f"stages.variations.constraints.{name}"
 
 
-def unknown_in(asked: Mapping[str, Labels]) -> str | None:
-    """What is wrong with the constraints that a config asks for, and what would be right; None if nothing is."""
+def unknown_in(constraints: Mapping[str, Labels]) -> str | None:
+    """Return what is wrong with the constraints of a config, and the mend; None if nothing is."""
     known = find_constraints()
-    for name, labels in asked.items():
+    for name, labels in constraints.items():
         if name not in known:
             return f"{name!r} is no constraint; did you mean {nearest_word(name, known) or ', '.join(known)!r}?"
         constraint = known[name]
         allowed = (*constraint.needs, *constraint.may)
-        wrong = next((each for each in labels if each not in allowed), None)
+        wrong = next((role for role in labels if role not in allowed), None)
         if wrong is not None:
             return f"{name} knows no {wrong!r}; it knows {', '.join(allowed) or 'no labels'}"
-        missing = next((each for each in constraint.needs if not labels.get(each)), None)
+        missing = next((role for role in constraint.needs if not labels.get(role)), None)
         if missing is not None:
             return f"{name} needs {missing!r}: a list of labels of parts"
     return None
 
 
-def build_test(kit: Kit, asked: Mapping[str, Labels]) -> Test:
-    """One test of all constraints that are asked for, in their order. Raises ConfigError for labels of parts that the
-    kit has not."""
+def build_test(kit: Kit, constraints: Mapping[str, Labels]) -> Test:
+    """Return one test of all constraints of a config, in order. Raise ConfigError for labels that the kit does not
+    have.
+    """
     known = find_constraints()
-    for name, labels in asked.items():
-        for what, listed in labels.items():
-            named_labels(kit, listed, f"variations.require.constraints.{name}.{what}")
-    tests = [known[name].test(kit, labels) for name, labels in asked.items()]
+    for name, labels in constraints.items():
+        for role, listed in labels.items():
+            named_labels(kit, listed, f"variations.require.constraints.{name}.{role}")
+    tests = [known[name].test(kit, labels) for name, labels in constraints.items()]
 
     def unmet(assembly: Assembly) -> str | None:
         return next((reason for reason in (test(assembly) for test in tests) if reason is not None), None)
@@ -85,18 +90,23 @@ def build_test(kit: Kit, asked: Mapping[str, Labels]) -> Test:
     return unmet
 
 
-def build_repair(kit: Kit, asked: Mapping[str, Labels], most: float, rigid: Sequence[str]) -> Repair:
-    """What resizes parts of an assembly, each by `most` times at most and those labelled `rigid` never, until it meets
-    all constraints that are asked for; None for what cannot be mended so, or whose contacts would not hold."""
-    known, unmet, resizer = find_constraints(), build_test(kit, asked), Resizer(kit, most, rigid)
-    mends = [mend(kit, labels, resizer) for name, labels in asked.items() if (mend := known[name].repair) is not None]
+def build_repair(kit: Kit, constraints: Mapping[str, Labels], max_factor: float, rigid: Sequence[str]) -> Repair:
+    """Return what resizes parts of an assembly until it meets all constraints of a config.
 
-    def mended(assembly: Assembly) -> Assembly | None:
-        found: Assembly | None = assembly
-        for mend in mends:
-            found = None if found is None else mend(found)
-        if found is None or unmet(found) is not None or broken_contact(kit, found) is not None:
+    most: largest factor of a part; rigid: labels of parts that keep their size. The repair returns None where it fails
+        or
+    a contact would break.
+    """
+    known, unmet, resizer = find_constraints(), build_test(kit, constraints), Resizer(kit, max_factor, rigid)
+    makers = [(known[name].repair, labels) for name, labels in constraints.items()]
+    repairs = [make_repair(kit, labels, resizer) for make_repair, labels in makers if make_repair is not None]
+
+    def repaired(assembly: Assembly) -> Assembly | None:
+        result: Assembly | None = assembly
+        for repair in repairs:
+            result = None if result is None else repair(result)
+        if result is None or unmet(result) is not None or broken_contact(kit, result) is not None:
             return None
-        return found
+        return result
 
-    return mended
+    return repaired

@@ -1,4 +1,4 @@
-"""What stage `variations` says of itself as a producer of samples."""
+"""Stage `variations` as a producer of samples."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from stages.variations.settings import VariationsConfig
 
 
 def _measures(plan: Plan) -> Mapping[str, Any]:
-    """What the variants of each kit are worth."""
+    """Return the measures of each kit's samples."""
     summary = plan.summary("variations", f"{plan.config.name}-assignment")
     return dict(summary["kits"]) if summary is not None else {}
 
@@ -34,15 +34,15 @@ def _variety(plan: Plan) -> Sequence[str]:
 
 
 def _endings(plan: Plan) -> Sequence[str]:
-    """How the search of each kit ended, in words, from the summaries of its last pool."""
+    """Return how the search of each kit ended, in words, from the summaries of its last pool."""
     summaries = [plan.summary("variations", shard) or {} for shard in plan.shards("variations")]
     ended = [
-        f"- {each['why']}; {each['graphs']:,} distinct graphs, {each['histograms']:,} distinct histograms."
-        + (f" What limits it: {each['advice']}." if each["advice"] else "")
-        + (f" What was left out: {each['left']}." if each["left"] else "")
-        + (f" Resized: {_listed(each['resized'])}." if each["resized"] else "")
-        for each in summaries
-        if each.get("why")
+        f"- {summary['ending']}; {summary['graphs']:,} distinct graphs, {summary['histograms']:,} distinct histograms."
+        + (f" What limits it: {summary['advice']}." if summary["advice"] else "")
+        + (f" What was left out: {summary['skipped']}." if summary["skipped"] else "")
+        + (f" Resized: {_listed(summary['resized'])}." if summary["resized"] else "")
+        for summary in summaries
+        if summary.get("ending")
     ]
     return ["\n".join(ended)] if ended else []
 
@@ -51,44 +51,40 @@ def _listed(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{count:,} ({reason})" for reason, count in counts.items())
 
 
-def _made(plan: Plan) -> Sequence[str]:
+def _card(plan: Plan) -> Sequence[str]:
     return [*resolved_table(plan), *_endings(plan)]
 
 
 def _lineage(_: Config) -> Mapping[str, RecordField]:
-    whole = {"type": "integer", "minimum": 0}
+    count = {"type": "integer", "minimum": 0}
     share = {"type": "number", "exclusiveMinimum": 0, "maximum": 1}
-    places = {"type": "array", "items": whole, "minItems": 1}
+    counts = {"type": "array", "items": count, "minItems": 1}
     row = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+    name = {"type": "string", "minLength": 1}
     return {
-        "name": RecordField({"type": "string", "minLength": 1, "description": "what the search calls it"}),
+        "name": RecordField({**name, "description": "its name in the search"}),
         "made_of": RecordField(
             {
                 "type": "array",
-                "items": {"type": "string", "minLength": 1},
+                "items": name,
                 "minItems": 1,
-                "description": "the two shapes that pieces were exchanged of, exemplars or what the search calls them; "
-                "of a grown shape the exemplars that its patterns are of, that of its first part first",
+                "description": "the two shapes whose pieces were exchanged, exemplars or names in the search; of a "
+                "grown shape the exemplars of its patterns, that of its first part first",
             }
         ),
-        "parts_from": RecordField(
-            {
-                **places,
-                "description": "how many parts came from each of made_of",
-            }
-        ),
+        "parts_from": RecordField({**counts, "description": "number of parts from each of made_of"}),
         "boundary": RecordField(
             {
-                **places,
-                "description": "parts of the first of made_of along which it was cut, by their places there; of a "
-                "grown shape the one that it was grown from",
+                **counts,
+                "description": "boundary parts of the first of made_of, by their index there; of a grown shape the "
+                "part that it grew from",
             }
         ),
         "images": RecordField(
             {
-                **places,
-                "description": "parts of the second of made_of that each part of the boundary came to lie on, or, by "
-                "substitution, to dock to; of a grown shape the place that its first part has in it",
+                **counts,
+                "description": "parts of the second of made_of that each boundary part came to lie on or, by "
+                "substitution, docked to; of a grown shape the index of its first part",
             }
         ),
         "transform": RecordField(
@@ -97,49 +93,49 @@ def _lineage(_: Config) -> Mapping[str, RecordField]:
                 "items": row,
                 "minItems": 4,
                 "maxItems": 4,
-                "description": "moved the piece of the first of made_of to the second: the rows of a rotation, then a "
-                "translation, in the coordinates of the model files; a grown shape is not moved",
+                "description": "rigid transform of the piece from the first of made_of to the second: the rows of a "
+                "rotation, then a translation, in the coordinates of the model files; a grown shape is not moved",
             }
         ),
         "repeats": RecordField(
             {
-                **whole,
+                **count,
                 "minimum": 1,
-                "description": "how often that was done, each time upon what was made the time before, of which "
-                "images and motion are then: a recursive rule may be carried out several times",
+                "description": "number of times that a recursive rule was applied, each time to its own result, to "
+                "which images and transform refer",
             }
         ),
         "deformed": RecordField(
             {
                 "type": "boolean",
-                "description": "whether parts of it were moved by themselves, or are no longer as long, wide or high "
-                "as in the exemplars; where the piece was, motion is that of its first part",
+                "description": "whether parts moved independently or differ in size from the exemplars; if the piece "
+                "did, transform is that of its first part",
             }
         ),
         "copied": RecordField(
             {
                 "type": "object",
                 "properties": {
-                    "share": {**share, "description": "share of the parts, but for the backdrop, in that piece"},
-                    "pieces": {**whole, "minimum": 1, "description": "such pieces that together have all parts"},
+                    "share": {**share, "description": "share of the parts, without restored hubs, in that piece"},
+                    "pieces": {**count, "minimum": 1, "description": "number of such pieces that cover the shape"},
                     "exemplar_share": {**share, "description": "share of the parts of that exemplar"},
-                    "exemplar": {"type": "string", "minLength": 1, "description": "the name of that exemplar"},
+                    "exemplar": {**name, "description": "name of that exemplar"},
                 },
                 "required": ["share", "pieces", "exemplar_share", "exemplar"],
                 "additionalProperties": False,
-                "description": "the largest connected piece that stands just so, moved as a whole, in one exemplar",
+                "description": "the largest connected piece that one rigid transform lays on an exemplar",
             }
         ),
         "restored_hubs": RecordField(
-            {**whole, "description": "parts at the end of the list that were put back behind it"}
+            {**count, "description": "number of hub parts put back, at the end of the list of parts"}
         ),
         "turned_degrees": RecordField(
             {
                 "type": "number",
                 "minimum": 0,
                 "exclusiveMaximum": 360,
-                "description": "degrees about the vertical axis by which all of it was turned in the end, to face as "
-                "the exemplars do; motion is that before",
+                "description": "rotation about the vertical axis that finally oriented the shape as the exemplars "
+                "are, in degrees; transform is before that",
             }
         ),
     }
@@ -152,19 +148,19 @@ PRODUCER = Producer(
         config.section(ExemplarsConfig).kits and config.section(VariationsConfig).samples_per_kit
     ),
     sentence="exemplar meshes are cut into parts, a tiling grammar is read off their contacts, and new shapes are "
-    "made whose every neighbourhood and every docking of two parts was seen in an exemplar. A sample's "
+    "made in which every neighbourhood and every docking of two parts occurs in an exemplar. A sample's "
     "`lineage.parents` are samples of its own split, by their keys, and exemplars.",
-    splits="Samples whose shape graphs are equal stand in one split.",
+    splits="Samples with equal shape graphs are in one split.",
     nearness=_splits,
     graphs_share_split=True,
     lineage=_lineage,
     origins=lambda plan: exemplar_origins(plan.config),
     limits=(
-        "All parts are those of the exemplars, and they meet only as parts meet there. What is learnt of these kits "
-        "need not hold for other castles, temples or tracks.",
-        "A variant is made of pieces of its parents, or grown of what stands around their parts, and resembles them.",
+        "All parts are those of the exemplars, and they touch only as parts touch there. What is learnt from these "
+        "kits may not hold for other castles, temples or tracks.",
+        "A variant consists of pieces of its parents or grew from their neighbourhoods, and resembles them.",
     ),
-    card=_made,
+    card=_card,
     variety=_variety,
     measures=_measures,
 )

@@ -1,6 +1,6 @@
-"""Stage `variations`: kits in; many valid new assemblies out, as the shards `<dataset>-<split>-<index>.tar`.
+"""Stage `variations`: kits in, many valid new assemblies out, as shards `<dataset>-<split>-<index>.tar`.
 
-Its shards are the lanes and pools of each kit's search, the assignment of variants to splits, and the collection.
+Its shards are the searches and pools of each kit's rounds, the assignment of variants to splits, and the collection.
 """
 
 from __future__ import annotations
@@ -15,22 +15,20 @@ from stages.exemplars.settings import ExemplarsConfig
 from stages.variations.constraint import unknown_in
 from stages.variations.fallback import resolved_fallback
 from stages.variations.report.measures import described, growth
-from stages.variations.search.rounds import last_pool, run_lane, run_pool, search_shards
-from stages.variations.selection.collection import (
-    assignment_shard,
-    collection_shards_of,
-    run_assignment,
-    run_collection,
-)
+from stages.variations.search.pool_shard import run_pool
+from stages.variations.search.rounds import last_pool, search_shards
+from stages.variations.search.search_shard import run_search
+from stages.variations.selection.assignment import assignment_shard, run_assignment
+from stages.variations.selection.collection import collection_shards_of, run_collection
 from stages.variations.settings import VariationsConfig
 
-BYTES_A_VARIANT = 60_000
+BYTES_PER_VARIANT = 60_000
 
-_JOBS = {"lane": run_lane, "pool": run_pool, "assignment": run_assignment, "collection": run_collection}
+_JOBS = {"search": run_search, "pool": run_pool, "assignment": run_assignment, "collection": run_collection}
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """The rounds of every kit as far as they are known, then the assignment and the collection."""
+    """Return the rounds of every kit as far as they are known, then the assignment and the collection."""
     if (
         not plan.shards("exemplars")
         or not plan.config.section(VariationsConfig).samples_per_kit
@@ -50,51 +48,50 @@ def plan(plan: Plan) -> list[Shard]:
 
 
 def run_shard(task: Task) -> Outcome:
-    """One lane, pool, assignment or collection shard."""
+    """Run a search, pool, assignment or collection shard."""
     return _JOBS[task.shard.params["job"]](task)
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """How far the search of each kit is, why it ended, and what was chosen from what it found."""
+    """Return how far the search of each kit is, why it ended, and what was selected from the pool."""
     wanted = plan.config.section(VariationsConfig).samples_per_kit
     lines = []
     for kit in plan.shards("exemplars"):
         state = last_pool(plan, kit)
         if state:
             counts = f"{state['graphs']:,} distinct graphs, {state['histograms']:,} distinct histograms"
-            why = state["why"] or f"{kit}: {state['found']:,} found for {wanted:,} after {state['tries']:,} tries"
-            lines.append(f"{why}; {counts}")
+            progress = f"{kit}: {state['found']:,} found for {wanted:,} after {state['tries']:,} tries"
+            lines.append(f"{state['ending'] or progress}; {counts}")
             if state["advice"]:
                 lines.append(f"{kit}: {state['advice']}")
-            if state["left"]:
-                lines.append(f"{kit}: {state['left']}")
+            if state["skipped"]:
+                lines.append(f"{kit}: {state['skipped']}")
             lines.append(f"{kit}: growth of histograms: {growth(state['curve'])}")
     assignment = plan.summary("variations", f"{plan.config.name}-assignment") or {"kits": {}}
-    for kit, chosen in assignment["kits"].items():
-        lines.append(f"{kit}: {described(chosen)}")
-        if chosen["dull"]:
-            lines.append(f"{kit}: {chosen['dull']}")
+    for kit, selected in assignment["kits"].items():
+        lines.append(f"{kit}: {described(selected)}")
+        if selected["low_diversity"]:
+            lines.append(f"{kit}: {selected['low_diversity']}")
     return lines
 
 
 def check(config: Config) -> None:
-    """Raises ConfigError for constraints that nobody knows, and where hubs are required that a kit does not put back:
-    nothing would ever be kept."""
+    """Raise ConfigError for unknown constraints, and where hubs are required that a kit never restores."""
     wrong = unknown_in(config.section(VariationsConfig).require.constraints)
     if wrong:
         raise ConfigError(f"{config.path}: variations.require.constraints: {wrong}")
     if config.section(VariationsConfig).require.min_hubs in ("auto", 0):
         return
     for kit in config.section(ExemplarsConfig).kits:
-        if kit.hubs.types == "none" or (not (kit.hubs.restore)):
+        if kit.hubs.types == "none" or not kit.hubs.restore:
             raise ConfigError(
-                f"{config.path}: variations.require.min_hubs asks for hubs, and kit {kit.name} puts none back; "
-                "set its hubs.types and hubs.restore, or do not require them"
+                f"{config.path}: variations.require.min_hubs asks for hubs, but kit {kit.name} restores none; "
+                "set its hubs.types and hubs.restore, or do not require hubs"
             )
 
 
 def asked(config: Config) -> Sequence[int]:
-    """The variants of each shard of the collection, if the search finds as many as it is asked for."""
+    """Return the number of variants of each shard of the collection if the search finds all that is asked for."""
     section = config.section(VariationsConfig)
     return section.splits.shard_sizes(section.samples_per_kit * len(config.section(ExemplarsConfig).kits))
 
@@ -118,7 +115,7 @@ STAGE = Stage(
     run_shard=run_shard,
     estimate_bytes=lambda plan: (
         (1 + math.ceil(plan.config.section(VariationsConfig).selection.oversample))
-        * BYTES_A_VARIANT
+        * BYTES_PER_VARIANT
         * plan.config.section(VariationsConfig).samples_per_kit
         * len(plan.shards("exemplars"))
     ),

@@ -17,9 +17,11 @@ from stages.shape.geometry.contact import overlapping_boxes, world_boxes
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Assembly, Kit
 from stages.variations.kernels.checks import validate
-from stages.variations.kernels.structs import TRY, Outcome
+from stages.variations.kernels.outcomes import Outcome
+from stages.variations.kernels.structs import TRY_NUMBER
 from stages.variations.kernels.variant_graph import place_boxes
 from stages.variations.novelty.copied_pieces import CopyDetector
+from stages.variations.search.draft import load_shape
 from stages.variations.search.search import Search
 from stages.variations.selection.shared_surface import PackedShapes
 from stages.variations.settings import NoveltyConfig, SearchConfig
@@ -66,7 +68,7 @@ def bench() -> Iterator[Measure]:
 def _operations(name: str, kit: Kit, line: Search) -> Iterator[Measure]:
     """Graphs of which all that can be replaced in them is listed, without dummy edges and with one."""
     largest = max(kit.exemplars, key=lambda each: len(each.assembly)).assembly
-    labels = line.answers.dockings.label_edges(largest.types, largest.poses, largest.edges)
+    labels = line.oracle.dockings.label_edges(largest.types, largest.poses, largest.edges)
     graph = docking_graph(kit, largest, labels)
     for dummies in (0, 1):
         count = len(find_operations(graph, graph, dummies, by_docking=True))
@@ -108,7 +110,7 @@ def _relatives(name: str, kit: Kit, assemblies: list[Assembly]) -> Measure:
 
 def _copied(name: str, line: Search, assemblies: list[Assembly]) -> Measure:
     """Variants of which is told what they have copied whole."""
-    test, table = CopyDetector(line.kit, line.answers.dockings), line.answers.dockings
+    test, table = CopyDetector(line.kit, line.oracle.dockings), line.oracle.dockings
     labelled = cycle([(each, table.label_edges(each.types, each.poses, each.edges)) for each in assemblies])
 
     def variant() -> int:
@@ -147,18 +149,18 @@ def _validation(name: str, kit: Kit, line: Search, assemblies: list[Assembly]) -
         return len(cases)
 
     parents = [line.parent("bench", each, np.zeros(len(each), dtype=np.int8), (0, 0)) for each in assemblies]
-    ws, tables = line._ws, line.tables
+    ws, tables = line.maker.ws, line.maker.tables
 
     def ours() -> int:
         for parent in parents:
             n, shape = len(parent.assembly), parent.tables
-            line._load(parent)
+            load_shape(line.maker.ws, parent)
             ws.rotations[:n], ws.translations[:n] = shape.rotations, shape.translations
             place_boxes(tables.boxes, ws.types, ws.rotations, ws.translations, n, ws.boxes)
-            ws.counts[TRY] += 1
+            ws.counts[TRY_NUMBER] += 1
             i, j = parent.assembly.edges.T
-            ws.stamp[i, j] = ws.stamp[j, i] = ws.counts[TRY]
-            assert validate(tables, line.answers.table, ws) == Outcome.OK
+            ws.stamp[i, j] = ws.stamp[j, i] = ws.counts[TRY_NUMBER]
+            assert validate(tables, line.oracle.table, ws) == Outcome.OK
         return len(parents)
 
     parts = int(np.mean([len(each) for each in assemblies]))

@@ -138,7 +138,7 @@ def _make(config: Path, folder: Path, minutes: float) -> tuple[Ended, list[str]]
     if record is None:
         return whole, ["stopped at the limit" if ended.late else _why(ended), *[""] * 4]
     (summary,) = record.summary["kits"].values()
-    run(["stages.variations.report.sheet", "--config", str(config), "--out", str(folder)], minutes)
+    run(["pipeline", "sheets", "--config", str(config), "--out", str(folder)], minutes)
     return whole, list(_cells(summary))
 
 
@@ -150,10 +150,11 @@ def _why(ended: Ended) -> str:
 
 
 def _cells(summary: Mapping[str, Any]) -> Iterator[str]:
-    yield f"{summary['variants']:,} of {summary['pool']:,}{', ' + summary['dull'] if summary['dull'] else ''}"
+    low_diversity = summary["low_diversity"]
+    yield f"{summary['variants']:,} of {summary['pool']:,}{', ' + low_diversity if low_diversity else ''}"
     yield f"{summary['histograms']:,}"
     yield f"{summary['distance']:.2f}"
-    yield f"{summary['copied']:.0%}"
+    yield f"{summary['copied_share']:.0%}"
     yield f"{summary['mixed']:.0%}"
 
 

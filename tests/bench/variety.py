@@ -1,4 +1,4 @@
-"""What the search finds in a given CPU time, by each method and by both, or led by its archive beside plain random.
+"""What a search finds in a given CPU time, by each method and by both, guided by its archive or at random.
 
 python -m tests.bench.variety [--seconds 120] [--workers 2] [--grammar multiset] [--guidance] [--sheets DIR] [CONFIG...]
 
@@ -33,7 +33,8 @@ from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
 from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
 from stages.variations.novelty.features import AXES, MIN_MIXTURE
-from stages.variations.search.search import Search, Variant
+from stages.variations.search.search import Search
+from stages.variations.search.variant import Variant
 from stages.variations.selection.farthest_first import farthest_first
 from stages.variations.settings import SearchConfig, VariationsConfig
 
@@ -49,9 +50,9 @@ CONFIGS = (
     "bridge",
     "temple",
 )
-SLICE = 2000
+TRIES_PER_SLICE = 2000
 WARM_UP = 300
-KEPT = 2000
+MAX_VARIANTS_KEPT = 2000
 HEADER = (
     "| kit | search | tries | variants | a CPU s | graphs | histograms | at quarters | mixed | blended | E | copied "
     "| MB |\n"
@@ -83,7 +84,7 @@ def configured(name: str, grammar: str | None = None) -> tuple[Kit, SearchConfig
     sections = {name: stage.config for name, stage in find_stages().items()}
     config = load_config(Path(f"configs/{name}.yaml"), sections)
     kits = config.section(ExemplarsConfig).kits
-    kit_config = next((each for each in kits if each.name == chosen), kits[0])
+    kit_config = next((kit_config for kit_config in kits if kit_config.name == chosen), kits[0])
     if grammar is not None:
         kit_config = kit_config.model_copy(update={"grammar": grammar})
     kit, _ = build_kit(kit_config, [read_model(shape.path, kit_config.parts) for shape in kit_config.shapes])
@@ -91,22 +92,22 @@ def configured(name: str, grammar: str | None = None) -> tuple[Kit, SearchConfig
 
 
 def explore(kit: Kit, config: SearchConfig, seconds: float, seed: int, shown: bool = False) -> Finds:
-    """One worker's search of so many CPU seconds, after a warm-up that is not counted; where they are `shown`, the
+    """One worker's search for some CPU seconds, after a warm-up that is not counted; where they are `shown`, the
     first KEPT variants are kept to choose from."""
     Search(ContactOracle(kit), config).run(np.random.default_rng(seed), WARM_UP, 10**9, "warm", lambda count: None)
     line, rng, finds = Search(ContactOracle(kit), config), np.random.default_rng(seed), Finds()
     start, variants = time.process_time(), list[Variant]()
     for quarter in range(1, 5):
         while time.process_time() - start < seconds * quarter / 4:
-            found, tries = line.run(rng, SLICE, 10**9, f"w{seed}", lambda count: None)
+            found, tries = line.run(rng, TRIES_PER_SLICE, 10**9, f"w{seed}", lambda count: None)
             finds.tries += tries
-            finds.keys += [(each.graph, each.histogram) for each in found]
-            finds.features += [each.features for each in found]
-            variants += found[: KEPT - len(variants)] if shown else []
+            finds.keys += [(variant.graph, variant.histogram) for variant in found]
+            finds.features += [variant.features for variant in found]
+            variants += found[: MAX_VARIANTS_KEPT - len(variants)] if shown else []
         finds.curve.append(len(finds.keys))
     finds.crossings, finds.rejects = line.crossings, line.rejects
-    finds.kept = [each.assembly for each in variants]
-    lists = (type_counts(kit, [each.assembly.types for each in of]) for of in (variants, kit.exemplars))
+    finds.kept = [variant.assembly for variant in variants]
+    lists = (type_counts(kit, [entry.assembly.types for entry in of]) for of in (variants, kit.exemplars))
     finds.different = [
         variants[place].assembly for place in farthest_first(*lists, min(MAX_SHAPES_SHOWN, len(variants))).tolist()
     ]
@@ -115,20 +116,20 @@ def explore(kit: Kit, config: SearchConfig, seconds: float, seed: int, shown: bo
 
 
 def _row(name: str, how: str, workers: Sequence[Finds], seconds: float) -> str:
-    keys = [key for each in workers for key in each.keys]
-    features = np.array([each for worker in workers for each in worker.features]).reshape(-1, len(AXES))
+    keys = [key for entry in workers for key in entry.keys]
+    features = np.array([entry for worker in workers for entry in worker.features]).reshape(-1, len(AXES))
     graphs, histograms = len({graph for graph, _ in keys}), len({histogram for _, histogram in keys})
-    quarters = [len({key[1] for each in workers for key in each.keys[: each.curve[at]]}) for at in range(4)]
+    quarters = [len({key[1] for entry in workers for key in entry.keys[: entry.curve[at]]}) for at in range(4)]
     mixed = np.mean(features[:, AXES.index("mixture")] >= MIN_MIXTURE) if keys else 0.0
     blended = np.mean(features[:, AXES.index("neighbourhood_mixture")] > 0) if keys else 0.0
     distance = features[:, AXES.index("distance")].mean() if keys else 0.0
     copied = np.median(features[:, AXES.index("copied_share")]) if keys else 0.0
     return (
-        f"| {name} | {how} | {sum(each.tries for each in workers):,} | {len(keys):,} | "
+        f"| {name} | {how} | {sum(entry.tries for entry in workers):,} | {len(keys):,} | "
         f"{len(keys) / seconds / len(workers):,.0f} | {graphs:,} | {histograms:,} | "
-        f"{' '.join(f'{each:,}' for each in quarters)} | {mixed:.0%} | {blended:.0%} | {distance:.2f} | "
+        f"{' '.join(f'{entry:,}' for entry in quarters)} | {mixed:.0%} | {blended:.0%} | {distance:.2f} | "
         f"{copied:.0%} | "
-        f"{max(each.megabytes for each in workers):,.0f} |"
+        f"{max(entry.megabytes for entry in workers):,.0f} |"
     )
 
 
@@ -158,11 +159,11 @@ def main() -> None:
             workers: list[Finds] = Parallel(n_jobs=asked.workers)(jobs)
             print(_row(name, how, workers, asked.seconds), flush=True)
             if asked.sheets and workers[0].different:
-                shapes = [kit_shape(kit, each) for each in workers[0].different]
+                shapes = [kit_shape(kit, entry) for entry in workers[0].different]
                 path = asked.sheets / f"{name.replace('/', '-')}-{how}.png"
                 write_file(path, sample_figure(kit, shapes, "Most different finds", name, how))
         if len(kit.exemplars) > 1:
-            crossings = sum((each.crossings for each in workers), Counter[str]()).most_common()
+            crossings = sum((entry.crossings for entry in workers), Counter[str]()).most_common()
             notes.append(
                 f"{name}: tries across exemplars: " + ", ".join(f"{count:,} {why}" for why, count in crossings)
             )

@@ -56,7 +56,7 @@ def models_of(meshes: dict[str, trimesh.Trimesh], shapes: Sequence[Sequence[Plac
 
 
 def config_of(shapes: Sequence[Sequence[Placed]], kinds: Sequence[str] = ("face",)) -> KitConfig:
-    """The config of a kit of so many shapes, which leaves nothing open."""
+    """Return the config of a kit of some shapes, with every setting stated."""
     return KitConfig(
         name="toy",
         shapes=tuple(Path(__file__) for _ in shapes),

@@ -16,8 +16,14 @@ from stages.programs.schema import Values
 SIZE = {"scale x": 1.0, "scale y": 1.0, "scale z": 1.1, "seat_pos": 0.6, "seat_shape": 0.4}
 SPINDLES = {"is_top_rail": True, "is_vertical_rail": True, "vr_count": 4}
 COMB = SPINDLES | {"vr_count": 6, "vr_scale_x": 0.5, "tr_shape_1": 0.0, "back_frame_top_y_offset_pct": 0.4}
-LADDER = {"is_top_rail": False, "is_vertical_rail": False, "cr_count": 3, "cr_scale_z": 1.6, "cr_shape_1": 1.0}
-SLATS = LADDER | {"cr_count": 5, "cr_scale_z": 1.0, "cr_offset_bottom": 0.3, "cr_offset_top": 0.9, "cr_shape_1": 0.0}
+CROSS_RAILS = {"is_top_rail": False, "is_vertical_rail": False, "cr_count": 3, "cr_scale_z": 1.6, "cr_shape_1": 1.0}
+SLATS = CROSS_RAILS | {
+    "cr_count": 5,
+    "cr_scale_z": 1.0,
+    "cr_offset_bottom": 0.3,
+    "cr_offset_top": 0.9,
+    "cr_shape_1": 0.0,
+}
 PANEL = {"is_top_rail": True, "is_back_rest": True}
 LEANING = PANEL | {"curvature": 0.5, "tr_shape_1": 0.0, "tr_scale_z": 0.75, "back_frame_top_y_offset_pct": 0.4}
 
@@ -38,7 +44,7 @@ CHAIRS: tuple[Values, ...] = (
     SIZE | SPINDLES | STRAIGHT | PADDED | FLAT,
     SIZE | COMB | TURNED | NO_ARMS | BOARD,
     SIZE | SLATS | WAISTED | BARE | FLAT,
-    SIZE | LADDER | CURVED | NO_ARMS | PUFFED,
+    SIZE | CROSS_RAILS | CURVED | NO_ARMS | PUFFED,
     SIZE | PANEL | TURNED | PADDED | FLAT,
     SIZE | SPINDLES | CURVED | NO_ARMS | BOARD,
     SIZE | LEANING | WAISTED | BARE | PUFFED,

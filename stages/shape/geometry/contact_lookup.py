@@ -1,8 +1,9 @@
-"""Hashes of poses, and tables indexed by them."""
+"""The table of known contacts, looked up by two part types and their quantized relative pose."""
 
 from __future__ import annotations
 
-from typing import Any
+import ctypes
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -10,13 +11,29 @@ from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 
-from stages.variations.kernels.structs import MISSING
+from stages.shape.geometry.hash_tables import MISSING_KEY, look_up, mix
+
+NO_CONTACT, FORBIDDEN_CONTACT, UNKNOWN_CONTACT = -1, -2, MISSING_KEY
+"""Answers that are no pair of docking labels: no contact, a forbidden contact, not known yet."""
+LABEL_BASE = 1 << 20
+"""An answer that is a contact is `first label * LABEL_BASE + second label`."""
+POSE_QUANTUM = 1 / 64
+"""Step of the quantized poses, as a share of the contact tolerance."""
+
+
+class ContactTable(NamedTuple):
+    """Known answers, an open-addressing table."""
+
+    keys: np.ndarray  # uint64 (2^k,): `contact_key`, 0 where free
+    values: np.ndarray  # int64 (2^k,): NO_CONTACT, FORBIDDEN_CONTACT or a packed pair of docking labels
 
 
 @numba.njit(cache=True)
 def quantize_pose(first_rotation, first_translation, rotation, translation, reach, quantum, out):
-    """Write the pose of the second part in coordinates of the first in whole quanta, int64 (12,): translation,
-    rotation.
+    """Write the second part's pose relative to the first, in whole quanta, into `out`.
+
+    out: int64 (12,), translation then rotation
+    reach: half the diagonal of the second part, which scales rotations to lengths
     """
     for i in range(3):
         x = 0.0
@@ -30,16 +47,9 @@ def quantize_pose(first_rotation, first_translation, rotation, translation, reac
             out[3 + 3 * i + j] = np.int64(np.floor(y * reach / quantum + 0.5))
 
 
-@numba.njit(cache=True, inline="always")
-def mix(x):
-    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return x ^ (x >> np.uint64(31))
-
-
 @numba.njit(cache=True)
 def contact_key(a, b, quanta):
-    """Return a key of a type pair and a quantised pose, uint64, never 0."""
+    """Return the key of two part types and a quantized pose int64 (12,), uint64, never 0."""
     x = mix(np.uint64(a) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(b) + np.uint64(1))
     for k in range(12):
         x = mix(x * np.uint64(0x9E3779B97F4A7C15) + np.uint64(quanta[k]))
@@ -47,31 +57,18 @@ def contact_key(a, b, quanta):
 
 
 @numba.njit(cache=True)
-def look_up(keys, values, key):
-    mask = np.uint64(len(keys) - 1)
-    slot = key & mask
-    while keys[slot] != np.uint64(0):
-        if keys[slot] == key:
-            return values[slot]
-        slot = (slot + np.uint64(1)) & mask
-    return MISSING
-
-
-@numba.njit(cache=True)
 def look_up_around(keys, values, types, rotations, translations, b, rotation, translation, reach, quantum):
-    """Return the known answers for a part of type b next to each of some others, int64 (n,)."""
-    known = np.empty(len(types), dtype=np.int64)
+    """Return the known answers for a part of type `b` at a pose and each of n other parts, int64 (n,)."""
+    answers = np.empty(len(types), dtype=np.int64)
     quanta = np.empty(12, dtype=np.int64)
     for i in range(len(types)):
         quantize_pose(rotations[i], translations[i], rotation, translation, reach, quantum, quanta)
-        known[i] = look_up(keys, values, contact_key(types[i], b, quanta))
-    return known
+        answers[i] = look_up(keys, values, contact_key(types[i], b, quanta))
+    return answers
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def call_oracle(typing_context: Any, address: Any, a: Any, b: Any) -> tuple[Any, Any]:
-    """Call the C function of two int64 at an address, which returns one: an answer from Python inside a kernel."""
-
+def _call_compiled(typing_context: Any, address: Any, a: Any, b: Any) -> tuple[Any, Any]:
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         word = ir.IntType(64)
         function = builder.inttoptr(arguments[0], ir.FunctionType(word, [word, word]).as_pointer())
@@ -80,6 +77,9 @@ def call_oracle(typing_context: Any, address: Any, a: Any, b: Any) -> tuple[Any,
     return types.int64(types.int64, types.int64, types.int64), code
 
 
-@numba.njit(cache=True)
-def random_below(rng, n):
-    return min(np.int64(rng.random() * n), n - 1)
+def _call_interpreted(address: int, a: int, b: int) -> int:
+    return int(ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(address)(a, b))
+
+
+call_oracle: Any = _call_interpreted if numba.config.DISABLE_JIT else _call_compiled
+"""Calls the C function (int64, int64) -> int64 at an address: `ContactOracle.c_callback`."""

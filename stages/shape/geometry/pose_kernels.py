@@ -1,4 +1,4 @@
-"""Points and rotations in kernels: move them, and test whether two look the same."""
+"""Points and rotations in compiled code: transforming them, and whether two rotations of a part look the same."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import numpy as np
 
 @numba.njit(cache=True)
 def same_rotation(symmetries, first, last, rotation, other, slack):
-    """Return the symmetry by which two rotations of a part look the same, entries within `slack` together, or -1."""
+    """Return the symmetry under which two rotations of a part look the same, or -1. slack: tolerance of all entries
+    together
+    """
     limit = slack * slack
     between = np.empty((3, 3))
     for i in range(3):
@@ -30,14 +32,14 @@ def same_rotation(symmetries, first, last, rotation, other, slack):
 
 @numba.njit(cache=True)
 def looks_same(kit, part_type, rotation, other):
-    """Return the symmetry by which two rotations of a part of a type look the same within the pose tolerance, or -1."""
+    """Return the symmetry under which two rotations of a type look the same within the pose tolerance, or -1."""
     first, last = kit.symmetry_starts[part_type], kit.symmetry_starts[part_type + 1]
     return same_rotation(kit.symmetries, first, last, rotation, other, kit.limits[0] / kit.reach[part_type])
 
 
 @numba.njit(cache=True)
 def part_at(translations, by_type, first, last, point, tolerance):
-    """Return which of the parts `by_type[first:last]` is at a point, or -1."""
+    """Return which of the parts by_type[first:last] is at a point, or -1."""
     limit = tolerance * tolerance
     for k in range(first, last):
         part = by_type[k]
@@ -54,15 +56,17 @@ def squared_distance(p, q):
 
 
 @numba.njit(cache=True)
-def transform(motion, point, out):
-    """Write a point moved by a rigid transform into `out`."""
+def apply_transform(transform, point, out):
+    """Write a transformed point to `out`. transform: float64 (4, 3), rows of a rotation, then a translation"""
     for i in range(3):
-        out[i] = motion[i, 0] * point[0] + motion[i, 1] * point[1] + motion[i, 2] * point[2] + motion[3, i]
+        out[i] = transform[i, 0] * point[0] + transform[i, 1] * point[1] + transform[i, 2] * point[2] + transform[3, i]
 
 
 @numba.njit(cache=True)
-def rotate(motion, rotation, out):
-    """Write the product of a rotation and that of a rigid transform into `out`."""
+def rotate(transform, rotation, out):
+    """Write the rotation of `transform` applied to a rotation to `out`."""
     for i in range(3):
         for j in range(3):
-            out[i, j] = motion[i, 0] * rotation[0, j] + motion[i, 1] * rotation[1, j] + motion[i, 2] * rotation[2, j]
+            out[i, j] = (
+                transform[i, 0] * rotation[0, j] + transform[i, 1] * rotation[1, j] + transform[i, 2] * rotation[2, j]
+            )

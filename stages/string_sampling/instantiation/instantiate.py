@@ -9,6 +9,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.components import connected_components
+from stages.shape.geometry.contact_lookup import FORBIDDEN_CONTACT, NO_CONTACT
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
@@ -20,7 +21,6 @@ from stages.string_sampling.instantiation.solver import BUDGET, IMPOSSIBLE, NO_R
 from stages.string_sampling.instantiation.state import STANDARD_METHOD, TRIES, SolverMethod, graph_tables, new_state
 from stages.strings.compiled_grammar import compile_grammar
 from stages.variations.growth.state import KnownContacts
-from stages.variations.kernels.structs import FORBIDDEN, NONE
 from stages.variations.kernels.tables import kit_tables
 
 MIN_NODES = 64
@@ -130,9 +130,9 @@ class Instantiator:
         for part in range(1, count):
             near = np.flatnonzero(_boxes_meet(s.boxes[at[:part]], s.boxes[at[part]], 1.1 * self.kit.contact_tolerance))
             seen = self.answers.around(types[near].astype(np.int64), poses[near], int(types[part]), poses[part])
-            if (seen == FORBIDDEN).any():
+            if (seen == FORBIDDEN_CONTACT).any():
                 return Assembly(types, poses, np.empty((0, 2), dtype=np.int32))
-            touched = near[seen != NONE]
+            touched = near[seen != NO_CONTACT]
             found.append(np.stack([touched, np.full_like(touched, part)], axis=1).astype(np.int32))
         edges = np.concatenate(found)
         return Assembly(types, poses, edges[np.lexsort((edges[:, 1], edges[:, 0]))])

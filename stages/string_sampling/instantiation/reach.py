@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import mix
+from stages.shape.geometry.hash_tables import mix
 from stages.shape.geometry.pose_kernels import same_rotation, squared_distance
 from stages.string_sampling.instantiation.transforms import compose
 

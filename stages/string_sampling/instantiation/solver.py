@@ -5,12 +5,12 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import call_oracle, contact_key, look_up, quantize_pose
+from stages.shape.geometry.contact_lookup import NO_CONTACT, UNKNOWN_CONTACT, call_oracle, contact_key, quantize_pose
+from stages.shape.geometry.hash_tables import look_up
 from stages.string_sampling.instantiation.guidance import drop_frames, propagate_frames, score_by_category
 from stages.string_sampling.instantiation.reach import LONGEST, can_reach
 from stages.string_sampling.instantiation.state import FAILS, PLACED, TRAIL, TRIES, VALUES
 from stages.string_sampling.instantiation.transforms import compose, relative_transform
-from stages.variations.kernels.structs import MISSING, NONE
 
 SOLVED, IMPOSSIBLE, BUDGET, NO_ROOM = 0, 1, 2, 3
 """How it ended; IMPOSSIBLE: every way has been tried."""
@@ -261,17 +261,17 @@ def _agrees(kit, contacts, graph, method, s, placed, value):
     is_edge = graph.rows[a, b] >= 0
     answer = _relation(kit, contacts, s, placed, value)
     if answer < 0:
-        return answer == NONE and not is_edge
+        return answer == NO_CONTACT and not is_edge
     return is_edge or not method.whole
 
 
 @numba.njit(cache=True)
 def _relation(kit, contacts, s, a, b):
-    """What two values are to each other: NONE, FORBIDDEN, or, where they dock, a number that is not negative."""
+    """Return the contact of two values: NO_CONTACT, FORBIDDEN_CONTACT or, where they dock, a number from 0."""
     slack = 1.1 * kit.limits[1]
     for i in range(3):
         if abs(s.boxes[a, 0, i] - s.boxes[b, 0, i]) > s.boxes[a, 1, i] + s.boxes[b, 1, i] + slack:
-            return NONE
+            return NO_CONTACT
     if s.types[a] > s.types[b]:
         a, b = b, a
     quanta = np.empty(12, dtype=np.int64)
@@ -280,7 +280,7 @@ def _relation(kit, contacts, s, a, b):
         s.rotations[a], s.translations[a], s.rotations[b], s.translations[b], kit.reach[kind], kit.limits[2], quanta
     )
     answer = look_up(contacts.keys, contacts.values, contact_key(s.types[a], kind, quanta))
-    if answer == MISSING:
+    if answer == UNKNOWN_CONTACT:
         answer = call_oracle(contacts.oracle_address, a, b)
     return answer
 

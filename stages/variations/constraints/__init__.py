@@ -1,5 +1,7 @@
-"""Global constraints that a config may ask of every variant, each a module with `CONSTRAINT`, found here by its name
-(substructures §5.3). A folder `stages/variations/constraints` elsewhere on the PYTHONPATH adds its own to these."""
+"""Global constraints that a config may require, each a module with `CONSTRAINT` (substructures §5.3).
+
+A folder `stages/variations/constraints` elsewhere on the PYTHONPATH adds its own.
+"""
 
 from __future__ import annotations
 

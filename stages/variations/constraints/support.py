@@ -1,9 +1,9 @@
-"""Support: what stood on the ground or on another part in the exemplars does so still (substructures §5.3).
+"""Support: what stood on the ground or on another part in the exemplars still does (substructures §5.3).
 
-The paper fits a plane to each contact area and asks whether its normal is vertical. Parts are upright here and
-stretched upright alone, so a part is borne where its lowest point is as high as the highest point of a neighbour, and a
-height is that of its lowest point over that of the shape. A leg that hangs over the ground may be made taller, so that
-it reaches it (figure 11).
+The paper fits a plane to each contact area and tests whether its normal is vertical. Parts are upright here and are
+stretched only vertically. So a part is supported where its lowest point is as high as a neighbour's highest point, and
+its height is that of its lowest point above that of the shape. A repair makes a leg that hangs above the ground longer
+(figure 11).
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ def _test(kit: Kit, labels: Labels) -> Test:
     del labels
     ground = GroundTest(kit, kit.contact_tolerance)
     always = np.ones(len(kit.types), dtype=bool)
-    for each in kit.exemplars:
-        always[each.assembly.types[~_supported(kit, each.assembly)]] = False
+    for exemplar in kit.exemplars:
+        always[exemplar.assembly.types[~_supported(kit, exemplar.assembly)]] = False
 
     def unmet(assembly: Assembly) -> str | None:
         if ground.is_lifted(assembly.types, assembly.placements):
@@ -32,31 +32,31 @@ def _test(kit: Kit, labels: Labels) -> Test:
     return unmet
 
 
-def _mend(kit: Kit, labels: Labels, resizer: Resizer) -> Repair:
+def _repair(kit: Kit, labels: Labels, resizer: Resizer) -> Repair:
     del labels
     ground = GroundTest(kit, kit.contact_tolerance)
 
-    def mended(assembly: Assembly) -> Assembly | None:
-        found: Assembly | None = assembly
+    def repaired(assembly: Assembly) -> Assembly | None:
+        result: Assembly | None = assembly
         spans = spans_of(kit, assembly)
         for part in ground.lifted(assembly.types, assembly.placements).tolist():
             low, high = spans[part].tolist()
             factor = (high - spans[:, 0].min()) / (high - low)
-            found = None if found is None else resizer.stretched(found, part, factor, high)
-        return found
+            result = None if result is None else resizer.stretched(result, part, factor, high)
+        return result
 
-    return mended
+    return repaired
 
 
 def _supported(kit: Kit, assembly: Assembly) -> np.ndarray:
-    """Which parts stand on the ground or on the top of a neighbour, bool (n,)."""
+    """Return which parts stand on the ground or on the top of a neighbour, bool (n,)."""
     heights = spans_of(kit, assembly)
     tolerance = 2 * kit.contact_tolerance
-    found: np.ndarray = heights[:, 0] <= heights[:, 0].min() + tolerance
+    supported: np.ndarray = heights[:, 0] <= heights[:, 0].min() + tolerance
     for i, j in assembly.edges.tolist():
         for upper, lower in ((i, j), (j, i)):
-            found[upper] |= abs(heights[upper, 0] - heights[lower, 1]) <= tolerance
-    return found
+            supported[upper] |= abs(heights[upper, 0] - heights[lower, 1]) <= tolerance
+    return supported
 
 
-CONSTRAINT = GlobalConstraint(needs=(), may=(), test=_test, repair=_mend)
+CONSTRAINT = GlobalConstraint(needs=(), may=(), test=_test, repair=_repair)

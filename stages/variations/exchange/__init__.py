@@ -1,1 +1,1 @@
-"""Variation by exchange: a piece is cut out of one shape and docked in another (strings §3)."""
+"""Variation by exchange: a piece is cut out of one shape and docked into another (strings §3)."""

@@ -1,26 +1,33 @@
-"""Choosing what stays of the shape that a piece is docked in (strings §4): B without the images of the boundary falls
-into components, and those stay with which every boundary part has a neighbourhood that the grammar admits."""
+"""Choice of what stays of the shape that a piece is docked into (strings §4).
+
+B without the images of the boundary falls into components. Those stay with which every boundary part has a
+neighbourhood
+that the grammar admits.
+"""
 
 from __future__ import annotations
 
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import random_below
-from stages.shape.geometry.pose_kernels import squared_distance, transform
+from stages.shape.geometry.pose_kernels import apply_transform, squared_distance
 from stages.variations.kernels.membership import admitted
-from stages.variations.kernels.structs import BOUNDARY, CHOICES
+from stages.variations.kernels.random_choice import random_below
+from stages.variations.kernels.structs import MAX_COMPONENT_CHOICES, N_BOUNDARY
 
-FEW = 6
-"""Of so many components that touch the boundary every choice is tried; of more, random ones."""
-KEPT = 0.7
-"""How likely a component stays in a random choice."""
+MAX_COMPONENTS_ENUMERATED = 6
+"""For this many components next to the boundary every choice is tried; for more, random ones."""
+KEEP_PROBABILITY = 0.7
+"""Probability that a component stays in a random choice."""
 
 
 @numba.njit(cache=True)
 def find_components(starts, ends, image_of, component, stack):
-    """Number the components of B without the images of the boundary, whose `image_of` is not -1, in `component` (-1:
-    an image). Returns how many there are; `stack` is scratch."""
+    """Number the components of B without the images of the boundary in `component`, -1 for an image; return their
+    number.
+
+    Images are parts whose `image_of` is not -1; `stack` is scratch.
+    """
     n = len(starts) - 1
     component[:n] = -1
     components = 0
@@ -45,19 +52,23 @@ def find_components(starts, ends, image_of, component, stack):
 
 @numba.njit(cache=True)
 def choose_components(rng, kit, a, b, ws, components):
-    """Choose which of the components stay, in `ws.keep`: the first choice in random order with which the
-    neighbourhoods of all boundary parts are in the grammar. False where there is none."""
-    count = ws.counts[BOUNDARY]
+    """Choose which components stay, in `ws.keep`; return False where no choice is admitted.
+
+    The first choice in random order is taken with which the neighbourhoods of all boundary parts are in the grammar.
+    """
+    count = ws.counts[N_BOUNDARY]
     firsts, lasts, near, owner, touched = _possible_neighbours(kit.limits[0], a, b, ws, components)
     free = np.flatnonzero(touched)
     around = np.empty(len(near), dtype=np.int64)
-    choices = CHOICES if len(free) > FEW else (1 << len(free)) - 1
+    choices = MAX_COMPONENT_CHOICES if len(free) > MAX_COMPONENTS_ENUMERATED else (1 << len(free)) - 1
     offset = random_below(rng, choices) if choices > 0 else 0
     ws.keep[:components] = False
     for step in range(choices):
         chosen = 1 + (offset + step) % choices
         for c in range(len(free)):
-            ws.keep[free[c]] = rng.random() < KEPT if len(free) > FEW else (chosen >> c) & 1 == 1
+            ws.keep[free[c]] = (
+                rng.random() < KEEP_PROBABILITY if len(free) > MAX_COMPONENTS_ENUMERATED else (chosen >> c) & 1 == 1
+            )
         fits = True
         for k in range(count):
             neighbours = 0
@@ -75,12 +86,14 @@ def choose_components(rng, kit, a, b, ws, components):
 
 @numba.njit(cache=True)
 def _possible_neighbours(tolerance, a, b, ws, components):
-    """What each boundary part may have around it: `(firsts, lasts, near, owner, touched)`.
+    """Return what each boundary part may have around it: `(firsts, lasts, near, owner, touched)`.
 
-    The k-th may have neighbours of the types `near[firsts[k]:lasts[k]]`, each if the component `owner` stays, always
-    where that is -1, all int64; touched: bool (components,), whether a component is beside a boundary part.
+    The k-th may have neighbours of the types near[firsts[k]:lasts[k]], each if the component `owner` stays, always
+    where
+    that is -1; all int64.
+    touched: bool (components,), whether a component is next to a boundary part
     """
-    count = ws.counts[BOUNDARY]
+    count = ws.counts[N_BOUNDARY]
     firsts = np.zeros(count + 1, dtype=np.int64)
     for k in range(count):
         part, image = ws.boundary[k], ws.images[k]
@@ -101,12 +114,12 @@ def _possible_neighbours(tolerance, a, b, ws, components):
             if ws.image_of[end] >= 0:
                 continue
             touched[ws.component[end]] = True
-            # A neighbour that the piece brings to the same place is there already.
+            # The piece may bring this neighbour to the same place.
             brought = False
             for f in range(a.starts[part], a.starts[part + 1]):
                 other = a.ends[f]
                 if ws.inside[other] and a.types[other] == b.types[end]:
-                    transform(ws.motion, a.translations[other], point)
+                    apply_transform(ws.transform, a.translations[other], point)
                     if squared_distance(point, b.translations[end]) <= tolerance**2:
                         brought = True
                         break

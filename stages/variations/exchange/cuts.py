@@ -5,33 +5,37 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import random_below
-from stages.variations.kernels.structs import BOUNDARY, GROWN, JOINTS, PIECE, Outcome
+from stages.variations.kernels.operators import GROWN_CUT, JOINT_CUT
+from stages.variations.kernels.outcomes import Outcome
+from stages.variations.kernels.random_choice import random_below
+from stages.variations.kernels.structs import N_BOUNDARY, N_PIECE_PARTS
 
-OF_A_PART = 0.75
-"""How likely planes stand along the axes of one of the parts; else they stand in any direction."""
-HALF_SPACE, BOX = 0, 2
-"""What planes may hold; 1 is a slab."""
+PART_AXES_PROBABILITY = 0.75
+"""Probability that planes are along the axes of a part; otherwise they have any direction."""
+IN_HALF_SPACE, IN_BOX = 0, 2
+"""What planes bound; 1 is a slab."""
 
 
 @numba.njit(cache=True)
-def cut(rng, a, b, ws, way, slack):
-    """Cut a random connected piece out of A: `ws.inside`, and its boundary, the parts with a neighbour outside, in
-    `ws.boundary`, that of the rarest type in B first. `slack`: how far behind a plane a part may stand that is in it.
+def cut(rng, a, b, ws, operator, slack):
+    """Cut a random connected piece out of A into `ws.inside`, and its boundary into `ws.boundary`.
+
+    The boundary are the parts with a neighbour outside, that of the rarest type in B first.
+    slack: how far behind a plane a part may be that is in it
     """
-    size = _cut(rng, a, b, ws, way, slack)
+    size = _cut(rng, a, b, ws, operator, slack)
     count = put_boundary(a, ws)
-    ws.counts[PIECE] = size
+    ws.counts[N_PIECE_PARTS] = size
     if count == 0 or size == len(a.types):
         return Outcome.WHOLE
-    rarest, fewest = 0, 1 << 30
+    rarest, smallest = 0, 1 << 30
     for k in range(count):
         part_type = a.types[ws.boundary[k]]
         present = b.type_starts[part_type + 1] - b.type_starts[part_type]
         if present == 0:
             return Outcome.NO_SUCH_PART
-        if present < fewest:
-            rarest, fewest = k, present
+        if present < smallest:
+            rarest, smallest = k, present
     first = ws.boundary[0]
     ws.boundary[0] = ws.boundary[rarest]
     ws.boundary[rarest] = first
@@ -40,8 +44,9 @@ def cut(rng, a, b, ws, way, slack):
 
 @numba.njit(cache=True)
 def put_boundary(a, ws):
-    """Put the parts of the piece with a neighbour outside into `ws.boundary`, and how many they are into its counts,
-    and return that."""
+    """Write the parts of the piece with a neighbour outside into `ws.boundary`; return their number, also in the
+    counts.
+    """
     count = 0
     for part in range(len(a.types)):
         if ws.inside[part]:
@@ -50,26 +55,28 @@ def put_boundary(a, ws):
                     ws.boundary[count] = part
                     count += 1
                     break
-    ws.counts[BOUNDARY] = count
+    ws.counts[N_BOUNDARY] = count
     return count
 
 
 @numba.njit(cache=True)
-def _cut(rng, shape, other, ws, way, slack):
-    """A random connected piece of a shape into `ws.inside`: grown part by part (GROWN), ended at joints (JOINTS), or
-    cut out by planes (PLANES). Returns its number of parts."""
+def _cut(rng, shape, other, ws, operator, slack):
+    """Cut a random connected piece out of a shape into `ws.inside`; return its number of parts.
+
+    operator: GROWN_CUT, JOINT_CUT or PLANE_CUT
+    """
     ws.inside[: len(shape.types)] = False
     seed = random_below(rng, len(shape.types))
-    if way == JOINTS:
+    if operator == JOINT_CUT:
         return _cut_at_joints(rng, shape, other.type_starts, ws.inside, ws.stack, seed)
-    if way == GROWN:
+    if operator == GROWN_CUT:
         return _grow(rng, shape.starts, shape.ends, ws.inside, ws.stack, seed)
     return _cut_by_planes(rng, shape, ws.inside, ws.component, ws.stack, seed, slack)
 
 
 @numba.njit(cache=True)
 def _grow(rng, starts, ends, inside, stack, seed):
-    """A piece of a random number of parts, grown from `seed` by a random part beside it at a time."""
+    """Grow a piece of a random number of parts from `seed`, a random adjacent part at a time."""
     n = len(starts) - 1
     wanted = 1 + random_below(rng, n - 1)
     size, count = 0, 1
@@ -92,8 +99,10 @@ def _grow(rng, starts, ends, inside, stack, seed):
 
 @numba.njit(cache=True)
 def _cut_at_joints(rng, shape, other_starts, inside, stack, seed):
-    """A piece that ends at parts of one or two types which the other shape has too, by its `other_starts` of types;
-    in half of all cuts some of these are passed by all the same."""
+    """Cut a piece that ends at parts of one or two types which the other shape has too, by its `other_starts` of types.
+
+    In half of all cuts some of these are passed.
+    """
     n = len(shape.types)
     joints = np.empty(2, dtype=np.int64)
     for k in range(2):
@@ -127,23 +136,24 @@ def _cut_at_joints(rng, shape, other_starts, inside, stack, seed):
 
 @numba.njit(cache=True)
 def _cut_by_planes(rng, shape, inside, within, stack, seed, slack):
-    """What a half-space, a slab or a box holds, as far as it is connected to `seed`; `within` and `stack` are
-    scratch."""
+    """Cut what a half-space, a slab or a box holds, as far as it is connected to `seed`; `within` and `stack` are
+    scratch.
+    """
     n = len(shape.types)
     axes = np.empty((3, 3))
-    if rng.random() < OF_A_PART:
+    if rng.random() < PART_AXES_PROBABILITY:
         axes[:] = shape.rotations[random_below(rng, n)].T
     else:
         _draw_axes(rng, axes)
     kind = random_below(rng, 3)
-    used = 3 if kind == BOX else 1
+    used = 3 if kind == IN_BOX else 1
     first = random_below(rng, 3)
     low, high = np.empty(3), np.empty(3)
     far = random_below(rng, n)
     for u in range(used):
         axis = axes[(first + u) % 3]
         a, b = _along(axis, shape.translations[seed]), _along(axis, shape.translations[far])
-        if kind == HALF_SPACE:
+        if kind == IN_HALF_SPACE:
             if rng.random() < 0.5:
                 low[u], high[u] = a - slack, np.inf
             else:
@@ -162,13 +172,13 @@ def _cut_by_planes(rng, shape, inside, within, stack, seed, slack):
 
 @numba.njit(cache=True)
 def _along(axis, point):
-    """A point's coordinate along an axis."""
+    """Return a point's coordinate along an axis."""
     return axis[0] * point[0] + axis[1] * point[1] + axis[2] * point[2]
 
 
 @numba.njit(cache=True)
 def _draw_axes(rng, axes):
-    """Three random axes at right angles, as rows."""
+    """Draw three random perpendicular axes, as rows."""
     for i in range(2):
         norm = 0.0
         while norm < 1e-3:
@@ -188,7 +198,7 @@ def _draw_axes(rng, axes):
 
 @numba.njit(cache=True)
 def connected(starts, ends, within, inside, stack, seed):
-    """The parts that are connected to `seed` by parts `within`."""
+    """Mark the parts that are connected to `seed` by parts `within`; return their number."""
     size, count = 0, 1
     stack[0] = seed
     inside[seed] = True

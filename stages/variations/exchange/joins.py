@@ -4,40 +4,43 @@ from __future__ import annotations
 
 import numba
 
-from stages.shape.geometry.pose_kernels import looks_same, rotate, squared_distance, transform
+from stages.shape.geometry.pose_kernels import apply_transform, looks_same, rotate, squared_distance
 from stages.variations.exchange.components import choose_components, find_components
-from stages.variations.kernels.structs import BOUNDARY, EDGES, PARTS, TRY, UNKNOWNS, Outcome
+from stages.variations.kernels.outcomes import Outcome
+from stages.variations.kernels.structs import N_BOUNDARY, N_EDGES, N_PARTS, N_UNKNOWNS, TRY_NUMBER
 from stages.variations.kernels.variant_graph import inherit_edges, place_boxes
 
 
 @numba.njit(cache=True)
-def join(rng, kit, a, b, ws, smallest, largest):
-    """Put the piece of A, moved, in place of a part of B that its boundary cuts off.
+def join(rng, kit, a, b, ws, min_parts, max_parts):
+    """Put the piece of A, moved, in place of the part of B that its boundary cuts off.
 
-    The boundary parts stand for their images. Of B without the images, components stay so that the neighbourhood of
-    each boundary part is in the grammar; parts of them that coincide with parts of the piece are one with these.
-    Fills the variant's parts and the edges it inherits.
+    Boundary parts replace their images. Of B without the images, components stay so that the neighbourhood of each
+    boundary
+    part is in the grammar; parts of them that coincide with parts of the piece are merged. Fills the variant's parts
+    and
+    inherited edges.
     """
-    ws.counts[TRY] += 1
-    ws.counts[EDGES] = 0
-    ws.counts[UNKNOWNS] = 0
+    ws.counts[TRY_NUMBER] += 1
+    ws.counts[N_EDGES] = 0
+    ws.counts[N_UNKNOWNS] = 0
     ws.image_of[: len(b.types)] = -1
-    for k in range(ws.counts[BOUNDARY]):
+    for k in range(ws.counts[N_BOUNDARY]):
         ws.image_of[ws.images[k]] = ws.boundary[k]
     components = find_components(b.starts, b.ends, ws.image_of, ws.component, ws.stack)
     if not choose_components(rng, kit, a, b, ws, components):
         return Outcome.GRAMMAR
-    outcome = _check_room(a, b, ws, smallest, largest)
+    outcome = _check_room(a, b, ws, min_parts, max_parts)
     if outcome != Outcome.OK:
         return outcome
     piece = _put_piece(a, b, ws)
     parts = _put_rest(kit, a, b, ws, piece)
     if parts < 0:
         return Outcome.CLASH
-    ws.counts[PARTS] = parts
-    if parts < smallest:
+    ws.counts[N_PARTS] = parts
+    if parts < min_parts:
         return Outcome.TOO_SMALL
-    if parts > largest:
+    if parts > max_parts:
         return Outcome.TOO_LARGE
     if parts == piece:
         return Outcome.NOTHING_ATTACHED
@@ -48,8 +51,8 @@ def join(rng, kit, a, b, ws, smallest, largest):
 
 
 @numba.njit(cache=True)
-def _check_room(a, b, ws, smallest, largest):
-    """TOO_SMALL or TOO_LARGE where the variant is it however many parts of the piece and of B are one."""
+def _check_room(a, b, ws, min_parts, max_parts):
+    """Return TOO_SMALL or TOO_LARGE where the variant is that however many parts of the piece and of B are merged."""
     piece, kept = 0, 0
     for part in range(len(a.types)):
         if ws.inside[part]:
@@ -57,16 +60,16 @@ def _check_room(a, b, ws, smallest, largest):
     for part in range(len(b.types)):
         if ws.component[part] >= 0 and ws.keep[ws.component[part]]:
             kept += 1
-    if piece + kept < smallest:
+    if piece + kept < min_parts:
         return Outcome.TOO_SMALL
-    if max(piece, kept + ws.counts[BOUNDARY]) > largest or piece + kept > len(ws.types):
+    if max(piece, kept + ws.counts[N_BOUNDARY]) > max_parts or piece + kept > len(ws.types):
         return Outcome.TOO_LARGE
     return Outcome.OK
 
 
 @numba.njit(cache=True)
 def _put_piece(a, b, ws):
-    """Begin the variant with the parts of the piece, moved; those of its boundary are of B too. Returns how many."""
+    """Begin the variant with the parts of the piece, moved; boundary parts are of B too. Return their number."""
     ws.from_a[: len(a.types)] = -1
     ws.from_b[: len(b.types)] = -1
     v = 0
@@ -74,11 +77,11 @@ def _put_piece(a, b, ws):
         if ws.inside[part]:
             ws.from_a[part] = v
             ws.types[v] = a.types[part]
-            transform(ws.motion, a.translations[part], ws.translations[v])
-            rotate(ws.motion, a.rotations[part], ws.rotations[v])
+            apply_transform(ws.transform, a.translations[part], ws.translations[v])
+            rotate(ws.transform, a.rotations[part], ws.rotations[v])
             ws.origin[v] = 0
             v += 1
-    for k in range(ws.counts[BOUNDARY]):
+    for k in range(ws.counts[N_BOUNDARY]):
         ws.from_b[ws.images[k]] = ws.from_a[ws.boundary[k]]
         ws.origin[ws.from_a[ws.boundary[k]]] = 2
     return v
@@ -86,8 +89,10 @@ def _put_piece(a, b, ws):
 
 @numba.njit(cache=True)
 def _put_rest(kit, a, b, ws, piece):
-    """Add the parts of B that stay to the `piece` parts of the variant. Returns how many it has then, or -1 where a
-    part stands in the place of one of the piece but looks another way, or in that of one that is of B already."""
+    """Add the parts of B that stay to the `piece` parts of the variant; return how many parts it has then.
+
+    -1 where a part is at the place of one of the piece but looks different, or of one that is of B already.
+    """
     v = piece
     for part in range(len(b.types)):
         if ws.component[part] < 0 or not ws.keep[ws.component[part]]:
@@ -113,8 +118,9 @@ def _put_rest(kit, a, b, ws, piece):
 
 @numba.njit(cache=True)
 def _part_of_piece(by_type, first, last, from_a, translations, point, tolerance):
-    """Which of the parts `by_type[first:last]` of A is in the variant and stands at a point there, as a part of the
-    variant, or -1."""
+    """Return which of the parts by_type[first:last] of A is in the variant at a point, as a part of the variant, or
+    -1.
+    """
     for k in range(first, last):
         v = from_a[by_type[k]]
         if v >= 0 and squared_distance(translations[v], point) <= tolerance**2:

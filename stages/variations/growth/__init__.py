@@ -1,1 +1,1 @@
-"""Growth from nothing: shapes docked part by part from the exemplars' local patterns, by constraint propagation."""
+"""Growth: shapes are docked part by part from the exemplars' local patterns, by constraint propagation."""

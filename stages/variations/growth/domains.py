@@ -1,110 +1,137 @@
-"""What may still stand around the parts that stand: domains of candidates, kept consistent by propagation."""
+"""Domains of placed parts: candidates, kept consistent by propagation. `growth.state` describes the solver's state."""
 
 from __future__ import annotations
 
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import mix
+from stages.shape.geometry.contact_lookup import FORBIDDEN_CONTACT, NO_CONTACT
+from stages.shape.geometry.hash_tables import mix
 from stages.shape.geometry.pose_kernels import looks_same, squared_distance
-from stages.variations.growth.placements import FORBIDS, add_node, add_spot, boxes_meet, find_node, find_spot, relation
-from stages.variations.growth.state import CANDIDATES, EVENTS, FREE, GROWN_PARTS, MEMBERS, SPOTS, TRAIL, WORK
-from stages.variations.kernels.structs import FORBIDDEN, NONE, UPRIGHT
+from stages.variations.growth.placements import (
+    LINK_FORBIDS,
+    add_link,
+    add_placement,
+    boxes_meet,
+    find_link,
+    find_placement,
+    relation,
+)
+from stages.variations.growth.state import (
+    FREE_LINK,
+    N_CANDIDATES,
+    N_GROWN_PARTS,
+    N_MEMBERS,
+    N_NEWLY_BLOCKED,
+    N_PLACEMENTS,
+    TRAIL_LENGTH,
+    WORK_DONE,
+    placed_part,
+    push_placed,
+    push_pruned,
+)
+from stages.variations.kernels.outcomes import Outcome
+from stages.variations.kernels.structs import MIN_UPRIGHT_COSINE
 
-FINE, CONFLICT, NO_ROOM = 0, 1, 2
-"""How a step ended."""
-LIGHT = 32
-"""So many looks at a member of a pattern, or at a spot, count as one contact asked for."""
-SEED_TURNS = 16
-"""Symmetric images of the first part that are tried at most: round parts have hundreds, all alike."""
+LIGHT_CHECKS_PER_WORK = 32
+"""Looks at a member of a pattern, or at a placement, that count as one contact asked for."""
+MAX_SEED_TURNS = 16
+"""Symmetric images of the first part that are tried: round parts have hundreds, all alike."""
 
 
 @numba.njit(cache=True)
-def place(kit, patterns, answers, g, field, spot):
-    """Put a part on a spot, find its candidates, and strike what it forbids."""
-    part = g.counts[GROWN_PARTS]
-    if g.bad[spot] > 0 or part == field.most:
-        return CONFLICT
-    if g.counts[TRAIL] == len(g.trail):
-        return NO_ROOM
-    g.trail[g.counts[TRAIL]] = -1 - part
-    g.counts[TRAIL] += 1
-    g.counts[GROWN_PARTS] += 1
-    g.part_spots[part] = spot
-    g.spot_parts[spot] = part
-    g.have[g.spot_types[spot]] += 1
-    g.alive_counts[part] = 0
-    g.first_candidates[part] = g.counts[CANDIDATES]
-    counts = g.counts
-    counts[WORK] += counts[SPOTS] // LIGHT
+def place(problem, state, placement):
+    """Place a part, find its candidates, and prune what it forbids; return OK, CONFLICT or NO_ROOM."""
+    part, kit, contacts = state.counts[N_GROWN_PARTS], problem.kit, problem.contacts
+    if state.blockers[placement] > 0 or part == problem.field.max_parts:
+        return Outcome.CONFLICT
+    if state.counts[TRAIL_LENGTH] == len(state.trail):
+        return Outcome.NO_ROOM
+    push_placed(state, part)
+    state.counts[N_GROWN_PARTS] += 1
+    state.part_placements[part] = placement
+    state.placed_parts[placement] = part
+    state.type_counts[state.placement_types[placement]] += 1
+    state.domain_sizes[part] = 0
+    state.first_candidates[part] = state.counts[N_CANDIDATES]
+    counts = state.counts
+    counts[WORK_DONE] += counts[N_PLACEMENTS] // LIGHT_CHECKS_PER_WORK
     room, slack = True, 1.1 * kit.limits[1]
-    boxes, heads, node_parts, node_counts = g.spot_boxes, g.heads, g.node_parts, g.node_counts
-    bad, spot_parts, events = g.bad, g.spot_parts, g.events
-    for other in range(counts[SPOTS]):
-        if other == spot or not boxes_meet(boxes, spot, other, slack):
+    boxes, first_links, link_parts, link_counts = (
+        state.placement_boxes,
+        state.first_links,
+        state.link_parts,
+        state.link_counts,
+    )
+    blockers, placed_parts, newly_blocked = state.blockers, state.placed_parts, state.newly_blocked
+    for other in range(counts[N_PLACEMENTS]):
+        if other == placement or not boxes_meet(boxes, placement, other, slack):
             continue
-        answer = relation(kit, answers, g, spot, other)
-        if answer != NONE:
-            room = add_node(g, other, part, FORBIDS if answer == FORBIDDEN else 0) and room
-            if answer == FORBIDDEN:
-                bad[other] += 1
-                _report(bad, events, counts, other)
-    room = room and _find_candidates(kit, patterns, answers, g, field, part)
-    # Spots that the part touches and has in no candidate can never be.
-    for other in range(counts[SPOTS]):
-        node = heads[other]
-        if node >= 0 and node_parts[node] == part and node_counts[node] == 0 and spot_parts[other] < 0:
-            bad[other] += 1
-            _report(bad, events, counts, other)
-    g.dirty[part] = True
+        answer = relation(kit, contacts, state, placement, other)
+        if answer != NO_CONTACT:
+            room = add_link(state, other, part, LINK_FORBIDS if answer == FORBIDDEN_CONTACT else 0) and room
+            if answer == FORBIDDEN_CONTACT:
+                blockers[other] += 1
+                _queue_blocked(blockers, newly_blocked, counts, other)
+    room = room and _find_candidates(problem, state, part)
+    # A placement that the part touches and has in no candidate is blocked.
+    for other in range(counts[N_PLACEMENTS]):
+        link = first_links[other]
+        if link >= 0 and link_parts[link] == part and link_counts[link] == 0 and placed_parts[other] < 0:
+            blockers[other] += 1
+            _queue_blocked(blockers, newly_blocked, counts, other)
+    state.changed[part] = True
     if not room:
-        return NO_ROOM
-    if g.alive_counts[part] == 0:
-        return CONFLICT
-    node = g.heads[spot]
-    while node >= 0:
-        if g.node_counts[node] != FORBIDS and not _keep_only_with(g, g.node_parts[node], spot):
-            return CONFLICT
-        node = g.node_next[node]
-    return FINE
+        return Outcome.NO_ROOM
+    if state.domain_sizes[part] == 0:
+        return Outcome.CONFLICT
+    link = state.first_links[placement]
+    while link >= 0:
+        if state.link_counts[link] != LINK_FORBIDS and not _keep_only_with(state, state.link_parts[link], placement):
+            return Outcome.CONFLICT
+        link = state.link_next[link]
+    return Outcome.OK
 
 
 @numba.njit(cache=True, inline="always")
-def _report(bad, events, counts, spot):
-    """Say that a spot has become bad; domains are rid of it later."""
-    if bad[spot] == 1 and counts[EVENTS] < len(events):
-        events[counts[EVENTS]] = spot
-        counts[EVENTS] += 1
+def _queue_blocked(blockers, newly_blocked, counts, placement):
+    """Queue a placement that has just become blocked; domains are pruned later."""
+    if blockers[placement] == 1 and counts[N_NEWLY_BLOCKED] < len(newly_blocked):
+        newly_blocked[counts[N_NEWLY_BLOCKED]] = placement
+        counts[N_NEWLY_BLOCKED] += 1
 
 
 @numba.njit(cache=True)
-def _find_candidates(kit, patterns, answers, g, field, part):
-    """Make the candidates of a part: patterns of its type with each part that it touches among their members. False
-    where there is no room."""
-    spot = g.part_spots[part]
-    part_type = g.spot_types[spot]
-    rotation, translation = g.spot_rotations[spot], g.spot_translations[spot]
+def _find_candidates(problem, state, part):
+    """Make the candidates of a part: turned patterns of its type with each part that it touches among their members.
+
+    Returns False where there is no room.
+    """
+    kit, patterns = problem.kit, problem.patterns
+    placement = state.part_placements[part]
+    part_type = state.placement_types[placement]
+    rotation, translation = state.placement_rotations[placement], state.placement_translations[placement]
     anchor, touching = -1, 0
-    node = g.heads[spot]
-    while node >= 0:
-        if g.node_counts[node] != FORBIDS:
-            anchor = g.part_spots[g.node_parts[node]]
+    link = state.first_links[placement]
+    while link >= 0:
+        if state.link_counts[link] != LINK_FORBIDS:
+            anchor = state.part_placements[state.link_parts[link]]
             touching += 1
-        node = g.node_next[node]
+        link = state.link_next[link]
     first, last = kit.symmetry_starts[part_type], kit.symmetry_starts[part_type + 1]
     turned, point, relative = np.empty((3, 3)), np.empty(3), np.zeros(3)
     if anchor >= 0:
         for i in range(3):
             for k in range(3):
-                relative[i] += rotation[k, i] * (g.spot_translations[anchor, k] - translation[k])
+                relative[i] += rotation[k, i] * (state.placement_translations[anchor, k] - translation[k])
     else:
-        last = min(last, first + SEED_TURNS)
+        last = min(last, first + MAX_SEED_TURNS)
     distance = np.sqrt((relative**2).sum())
     tolerance = kit.limits[0]
     own, end_of_own = patterns.of_type[part_type], patterns.of_type[part_type + 1]
     starts, ups, types, places = patterns.starts, patterns.ups, patterns.types, patterns.translations
-    symmetries, anchor_type = kit.symmetries, g.spot_types[max(anchor, 0)]
-    g.counts[WORK] += (last - first) * (starts[end_of_own] - starts[own]) // LIGHT
+    symmetries, anchor_type = kit.symmetries, state.placement_types[max(anchor, 0)]
+    state.counts[WORK_DONE] += (last - first) * (starts[end_of_own] - starts[own]) // LIGHT_CHECKS_PER_WORK
     for pattern in range(own, end_of_own):
         start, end = starts[pattern], starts[pattern + 1]
         for symmetry in range(first, last):
@@ -114,7 +141,7 @@ def _find_candidates(kit, patterns, answers, g, field, part):
                 for i in range(3):
                     for j in range(3):
                         x += rotation[kit.up, i] * turn[i, j] * ups[pattern, j]
-                if x < UPRIGHT:
+                if x < MIN_UPRIGHT_COSINE:
                     continue
             fits = anchor < 0
             for member in range(start, end):
@@ -128,8 +155,8 @@ def _find_candidates(kit, patterns, answers, g, field, part):
                 _turn_point(turn, there, point)
                 if squared_distance(point, relative) <= tolerance**2:
                     _turn(rotation, turn, patterns.rotations[member], turned)
-                    fits = looks_same(kit, anchor_type, turned, g.spot_rotations[anchor]) >= 0
-            if fits and not _add_candidate(kit, patterns, answers, g, field, part, pattern, turn, touching):
+                    fits = looks_same(kit, anchor_type, turned, state.placement_rotations[anchor]) >= 0
+            if fits and not _add_candidate(problem, state, part, pattern, turn, touching):
                 return False
     return True
 
@@ -142,7 +169,7 @@ def _turn_point(turn, point, out):
 
 @numba.njit(cache=True, inline="always")
 def _turn(rotation, turn, other, out):
-    """Put the product of three rotations into `out`."""
+    """Write the product of three rotations to `out`."""
     for i in range(3):
         for j in range(3):
             x = 0.0
@@ -153,20 +180,31 @@ def _turn(rotation, turn, other, out):
 
 
 @numba.njit(cache=True)
-def _add_candidate(kit, patterns, answers, g, field, part, pattern, turn, touching):
-    """Add a pattern, turned, to a part's candidates where all its members may be; False where there is no room."""
-    if g.counts[CANDIDATES] + 1 >= len(g.member_starts):
+def _add_candidate(problem, state, part, pattern, turn, touching):
+    """Add a turned pattern to a part's candidates where all its members may be; return False where there is no room."""
+    if state.counts[N_CANDIDATES] + 1 >= len(state.member_starts):
         return False
-    spot = g.part_spots[part]
-    rotation, translation = g.spot_rotations[spot], g.spot_translations[spot]
+    kit, patterns, contacts = problem.kit, problem.patterns, problem.contacts
+    low, high = problem.field.low, problem.field.high
+    placement = state.part_placements[part]
+    rotation, translation = state.placement_rotations[placement], state.placement_translations[placement]
     there, turned, place_there = np.empty(3), np.empty((3, 3)), np.empty(3)
-    heads, node_parts, node_next, node_counts = g.heads, g.node_parts, g.node_next, g.node_counts
-    members = g.members
+    first_links, link_parts, link_next, link_counts = (
+        state.first_links,
+        state.link_parts,
+        state.link_next,
+        state.link_counts,
+    )
+    members = state.members
     types, turns, places = patterns.types, patterns.rotations, patterns.translations
     symmetry_starts, symmetries, boxes, reach = kit.symmetry_starts, kit.symmetries, kit.boxes, kit.reach
-    spot_types, spot_rotations, spot_translations = g.spot_types, g.spot_rotations, g.spot_translations
-    buckets, chains, tolerance = g.buckets, g.chains, kit.limits[0]
-    start = g.counts[MEMBERS]
+    placement_types, placement_rotations, placement_translations = (
+        state.placement_types,
+        state.placement_rotations,
+        state.placement_translations,
+    )
+    buckets, bucket_next, tolerance = state.buckets, state.bucket_next, kit.limits[0]
+    start = state.counts[N_MEMBERS]
     end, key, standing = start, np.uint64(0), 0
     for member in range(patterns.starts[pattern], patterns.starts[pattern + 1]):
         if end == len(members):
@@ -176,51 +214,51 @@ def _add_candidate(kit, patterns, answers, g, field, part, pattern, turn, touchi
         _turn_point(rotation, there, place_there)
         place_there += translation
         _turn(rotation, turn, turns[member], turned)
-        if not _within(boxes, field.low, field.high, kind, turned, place_there):
+        if not _within(boxes, low, high, kind, turned, place_there):
             return True
-        other = find_spot(
-            symmetry_starts, symmetries, tolerance, tolerance / reach[kind], spot_types, spot_rotations,
-            spot_translations, buckets, chains, kind, turned, place_there,
+        other = find_placement(
+            symmetry_starts, symmetries, tolerance, tolerance / reach[kind], placement_types, placement_rotations,
+            placement_translations, buckets, bucket_next, kind, turned, place_there,
         )  # fmt: skip
         if other < 0:
-            other = add_spot(kit, answers, g, kind, turned, place_there)
+            other = add_placement(kit, contacts, state, kind, turned, place_there)
         if other < 0:
             return False
-        node = find_node(heads, node_parts, node_next, other, part)
-        if node < 0 or node_counts[node] == FORBIDS:
+        link = find_link(first_links, link_parts, link_next, other, part)
+        if link < 0 or link_counts[link] == LINK_FORBIDS:
             return True
-        if g.spot_parts[other] >= 0:
+        if state.placed_parts[other] >= 0:
             standing += 1
-        elif g.bad[other] > 0:
+        elif state.blockers[other] > 0:
             return True
         members[end] = other
         end += 1
         key += mix(np.uint64(other) + np.uint64(1))
     if standing != touching:
         return True
-    for known in range(g.first_candidates[part], g.counts[CANDIDATES]):
-        if g.hashes[known] == key:
-            g.weights[known] += patterns.weights[pattern]
+    for known in range(state.first_candidates[part], state.counts[N_CANDIDATES]):
+        if state.candidate_keys[known] == key:
+            state.weights[known] += patterns.weights[pattern]
             return True
-    candidate = g.counts[CANDIDATES]
-    g.counts[CANDIDATES] += 1
-    g.counts[MEMBERS] = end
-    g.member_starts[candidate] = start
-    g.member_starts[candidate + 1] = end
-    g.candidate_parts[candidate] = part
-    g.patterns[candidate] = pattern
-    g.weights[candidate] = patterns.weights[pattern]
-    g.hashes[candidate] = key
-    g.alive[candidate] = True
-    g.alive_counts[part] += 1
+    candidate = state.counts[N_CANDIDATES]
+    state.counts[N_CANDIDATES] += 1
+    state.counts[N_MEMBERS] = end
+    state.member_starts[candidate] = start
+    state.member_starts[candidate + 1] = end
+    state.candidate_parts[candidate] = part
+    state.patterns[candidate] = pattern
+    state.weights[candidate] = patterns.weights[pattern]
+    state.candidate_keys[candidate] = key
+    state.in_domain[candidate] = True
+    state.domain_sizes[part] += 1
     for k in range(start, end):
-        node_counts[find_node(heads, node_parts, node_next, members[k], part)] += 1
+        link_counts[find_link(first_links, link_parts, link_next, members[k], part)] += 1
     return True
 
 
 @numba.njit(cache=True)
 def _within(boxes, low, high, part_type, rotation, translation):
-    """Whether a part at a pose lies between two corners."""
+    """Return whether a part at a pose lies between two corners."""
     for i in range(3):
         centre, half = translation[i], 0.0
         for j in range(3):
@@ -232,159 +270,194 @@ def _within(boxes, low, high, part_type, rotation, translation):
 
 
 @numba.njit(cache=True, inline="always")
-def _has(member_starts, members, candidate, spot):
+def _has(member_starts, members, candidate, placement):
     k, end = member_starts[candidate], member_starts[candidate + 1]
-    while k < end and members[k] != spot:
+    while k < end and members[k] != placement:
         k += 1
     return k < end
 
 
 @numba.njit(cache=True)
-def _keep_only_with(g, part, spot):
-    """Strike the candidates of a part that lack a spot; False where none is left."""
-    candidate, count = g.first_candidates[part], g.alive_counts[part]
-    alive, member_starts, members = g.alive, g.member_starts, g.members
+def _keep_only_with(state, part, placement):
+    """Prune the candidates of a part that lack a placement; return False where its domain becomes empty."""
+    candidate, count = state.first_candidates[part], state.domain_sizes[part]
+    in_domain, member_starts, members = state.in_domain, state.member_starts, state.members
     while count > 0:
-        if alive[candidate]:
+        if in_domain[candidate]:
             count -= 1
-            if not _has(member_starts, members, candidate, spot) and not strike(g, candidate):
+            if not _has(member_starts, members, candidate, placement) and not prune(state, candidate):
                 return False
         candidate += 1
     return True
 
 
 @numba.njit(cache=True)
-def strike(g, candidate):
-    """Take a candidate out of its part's domain; False where the domain is empty then."""
-    part = g.candidate_parts[candidate]
-    g.alive[candidate] = False
-    g.alive_counts[part] -= 1
-    g.dirty[part] = True
-    g.trail[g.counts[TRAIL]] = candidate
-    g.counts[TRAIL] += 1
-    heads, node_parts, node_next, node_counts = g.heads, g.node_parts, g.node_next, g.node_counts
-    members, bad, spot_parts, events, counts = g.members, g.bad, g.spot_parts, g.events, g.counts
-    for k in range(g.member_starts[candidate], g.member_starts[candidate + 1]):
-        spot = members[k]
-        node = find_node(heads, node_parts, node_next, spot, part)
-        node_counts[node] -= 1
-        if node_counts[node] == 0 and spot_parts[spot] < 0:
-            bad[spot] += 1
-            _report(bad, events, counts, spot)
-    return g.alive_counts[part] > 0
+def prune(state, candidate):
+    """Remove a candidate from its part's domain; return False where the domain becomes empty."""
+    part = state.candidate_parts[candidate]
+    state.in_domain[candidate] = False
+    state.domain_sizes[part] -= 1
+    state.changed[part] = True
+    push_pruned(state, candidate)
+    first_links, link_parts, link_next, link_counts = (
+        state.first_links,
+        state.link_parts,
+        state.link_next,
+        state.link_counts,
+    )
+    members, blockers, placed_parts, newly_blocked, counts = (
+        state.members,
+        state.blockers,
+        state.placed_parts,
+        state.newly_blocked,
+        state.counts,
+    )
+    for k in range(state.member_starts[candidate], state.member_starts[candidate + 1]):
+        placement = members[k]
+        link = find_link(first_links, link_parts, link_next, placement, part)
+        link_counts[link] -= 1
+        if link_counts[link] == 0 and placed_parts[placement] < 0:
+            blockers[placement] += 1
+            _queue_blocked(blockers, newly_blocked, counts, placement)
+    return state.domain_sizes[part] > 0
 
 
 @numba.njit(cache=True)
-def narrow(g, candidate):
+def assign(state, candidate):
     """Make a candidate the only one of its part."""
-    part = g.candidate_parts[candidate]
-    for other in range(g.first_candidates[part], g.counts[CANDIDATES]):
-        if g.candidate_parts[other] != part:
+    part = state.candidate_parts[candidate]
+    for other in range(state.first_candidates[part], state.counts[N_CANDIDATES]):
+        if state.candidate_parts[other] != part:
             break
-        if g.alive[other] and other != candidate:
-            strike(g, other)
+        if state.in_domain[other] and other != candidate:
+            prune(state, other)
 
 
 @numba.njit(cache=True)
-def propagate(kit, patterns, answers, g, field):
-    """Rid domains of what cannot be and place what must be, until nothing follows any more."""
-    counts, events, dirty = g.counts, g.events, g.dirty
+def propagate(problem, state):
+    """Prune what cannot be and place what must be, until nothing follows; return OK, CONFLICT or NO_ROOM."""
+    counts, newly_blocked, dirty = state.counts, state.newly_blocked, state.changed
     while True:
-        while counts[EVENTS] > 0:
-            counts[EVENTS] -= 1
-            if not _rid(g, events[counts[EVENTS]]):
-                return CONFLICT
+        while counts[N_NEWLY_BLOCKED] > 0:
+            counts[N_NEWLY_BLOCKED] -= 1
+            if not _prune_all_with(state, newly_blocked[counts[N_NEWLY_BLOCKED]]):
+                return Outcome.CONFLICT
         part, forced = 0, -1
-        while part < counts[GROWN_PARTS] and forced < 0:
+        while part < counts[N_GROWN_PARTS] and forced < 0:
             if dirty[part]:
-                forced = _forced(g, part)
+                forced = _forced(state, part)
                 if forced < 0:
                     dirty[part] = False
             part += 1
         if forced < 0:
-            return FINE
-        outcome = place(kit, patterns, answers, g, field, forced)
-        if outcome != FINE:
+            return Outcome.OK
+        outcome = place(problem, state, forced)
+        if outcome != Outcome.OK:
             return outcome
 
 
 @numba.njit(cache=True)
-def _rid(g, spot):
-    """Strike every candidate that has a bad spot; False where a domain is empty then."""
-    if g.spot_parts[spot] >= 0:
+def _prune_all_with(state, placement):
+    """Prune every candidate that has a blocked placement; return False where a domain becomes empty."""
+    if state.placed_parts[placement] >= 0:
         return True
-    node_parts, node_next, node_counts = g.node_parts, g.node_next, g.node_counts
-    alive, member_starts, members = g.alive, g.member_starts, g.members
-    node = g.heads[spot]
-    while node >= 0:
-        if node_counts[node] > 0:
-            candidate = g.first_candidates[node_parts[node]]
-            while node_counts[node] > 0:
-                if alive[candidate] and _has(member_starts, members, candidate, spot) and not strike(g, candidate):
+    link_parts, link_next, link_counts = state.link_parts, state.link_next, state.link_counts
+    in_domain, member_starts, members = state.in_domain, state.member_starts, state.members
+    link = state.first_links[placement]
+    while link >= 0:
+        if link_counts[link] > 0:
+            candidate = state.first_candidates[link_parts[link]]
+            while link_counts[link] > 0:
+                if (
+                    in_domain[candidate]
+                    and _has(member_starts, members, candidate, placement)
+                    and not prune(state, candidate)
+                ):
                     return False
                 candidate += 1
-        node = node_next[node]
+        link = link_next[link]
     return True
 
 
 @numba.njit(cache=True)
-def _forced(g, part):
-    """A spot that all candidates of a part have and where none stands, or -1."""
-    candidate, alive, count = g.first_candidates[part], g.alive, g.alive_counts[part]
-    heads, node_parts, node_next, node_counts = g.heads, g.node_parts, g.node_next, g.node_counts
-    members, spot_parts = g.members, g.spot_parts
-    while not alive[candidate]:
+def _forced(state, part):
+    """Return a placement that all candidates of a part have and where no part is placed, or -1."""
+    candidate, in_domain, count = state.first_candidates[part], state.in_domain, state.domain_sizes[part]
+    first_links, link_parts, link_next, link_counts = (
+        state.first_links,
+        state.link_parts,
+        state.link_next,
+        state.link_counts,
+    )
+    members, placed_parts = state.members, state.placed_parts
+    while not in_domain[candidate]:
         candidate += 1
-    for k in range(g.member_starts[candidate], g.member_starts[candidate + 1]):
-        spot = members[k]
-        if spot_parts[spot] < 0:
-            node = find_node(heads, node_parts, node_next, spot, part)
-            if node_counts[node] == count:
-                return spot
+    for k in range(state.member_starts[candidate], state.member_starts[candidate + 1]):
+        placement = members[k]
+        if placed_parts[placement] < 0:
+            link = find_link(first_links, link_parts, link_next, placement, part)
+            if link_counts[link] == count:
+                return placement
     return -1
 
 
 @numba.njit(cache=True)
-def undo(g, length):
-    """Take back everything since the trail was so long."""
-    heads, node_parts, node_next, node_counts = g.heads, g.node_parts, g.node_next, g.node_counts
-    members, member_starts, bad, spot_parts, counts = g.members, g.member_starts, g.bad, g.spot_parts, g.counts
-    counts[EVENTS] = 0
-    while counts[TRAIL] > length:
-        counts[TRAIL] -= 1
-        entry = g.trail[counts[TRAIL]]
-        if entry < 0:
-            _take_off(g, -1 - entry)
+def undo(state, length):
+    """Undo everything since the trail had that length."""
+    first_links, link_parts, link_next, link_counts = (
+        state.first_links,
+        state.link_parts,
+        state.link_next,
+        state.link_counts,
+    )
+    members, member_starts, blockers, placed_parts, counts = (
+        state.members,
+        state.member_starts,
+        state.blockers,
+        state.placed_parts,
+        state.counts,
+    )
+    counts[N_NEWLY_BLOCKED] = 0
+    while counts[TRAIL_LENGTH] > length:
+        counts[TRAIL_LENGTH] -= 1
+        entry = state.trail[counts[TRAIL_LENGTH]]
+        if placed_part(entry) >= 0:
+            _take_off(state, placed_part(entry))
             continue
-        part = g.candidate_parts[entry]
+        part = state.candidate_parts[entry]
         for k in range(member_starts[entry], member_starts[entry + 1]):
-            spot = members[k]
-            node = find_node(heads, node_parts, node_next, spot, part)
-            if node_counts[node] == 0 and spot_parts[spot] < 0:
-                bad[spot] -= 1
-            node_counts[node] += 1
-        g.alive[entry] = True
-        g.alive_counts[part] += 1
-    for part in range(g.counts[GROWN_PARTS]):
-        g.dirty[part] = False
+            placement = members[k]
+            link = find_link(first_links, link_parts, link_next, placement, part)
+            if link_counts[link] == 0 and placed_parts[placement] < 0:
+                blockers[placement] -= 1
+            link_counts[link] += 1
+        state.in_domain[entry] = True
+        state.domain_sizes[part] += 1
+    for part in range(state.counts[N_GROWN_PARTS]):
+        state.changed[part] = False
 
 
 @numba.njit(cache=True)
-def _take_off(g, part):
-    """Take the newest part off its spot, and its nodes and candidates with it."""
-    heads, node_parts, node_next, node_counts = g.heads, g.node_parts, g.node_next, g.node_counts
-    bad, spot_parts, counts = g.bad, g.spot_parts, g.counts
-    for other in range(counts[SPOTS]):
-        node = heads[other]
-        if node >= 0 and node_parts[node] == part:
-            if node_counts[node] == FORBIDS or (node_counts[node] == 0 and spot_parts[other] < 0):
-                bad[other] -= 1
-            heads[other] = node_next[node]
-            node_next[node] = counts[FREE]
-            counts[FREE] = node
-    spot = g.part_spots[part]
-    g.spot_parts[spot] = -1
-    g.have[g.spot_types[spot]] -= 1
-    g.counts[CANDIDATES] = g.first_candidates[part]
-    g.counts[MEMBERS] = g.member_starts[g.counts[CANDIDATES]] if g.counts[CANDIDATES] > 0 else 0
-    g.counts[GROWN_PARTS] = part
+def _take_off(state, part):
+    """Remove the newest part from its placement, with its links and candidates."""
+    first_links, link_parts, link_next, link_counts = (
+        state.first_links,
+        state.link_parts,
+        state.link_next,
+        state.link_counts,
+    )
+    blockers, placed_parts, counts = state.blockers, state.placed_parts, state.counts
+    for other in range(counts[N_PLACEMENTS]):
+        link = first_links[other]
+        if link >= 0 and link_parts[link] == part:
+            if link_counts[link] == LINK_FORBIDS or (link_counts[link] == 0 and placed_parts[other] < 0):
+                blockers[other] -= 1
+            first_links[other] = link_next[link]
+            link_next[link] = counts[FREE_LINK]
+            counts[FREE_LINK] = link
+    placement = state.part_placements[part]
+    state.placed_parts[placement] = -1
+    state.type_counts[state.placement_types[placement]] -= 1
+    state.counts[N_CANDIDATES] = state.first_candidates[part]
+    state.counts[N_MEMBERS] = state.member_starts[state.counts[N_CANDIDATES]] if state.counts[N_CANDIDATES] > 0 else 0
+    state.counts[N_GROWN_PARTS] = part

@@ -1,4 +1,4 @@
-"""Growing shapes of a kit, one a call: what the kernels need, and what each shape is to be like."""
+"""Growing shapes of a kit, one a call: the tables that compiled code needs, and the limits of each shape."""
 
 from __future__ import annotations
 
@@ -13,52 +13,55 @@ from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
 from stages.variations.growth.grow import grow, take_over
 from stages.variations.growth.pattern_tables import pattern_tables
-from stages.variations.growth.state import WORK, GrowthField, KnownContacts, growing
-from stages.variations.kernels.structs import PARTS, UNKNOWNS, KitTables, Outcome, Workspace
+from stages.variations.growth.state import WORK_DONE, GrowthField, GrowthProblem, KnownContacts, new_growth_state
+from stages.variations.kernels.outcomes import Outcome
+from stages.variations.kernels.structs import N_PARTS, KitTables, Workspace
+from stages.variations.kernels.tables import resolve_unknown
 
-LONGEST = 2.5
-"""How much longer, beside its other side, a field may be than the exemplar at most."""
-WIDEST = 4.0
-"""Area of a field at most, as a multiple of what so many parts take in the exemplar: loops need room to close."""
-TALLEST = 1.5
-"""Height of a field as a multiple of the tallest exemplar's."""
-ROOM = 0.25
-"""Sizes that are met within this share count as met."""
-WORK_A_TRY = 20.0
+MAX_ASPECT_FACTOR = 2.5
+"""How much longer, relative to its other side, a field may be than the exemplar."""
+MAX_AREA_FACTOR = 4.0
+"""Area of a field relative to what the same number of parts takes in the exemplar: loops need room to close."""
+HEIGHT_FACTOR = 1.5
+"""Height of a field relative to the tallest exemplar's."""
+SIZE_TOLERANCE = 0.25
+"""Sizes within this share of what was asked for are met."""
+CONTACTS_PER_TRY = 20.0
 """Contacts that growth asks for in the time of one try of the exchange."""
-MEMORY = 0.9
-"""How much of what was learnt about room for parts is kept from shape to shape."""
+MEMORY_SHARE = 0.9
+"""Share of what was learnt about room for parts that is kept from shape to shape."""
 
 
 class Grower:
     """Grows shapes within limits of size.
 
-    slots: of a kit with a grammar of slots, whose patterns grow then, those that nobody has seen among them; else the
-    observed ones do. parts, footprint: (least, most) parts, and sides of the area seen from above in the kit's units,
-    the shorter first; None where only `smallest` and `largest` parts, and what room so many parts take in the
-    exemplars, set the limits.
+    slots: the slot grammar of a kit that has one, whose patterns include unseen ones; otherwise observed patterns grow
+    parts: minimum and maximum number of parts, or None: `min_parts` and `max_parts` set the limits
+    footprint: sides of the area seen from above in the kit's units, the shorter first; None: as in the exemplars
     """
 
     def __init__(
         self,
-        answers: ContactOracle,
+        oracle: ContactOracle,
         tables: KitTables,
-        smallest: int,
-        largest: int,
+        min_parts: int,
+        max_parts: int,
         slots: SlotGrammar | None = None,
         parts: tuple[int, int] | None = None,
         footprint: tuple[float, float] | None = None,
     ) -> None:
-        kit = answers.kit
-        self.kit, self.answers, self.tables = kit, answers, tables
-        self.min_parts, self.max_parts = smallest, largest
+        kit = oracle.kit
+        self.kit, self.oracle, self.tables = kit, oracle, tables
+        self.min_parts, self.max_parts = min_parts, max_parts
         self.parts, self.footprint = parts, footprint
-        self.patterns = slots.patterns() if slots else observed_patterns(kit, answers.dockings, tables.up >= 0)
+        self.patterns = slots.patterns() if slots else observed_patterns(kit, oracle.dockings, tables.up >= 0)
         self._tables = pattern_tables(kit, self.patterns)
-        self._g = growing(len(kit.types), largest)
-        self._asker = answers.c_callback(self._g.spot_types, self._g.spot_rotations, self._g.spot_translations)
+        self._state = new_growth_state(len(kit.types), max_parts)
+        self._asker = oracle.c_callback(
+            self._state.placement_types, self._state.placement_rotations, self._state.placement_translations
+        )
         self._address = int(ctypes.cast(self._asker, ctypes.c_void_p).value or 0)
-        self._boxes = [_boxes(kit, each.assembly) for each in kit.exemplars]
+        self._boxes = [_boxes(kit, exemplar.assembly) for exemplar in kit.exemplars]
         self._corners = [(boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)) for boxes in self._boxes]
         self._up = {"y": 1, "z": 2}[kit.up]
         self._level = [axis for axis in range(3) if axis != self._up]
@@ -66,71 +69,72 @@ class Grower:
         self.seed = (0, 0)
 
     def grow(self, rng: np.random.Generator, ws: Workspace) -> tuple[int, float]:
-        """Try to grow one shape into `ws`: how it ended, as an `Outcome`, and the work that it took, in tries of the
-        exchange.
+        """Try to grow one shape into `ws`; return the outcome, and the work in tries of the exchange.
 
-        `seed` says then which part of which exemplar it grew from.
+        Afterwards `seed` is the number of the exemplar and of its part that it grew from.
         """
         field = self._field(rng)
-        table = self.answers.table
+        table = self.oracle.table
         contacts = KnownContacts(table.keys, table.values, self._address)
-        grown = grow(rng, self.tables, self._tables, contacts, self._g, field)
-        self.answers.raise_pending()
-        work = 1.0 + float(self._g.counts[WORK]) / WORK_A_TRY
+        problem = GrowthProblem(self.tables, self._tables, contacts, field)
+        grown = grow(rng, problem, self._state)
+        self.oracle.raise_pending()
+        work = 1.0 + float(self._state.counts[WORK_DONE]) / CONTACTS_PER_TRY
         if not grown:
             return Outcome.NO_MATCH, work
-        outcome = int(take_over(self.tables, self._tables, self.answers.table, self._g, ws))
+        outcome = int(take_over(self.tables, self._tables, self.oracle.table, self._state, ws))
         while outcome == Outcome.UNKNOWN:
-            if not self.answers.answer_unknown(ws, int(ws.counts[UNKNOWNS])):
+            if not resolve_unknown(self.oracle, ws):
                 return Outcome.CLASH, work
-            outcome = int(take_over(self.tables, self._tables, self.answers.table, self._g, ws))
+            outcome = int(take_over(self.tables, self._tables, self.oracle.table, self._state, ws))
         if outcome == Outcome.OK:
             outcome = self._size(ws, field)
         return outcome, work
 
     def _size(self, ws: Workspace, field: GrowthField) -> int:
-        """OK, TOO_SMALL or TOO_LARGE by what was asked for; and what was learnt of it for the next shape."""
-        count = int(ws.counts[PARTS])
-        self._room = MEMORY * self._room + (1 - MEMORY) * float(np.clip(np.log(field.target / count), -1.0, 1.0))
-        least, most = self.parts or (self.min_parts, self.max_parts)
+        """Return OK, TOO_SMALL or TOO_LARGE by the limits; learn from it how much room the next shape needs."""
+        count = int(ws.counts[N_PARTS])
+        learnt = float(np.clip(np.log(field.target / count), -1.0, 1.0))
+        self._room = MEMORY_SHARE * self._room + (1 - MEMORY_SHARE) * learnt
+        low, high = self.parts or (self.min_parts, self.max_parts)
         if self.parts is not None:
-            least, most = round(least * (1 - ROOM)), round(most * (1 + ROOM))
-        if count < least:
+            low, high = round(low * (1 - SIZE_TOLERANCE)), round(high * (1 + SIZE_TOLERANCE))
+        if count < low:
             return Outcome.TOO_SMALL
-        if count > most:
+        if count > high:
             return Outcome.TOO_LARGE
         if self.footprint is not None:
             boxes = ws.boxes[:count]
             spans = (boxes[:, 0] + boxes[:, 1]).max(axis=0) - (boxes[:, 0] - boxes[:, 1]).min(axis=0)
             shares = np.sort(spans[self._level]) / np.sort(self.footprint)
-            if (shares < 1 - ROOM).any():
+            if (shares < 1 - SIZE_TOLERANCE).any():
                 return Outcome.TOO_SMALL
-            if (shares > 1 + ROOM).any():
+            if (shares > 1 + SIZE_TOLERANCE).any():
                 return Outcome.TOO_LARGE
         return Outcome.OK
 
     def _field(self, rng: np.random.Generator) -> GrowthField:
-        """Where the next shape begins, and the room that it has."""
-        sizes = np.array([len(each.assembly) for each in self.kit.exemplars])
+        """Draw where the next shape begins, and its room."""
+        sizes = np.array([len(exemplar.assembly) for exemplar in self.kit.exemplars])
         number = int(np.searchsorted(sizes.cumsum(), rng.random() * sizes.sum(), side="right").clip(0, len(sizes) - 1))
         assembly = self.kit.exemplars[number].assembly
         part = min(int(rng.random() * len(assembly)), len(assembly) - 1)
         self.seed = number, part
         low, high = self._corners[number]
-        least, most = self.parts or (self.min_parts, self.max_parts)
-        target = round(float(np.exp(np.log(least) + rng.random() * (np.log(most) - np.log(least)))))
+        min_parts, max_parts = self.parts or (self.min_parts, self.max_parts)
+        target = round(float(np.exp(np.log(min_parts) + rng.random() * (np.log(max_parts) - np.log(min_parts)))))
         pose = assembly.poses[part]
         box_low, box_high = self._boxes[number][part]
         spans = high - low
         if self.footprint is not None:
-            sides = np.array(self.footprint) * (1 + ROOM / 2)
+            sides = np.array(self.footprint) * (1 + SIZE_TOLERANCE / 2)
             if rng.random() < 0.5:
                 sides = sides[::-1]
         else:
-            scale = target / len(assembly) * np.exp(self._room) * WIDEST ** rng.random()
-            aspect = LONGEST ** (2 * rng.random() - 1)
+            scale = target / len(assembly) * np.exp(self._room) * MAX_AREA_FACTOR ** rng.random()
+            aspect = MAX_ASPECT_FACTOR ** (2 * rng.random() - 1)
             sides = spans[self._level] * np.sqrt(scale) * np.array([np.sqrt(aspect), 1 / np.sqrt(aspect)])
-        # No narrower than a part needs, or nothing fits beside the first.
+        # No narrower than a part needs, or nothing fits next to the first.
         field_low, field_high = low.copy(), high.copy()
         for axis, side in zip(self._level, sides, strict=True):
             size = max(side, 1.01 * (box_high[axis] - box_low[axis]))
@@ -141,7 +145,7 @@ class Grower:
         height = spans[self._up]
         tallest = max(high[self._up] - low[self._up] for low, high in self._corners)
         if self.tables.up >= 0:
-            field_high[self._up] = field_low[self._up] + TALLEST * tallest
+            field_high[self._up] = field_low[self._up] + HEIGHT_FACTOR * tallest
         else:
             field_low[self._up] -= height
             field_high[self._up] += height
@@ -157,7 +161,7 @@ class Grower:
 
 
 def _boxes(kit: Kit, assembly: Assembly) -> FloatArray:
-    """The boxes around the parts as the kernels see them, around the turned boxes of their types, float64 (n, 2, 3)."""
+    """Return the boxes around the turned boxes of the parts' types, as compiled code sees them, float64 (n, 2, 3)."""
     bounds = np.stack([kit.types[index].bounds for index in assembly.types])
     turns, places = assembly.poses[:, :3, :3], assembly.poses[:, :3, 3]
     middles = np.einsum("nij,nj->ni", turns, bounds.mean(axis=1)) + places

@@ -1,4 +1,4 @@
-"""The patterns that growth may use, as tables for its kernels."""
+"""The patterns that growth may use, as tables for compiled code."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from stages.variations.growth.state import PatternTables
 
 
 def pattern_tables(kit: Kit, patterns: Sequence[Pattern]) -> PatternTables:
-    """Patterns, ordered by type, for the kernels."""
-    poses = np.concatenate([np.empty((0, 4, 4)), *(each.poses for each in patterns)])
-    parts = np.bincount(np.concatenate([each.assembly.types for each in kit.exemplars]), minlength=len(kit.types))
+    """Return patterns, ordered by type, as tables."""
+    poses = np.concatenate([np.empty((0, 4, 4)), *(pattern.poses for pattern in patterns)])
+    types = np.concatenate([exemplar.assembly.types for exemplar in kit.exemplars])
+    parts = np.bincount(types, minlength=len(kit.types))
     return PatternTables(
-        of_type=np.searchsorted([each.part_type for each in patterns], np.arange(len(kit.types) + 1)),
-        starts=np.cumsum([0, *(len(each.types) for each in patterns)]),
-        weights=np.array([float(each.seen) for each in patterns]),
-        owners=np.array([each.owner for each in patterns], dtype=np.int64),
-        ups=np.array([each.up for each in patterns]).reshape(-1, 3),
-        types=np.concatenate([np.empty(0, dtype=np.int64), *(each.types for each in patterns)]),
+        of_type=np.searchsorted([pattern.part_type for pattern in patterns], np.arange(len(kit.types) + 1)),
+        starts=np.cumsum([0, *(len(pattern.types) for pattern in patterns)]),
+        weights=np.array([float(pattern.seen) for pattern in patterns]),
+        owners=np.array([pattern.owner for pattern in patterns], dtype=np.int64),
+        ups=np.array([pattern.up for pattern in patterns]).reshape(-1, 3),
+        types=np.concatenate([np.empty(0, dtype=np.int64), *(pattern.types for pattern in patterns)]),
         rotations=np.ascontiguousarray(poses[:, :3, :3]),
         translations=np.ascontiguousarray(poses[:, :3, 3]),
         shares=parts / parts.sum(),

@@ -1,1 +1,3 @@
-"""The compiled ground of every method: layout of shapes in arrays, tables of a kit, admitted neighbourhoods."""
+"""Compiled code that all operators share: named tuples of arrays, tables of a kit, contacts and neighbourhoods of a
+variant.
+"""

@@ -5,15 +5,18 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import mix
-from stages.variations.kernels.structs import EDGES, PARTS
+from stages.shape.geometry.hash_tables import mix
+from stages.variations.kernels.structs import N_EDGES, N_PARTS
 
 
 @numba.njit(cache=True)
 def graph_key(label_of, ws, with_labels):
-    """A hash of the variant by colour refinement, of its graph, coloured by the kit's `label_of`, alone or with docking
-    labels. Equal graphs have equal keys; different keys mean different graphs."""
-    v, edges = ws.counts[PARTS], ws.counts[EDGES]
+    """Return a hash of the variant's graph by colour refinement, coloured by `label_of`, without or with docking
+    labels.
+
+    Equal graphs have equal keys; different keys mean different graphs.
+    """
+    v, edges = ws.counts[N_PARTS], ws.counts[N_EDGES]
     for i in range(v):
         ws.colour[i] = mix(np.uint64(label_of[ws.types[i]]) + np.uint64(0x51ED270B))
     classes = 0
@@ -31,13 +34,13 @@ def graph_key(label_of, ws, with_labels):
             ws.colour[i] = ws.fresh[i]
             ranked[i] = ws.fresh[i]
         ranked.sort()
-        found = 1
+        classes_now = 1
         for i in range(1, v):
             if ranked[i] != ranked[i - 1]:
-                found += 1
-        if found == classes:
+                classes_now += 1
+        if classes_now == classes:
             break
-        classes = found
+        classes = classes_now
     total = np.uint64(v)
     for i in range(v):
         total += mix(ranked[i])

@@ -1,6 +1,6 @@
-"""Whether a grammar admits a neighbourhood, by its rule (strings §3); what was asked before is remembered.
+"""Whether a grammar admits a neighbourhood, by its rule (strings §3); earlier verdicts are remembered.
 
-It says the same as `stages.shape.graphs.neighbourhoods.admits`, without hubs, which no shape of the search has.
+It agrees with `stages.shape.graphs.neighbourhoods.admits`, without hubs, which no shape of the search has.
 """
 
 from __future__ import annotations
@@ -8,31 +8,31 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import look_up, mix
-from stages.variations.kernels.structs import MISSING
+from stages.shape.geometry.contact_lookup import UNKNOWN_CONTACT
+from stages.shape.geometry.hash_tables import look_up, mix
 
 
 @numba.njit(cache=True, inline="always")
 def neighbourhood_key(kit, part_type):
-    """What the key of a part's neighbourhood starts from; the weights of its neighbours' types are added."""
+    """Return the start of the key of a part's neighbourhood; the weights of its neighbours' types are added."""
     return mix(kit.weights[part_type])
 
 
 @numba.njit(cache=True)
 def recalled(rules, key):
-    """1 or 0 where the neighbourhood of this key is known to be admitted or not, else MISSING."""
+    """Return 1 or 0 where the verdict of this key is known, else MISSING_KEY."""
     verdict = look_up(rules.keys, rules.verdicts, key)
-    return 0 if verdict == MISSING and rules.level == 0 else verdict
+    return 0 if verdict == UNKNOWN_CONTACT and rules.level == 0 else verdict
 
 
 @numba.njit(cache=True)
 def admitted(kit, part_type, near, count):
-    """Whether a part may have neighbours of the types `near[:count]`."""
+    """Return whether a part may have neighbours of the types near[:count]."""
     key = neighbourhood_key(kit, part_type)
     for n in range(count):
         key += kit.weights[near[n]]
     verdict = recalled(kit.rules, key)
-    if verdict == MISSING:
+    if verdict == UNKNOWN_CONTACT:
         labels = np.empty(count, dtype=np.int64)
         for n in range(count):
             labels[n] = kit.label_of[near[n]]
@@ -43,7 +43,7 @@ def admitted(kit, part_type, near, count):
 
 @numba.njit(cache=True)
 def _rule(rules, part_type, near, count):
-    """The rule on labels."""
+    """Return the verdict of the rule, on labels."""
     if rules.level < 4 and (count >= rules.sizes.shape[1] or not rules.sizes[part_type, count]):
         return 0
     if rules.level == 1:
@@ -75,7 +75,7 @@ def _rule(rules, part_type, near, count):
 
 @numba.njit(cache=True)
 def _remember(rules, key, verdict):
-    """Keep a verdict while there is room: it never changes, so what is kept changes no answer."""
+    """Keep a verdict while there is room; verdicts never change, so this changes no answer."""
     if 2 * rules.filled[0] >= len(rules.keys) or key == np.uint64(0):
         return
     mask = np.uint64(len(rules.keys) - 1)

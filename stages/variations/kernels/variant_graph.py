@@ -1,15 +1,15 @@
-"""The variant in hand: the boxes around its parts, and its edges."""
+"""The graph of the variant that is being made: boxes around its parts, and its edges."""
 
 from __future__ import annotations
 
 import numba
 
-from stages.variations.kernels.structs import EDGES, TRY
+from stages.variations.kernels.structs import N_EDGES, TRY_NUMBER
 
 
 @numba.njit(cache=True)
 def inherit_edges(starts, ends, labels, index, ws):
-    """Add the edges of a shape between parts that are in the variant; `index` says as which, or -1."""
+    """Add the edges of a shape between parts that are in the variant; `index` gives their numbers there, or -1."""
     for part in range(len(starts) - 1):
         i = index[part]
         if i < 0:
@@ -28,20 +28,20 @@ def inherit_edges(starts, ends, labels, index, ws):
 
 @numba.njit(cache=True)
 def set_edge(stamp, label, edges, counts, i, j, label_ij, label_ji):
-    """Add an edge of the variant, or only its labels where it is there."""
-    if stamp[i, j] != counts[TRY]:
-        stamp[i, j] = counts[TRY]
-        stamp[j, i] = counts[TRY]
-        edges[counts[EDGES], 0] = i
-        edges[counts[EDGES], 1] = j
-        counts[EDGES] += 1
+    """Add an edge of the variant, or only its labels where it exists."""
+    if stamp[i, j] != counts[TRY_NUMBER]:
+        stamp[i, j] = counts[TRY_NUMBER]
+        stamp[j, i] = counts[TRY_NUMBER]
+        edges[counts[N_EDGES], 0] = i
+        edges[counts[N_EDGES], 1] = j
+        counts[N_EDGES] += 1
     label[i, j] = label_ij
     label[j, i] = label_ji
 
 
 @numba.njit(cache=True)
 def place_boxes(type_boxes, types, rotations, translations, count, boxes):
-    """The axis-aligned boxes around the parts as centre and half extents."""
+    """Write the axis-aligned boxes around the parts, as centre and half extents."""
     for v in range(count):
         for i in range(3):
             centre, half = translations[v, i], 0.0

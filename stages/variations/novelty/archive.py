@@ -1,6 +1,6 @@
-"""The archive: a grid over the features of variants, with counts of its cells and of the type histograms.
+"""The MAP-Elites archive: a grid over the features of variants, with counts of its cells and of type histograms.
 
-It says which parents are rare, and which variants add to what is there (quality-diversity search).
+It tells which parents are rare and which variants are new (quality-diversity search).
 """
 
 from __future__ import annotations
@@ -15,13 +15,16 @@ from stages.variations.novelty.features import AXES, Axis
 Cell = tuple[int, ...]
 
 Place = tuple[int, int]
-"""Where a variant stands: the numbers of its cell and of its histogram, in the order in which they were first seen."""
+"""Numbers of a variant's cell and of its histogram, in the order in which they were first seen."""
 
 _SHARES = ("mixture", "neighbourhood_mixture", "distance", "copied_share")
 
 
 def cell_of(features: Float32Array, axes: Sequence[Axis], resolution: int) -> Cell:
-    """The cell of features float32 (10,): sizes by octaves, shares in equal steps with 0 apart, the dominant type."""
+    """Return the cell of features float32 (10,).
+
+    Sizes are binned by octaves, shares in equal steps with 0 apart; the dominant type is its own bin.
+    """
     cell = []
     for axis in axes:
         value = float(features[AXES.index(axis)])
@@ -30,39 +33,41 @@ def cell_of(features: Float32Array, axes: Sequence[Axis], resolution: int) -> Ce
         elif axis in _SHARES:
             cell.append(int(np.ceil(4 * resolution * value - 1e-6)))
         else:
-            # A hair is added so that sizes which are equal but for rounding share a cell.
+            # The small addition puts sizes that differ only by rounding into one cell.
             cell.append(int(np.floor(resolution * np.log2(value + (axis == "cycle_rank")) + 1e-3)) if value > 0 else 0)
     return tuple(cell)
 
 
 class Archive:
-    """How many variants there are of each cell and of each histogram."""
+    """Counts of variants by cell and by histogram."""
 
     def __init__(self, quota: int) -> None:
         self.cell_quota = quota
         self._cells, self._histograms = _Tally(), _Tally()
 
     def add(self, cell: Cell, histogram: int) -> Place:
-        """Count one variant, `histogram` being a hash of its type histogram, and say where it stands."""
+        """Count one variant with the hash `histogram` of its type histogram; return its place."""
         return self._cells.add(cell), self._histograms.add(histogram)
 
     def crowds(self, places: np.ndarray) -> np.ndarray:
-        """How common the variants at some places, int (k, 2), are, int64 (k,); the rarest have the least."""
+        """Return how common the variants at k places int (k, 2) are, int64 (k,); the rarest have the smallest
+        numbers.
+        """
         crowds: np.ndarray = self._cells.counts[places[:, 0]] * self._histograms.counts[places[:, 1]]
         return crowds
 
     def has_histogram(self, histogram: int) -> bool:
-        """Whether a variant with this histogram was counted."""
+        """Return whether a variant with this histogram was counted."""
         return histogram in self._histograms.numbers
 
     def is_full(self, cell: Cell, histogram: int) -> bool:
-        """Whether the archive has enough of such variants: the histogram is known and the cell has its quota."""
+        """Return whether the histogram is known and the cell has its quota."""
         number = self._cells.numbers.get(cell)
         return self.has_histogram(histogram) and number is not None and self._cells.counts[number] >= self.cell_quota
 
 
 class _Tally:
-    """Things by the number under which they were first seen, and how often each was."""
+    """Things, numbered in the order in which they were first seen, with their counts."""
 
     def __init__(self) -> None:
         self.numbers: dict[Hashable, int] = {}

@@ -1,4 +1,4 @@
-"""How much of a shape is copied whole: pieces that stand rigidly so in one exemplar."""
+"""Verbatim copies: pieces of a shape that one rigid transform lays on an exemplar."""
 
 from __future__ import annotations
 
@@ -15,21 +15,24 @@ from stages.variations.kernels.structs import ShapeTables
 from stages.variations.kernels.tables import shape_tables
 from stages.variations.novelty.rigid_pieces import Dockings, Groups, Joints, Target, cover, locate, rigid_pieces
 
-BUDGET = 2_000_000
-"""Contacts that are looked at for one shape at most. Rare dockings are looked at first, so that what is left unseen
-beyond it are repetitions of common ones: `largest` may then be too small, and `pieces` too many."""
+CONTACT_BUDGET = 2_000_000
+"""Contacts looked at for one shape. Rare dockings come first, so beyond the budget only repetitions of common ones are
+left out; `largest` may then be too small and `pieces` too large.
+"""
 
 
 @dataclass(frozen=True)
 class CopiedPieces:
-    """How much of a shape is copied whole.
+    """How much of a shape is a verbatim copy.
 
-    A piece is a connected set of parts that stand so in one exemplar: one rigid motion, no reflection, lays each part
-    on one that looks the same there, and the contacts that connect them are contacts there, too.
+    A piece is a connected set of parts that stand so in one exemplar: one rigid transform, no reflection, lays each
+    part
+    on one that looks the same, and the contacts that connect the parts are contacts there too.
 
-    largest: share of the shape's parts in its largest piece, 0 to 1; pieces: how many pieces cover the shape, each
-    chosen to cover most of what those before it left; exemplar: share of an exemplar's parts that the largest piece is,
-    and `of` its name: of several exemplars that show it, the smallest.
+    largest: share of the shape's parts in its largest piece, 0 to 1
+    pieces: number of pieces that cover the shape, chosen greedily
+    exemplar: share of an exemplar's parts in the largest piece
+    of: name of that exemplar; the smallest of several
     """
 
     largest: float
@@ -38,7 +41,7 @@ class CopiedPieces:
     of: str
 
     def described(self) -> dict[str, Any]:
-        """The same as JSON, as it stands in a lineage."""
+        """Return the same as JSON for a lineage."""
         return {
             "share": round(self.largest, 6),
             "pieces": self.pieces,
@@ -48,19 +51,23 @@ class CopiedPieces:
 
 
 class CopyDetector:
-    """What assemblies of one kit have copied of its exemplars."""
+    """Measures how much assemblies of one kit copy from its exemplars."""
 
     def __init__(self, kit: Kit, dockings: DockingTable) -> None:
-        self._names = tuple(each.name for each in kit.exemplars)
+        self._names = tuple(exemplar.name for exemplar in kit.exemplars)
         self._types = len(kit.types)
         self._groups = _groups(kit)
         self._dockings = _dockings(kit, self._groups)
         self._target = self._exemplars(kit, dockings)
-        self._has = np.array([np.isin(np.arange(self._types), each.assembly.types) for each in kit.exemplars])
+        self._has = np.array([np.isin(np.arange(self._types), exemplar.assembly.types) for exemplar in kit.exemplars])
 
     def copied(self, assembly: Assembly, labels: IntArray) -> CopiedPieces:
-        """How much of `assembly` is copied. labels: int32 (m, 2), directed docking labels of its edges, as from
-        `DockingTable.label_edges`, -1 for contacts that no exemplar shows."""
+        """Return how much of `assembly` is copied.
+
+        labels: int32 (m, 2), directed docking labels of its edges, as from `DockingTable.label_edges`; -1 where no
+            exemplar
+        shows the contact
+        """
         shape = shape_tables(assembly, labels, self._types)
         parts, starts, owners = rigid_pieces(
             self._groups,
@@ -70,7 +77,7 @@ class CopyDetector:
             _tails(shape),
             self._joints(shape),
             self._target,
-            BUDGET,
+            CONTACT_BUDGET,
         )
         sizes = np.diff(starts)
         if len(sizes):
@@ -89,13 +96,13 @@ class CopyDetector:
         return Joints(shape.starts, shape.ends, shape.labels, *locate(self._groups, self._dockings, shape))
 
     def _exemplars(self, kit: Kit, table: DockingTable) -> Target:
-        assemblies = [each.assembly for each in kit.exemplars]
-        sizes = np.array([len(each) for each in assemblies])
+        assemblies = [exemplar.assembly for exemplar in kit.exemplars]
+        sizes = np.array([len(assembly) for assembly in assemblies])
         shifts = np.cumsum(sizes) - sizes
         whole = Assembly(
-            np.concatenate([each.types for each in assemblies]),
-            np.concatenate([each.poses for each in assemblies]),
-            np.concatenate([each.edges + shift for each, shift in zip(assemblies, shifts, strict=True)]),
+            np.concatenate([assembly.types for assembly in assemblies]),
+            np.concatenate([assembly.poses for assembly in assemblies]),
+            np.concatenate([assembly.edges + shift for assembly, shift in zip(assemblies, shifts, strict=True)]),
         )
         shape = shape_tables(whole, table.label_edges(whole.types, whole.poses, whole.edges), self._types)
         type_sizes = np.diff(shape.type_starts)
@@ -104,12 +111,12 @@ class CopyDetector:
         joints, tails = self._joints(shape), _tails(shape)
         groups, dockings = self._groups, self._dockings
         by_label = np.argsort(shape.labels, kind="stable")
-        rooms = dockings.spot_counts[shape.types]
+        rooms = dockings.place_counts[shape.types]
         at_starts, at = np.cumsum(rooms) - rooms, np.full(rooms.sum(), -1, dtype=np.int32)
         # Contacts between two dockings, which are neither within tolerance, have no label and no spot.
-        told = np.flatnonzero(joints.labels >= 0)
-        spots = dockings.spots[dockings.rows[joints.labels[told]] + joints.near[told]]
-        at[at_starts[tails[told]] + spots] = told
+        known = np.flatnonzero(joints.labels >= 0)
+        place_numbers = dockings.place_numbers[dockings.rows[joints.labels[known]] + joints.near[known]]
+        at[at_starts[tails[known]] + place_numbers] = known
         directed = np.arange(2 * len(kit.grammar.dockings) + 1)
         return Target(
             rank=rank,
@@ -129,25 +136,25 @@ class CopyDetector:
 
 
 def _tails(shape: ShapeTables) -> np.ndarray:
-    """The part that each contact of a shape is seen from, int64 (2 m,)."""
+    """Return the part that each contact of a shape is seen from, int64 (2 m,)."""
     return np.repeat(np.arange(len(shape.types)), np.diff(shape.starts))
 
 
 def _handed(rotations: FloatArray) -> IntArray:
-    """1 for rotations (n, 3, 3), -1 for reflections, int64 (n,)."""
+    """Return 1 for rotations (n, 3, 3), -1 for reflections, int64 (n,)."""
     handed: IntArray = np.where(np.linalg.det(rotations) < 0, -1, 1)
     return handed
 
 
 def _groups(kit: Kit) -> Groups:
-    rotations = [np.ascontiguousarray(each.symmetries[:, :3, :3]) for each in kit.types]
-    orders = np.array([len(each) for each in rotations])
+    rotations = [np.ascontiguousarray(part_type.symmetries[:, :3, :3]) for part_type in kit.types]
+    orders = np.array([len(group) for group in rotations])
     inverses, products = [], []
-    for each in rotations:
-        table = np.full((len(each) + 1, len(each) + 1), len(each))
-        table[:-1, :-1] = [_numbers(each, first @ each) for first in each]
+    for group in rotations:
+        table = np.full((len(group) + 1, len(group) + 1), len(group))
+        table[:-1, :-1] = [_numbers(group, first @ group) for first in group]
         products.append(table.ravel())
-        inverses.append(_numbers(each, np.swapaxes(each, 1, 2)))
+        inverses.append(_numbers(group, np.swapaxes(group, 1, 2)))
     sizes = (orders + 1) ** 2
     return Groups(
         orders=orders,
@@ -157,13 +164,15 @@ def _groups(kit: Kit) -> Groups:
         signs=_handed(np.concatenate(rotations)),
         products=np.concatenate(products),
         rows=np.cumsum(sizes) - sizes,
-        reach=np.array([each.diagonal / 2 for each in kit.types]),
+        reach=np.array([part_type.diagonal / 2 for part_type in kit.types]),
     )
 
 
 def _numbers(group: FloatArray, rotations: FloatArray) -> np.ndarray:
-    """The number in a group (k, 3, 3) of each of some rotations (r, 3, 3), int64 (r,), k where it has none: those of
-    round parts are found by their corners and need not be all."""
+    """Return the number in a group (k, 3, 3) of each rotation (r, 3, 3), int64 (r,); k where the group lacks it.
+
+    The symmetries of round parts are found by their corners and need not be complete.
+    """
     apart = np.linalg.norm(group[1:] - group[0], axis=(1, 2)).min() / 2 if len(group) > 1 else np.inf
     gaps = np.linalg.norm(group[None] - rotations[:, None], axis=(2, 3))
     return np.where(gaps.min(axis=1) <= apart, gaps.argmin(axis=1), len(group))
@@ -171,11 +180,11 @@ def _numbers(group: FloatArray, rotations: FloatArray) -> np.ndarray:
 
 def _dockings(kit: Kit, groups: Groups) -> Dockings:
     ends, poses = np.empty((0, 2), np.int64), np.empty((0, 4, 4))
-    for each in kit.grammar.dockings:
-        ends = np.concatenate([ends, [(each.a, each.b), (each.b, each.a)]])
-        poses = np.concatenate([poses, [each.pose, invert(each.pose)]])
-    passed, kept, spots = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty(0, np.int64)]
-    spot_counts = np.zeros(len(kit.types), dtype=np.int64)
+    for docking in kit.grammar.dockings:
+        ends = np.concatenate([ends, [(docking.a, docking.b), (docking.b, docking.a)]])
+        poses = np.concatenate([poses, [docking.pose, invert(docking.pose)]])
+    passed, kept, place_numbers = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+    place_counts = np.zeros(len(kit.types), dtype=np.int64)
     # Two images of a docking are the same where one pose is within tolerance of both.
     within = 2 * kit.pose_tolerance
     for (a, b), pose in zip(ends.tolist(), poses, strict=True):
@@ -188,14 +197,14 @@ def _dockings(kit: Kit, groups: Groups) -> Dockings:
         kept.append(np.flatnonzero(same))
         side = len(first) + 1
         table = groups.products[groups.rows[a] :][: side**2].reshape(side, side)
-        # Symmetries that differ by one that is kept put the other part into one place.
+        # Symmetries that differ by a kept one put the other part into one place.
         _, places = np.unique(table[:-1, kept[-1]].min(axis=1), return_inverse=True)
-        spots.append(np.append(spot_counts[a] + places, -1))
-        spot_counts[a] += places.max() + 1
+        place_numbers.append(np.append(place_counts[a] + places, -1))
+        place_counts[a] += places.max() + 1
     lengths = groups.orders[ends[:, 0]] + 1
-    joined_spots = np.concatenate(spots)
-    # The last place around a type is that of what stands nowhere.
-    joined_spots = np.where(joined_spots < 0, spot_counts[np.repeat(ends[:, 0], lengths)], joined_spots)
+    joined_places = np.concatenate(place_numbers)
+    # The last place around a type stands for nowhere.
+    joined_places = np.where(joined_places < 0, place_counts[np.repeat(ends[:, 0], lengths)], joined_places)
     return Dockings(
         ends=ends,
         rotations=np.ascontiguousarray(poses[:, :3, :3]),
@@ -203,8 +212,8 @@ def _dockings(kit: Kit, groups: Groups) -> Dockings:
         passed=np.concatenate(passed),
         rows=np.cumsum(lengths) - lengths,
         kept=np.concatenate(kept),
-        kept_starts=np.cumsum([len(each) for each in kept]),
-        spots=joined_spots,
-        spot_counts=spot_counts + 1,
+        kept_starts=np.cumsum([len(symmetries) for symmetries in kept]),
+        place_numbers=joined_places,
+        place_counts=place_counts + 1,
         tolerance=kit.pose_tolerance,
     )

@@ -1,4 +1,4 @@
-"""Whether the exemplars of a kit can meet in one variant: what they share, and where one could go over into another."""
+"""Overlap of the exemplars of a kit: what they share, and where a variant could go over from one to another."""
 
 from __future__ import annotations
 
@@ -13,56 +13,58 @@ Rule = tuple[int, Multiset]
 
 
 def kit_overlap(kit: Kit) -> dict[str, Any]:
-    """What the exemplars of a kit share, as JSON; empty for a kit of one.
+    """Return what the exemplars of a kit share, as JSON; empty for a kit of one exemplar.
 
-    types: part types that several exemplars have, of `all_types`; neighbourhoods: types with a multiset of neighbour
-    types that several show, of `all_neighbourhoods`; joints: pairs of neighbourhoods that different exemplars show,
-    each with the other's type among its neighbours, so that their parts might stand side by side; meets: False where
-    it is proved that no variant under the grammar `multiset` has neighbourhoods which different exemplars alone show.
+    types, all_types: part types that several exemplars have, and all
+    neighbourhoods, all_neighbourhoods: types with a multiset of neighbour types that several exemplars show, and all
+    joints: pairs of neighbourhoods of different exemplars, each with the other's type among its neighbours
+    mixable: False if provably no variant under the grammar `multiset` can show neighbourhoods of different exemplars
 
-    The proof: a shape graph is connected. If it held a neighbourhood of one exemplar alone and one of another alone,
-    on the way between them two neighbourhoods of no common exemplar would stand side by side, which is a joint, or
-    there would be one that several exemplars show.
+    Proof: a shape graph is connected. Suppose it holds a neighbourhood that only one exemplar shows and one that only
+    another shows. On a path between them either two adjacent neighbourhoods have no exemplar in common, which is a
+    joint,
+    or several exemplars show one of them.
     """
     if len(kit.exemplars) < 2:
         return {}
     seen = [
         {
             (part_type, rule)
-            for part_type, rules in observe_neighbourhoods([kit.labelled(each.assembly)]).items()
+            for part_type, rules in observe_neighbourhoods([kit.labelled(exemplar.assembly)]).items()
             for rule in rules
         }
-        for each in kit.exemplars
+        for exemplar in kit.exemplars
     ]
     types = [{part_type for part_type, _ in rules} for rules in seen]
-    shared_types = {each for a, b in combinations(types, 2) for each in a & b}
+    shared_types = {part_type for a, b in combinations(types, 2) for part_type in a & b}
     shared = {rule for a, b in combinations(seen, 2) for rule in a & b}
-    joints = sum(_fit(one, other) for a, b in combinations(seen, 2) for one in a - shared for other in b - shared)
+    joints = sum(_fit(first, second) for a, b in combinations(seen, 2) for first in a - shared for second in b - shared)
     return {
         "types": len(shared_types),
         "all_types": len(set().union(*types)),
         "neighbourhoods": len(shared),
         "all_neighbourhoods": len(set().union(*seen)),
         "joints": joints,
-        "meets": bool(shared or joints),
+        "mixable": bool(shared or joints),
     }
 
 
-def _fit(one: Rule, other: Rule) -> bool:
-    """Whether each has the other's type among its neighbours."""
-    return any(near == other[0] for near, _ in one[1]) and any(near == one[0] for near, _ in other[1])
+def _fit(first: Rule, second: Rule) -> bool:
+    """Return whether each of two neighbourhoods has the other's type among its neighbours."""
+    return any(near == second[0] for near, _ in first[1]) and any(near == first[0] for near, _ in second[1])
 
 
-def overlap_sentence(found: Mapping[str, Any], strictness: str, crossings: Mapping[str, int]) -> str:
-    """`kit_overlap` in words, with what became of the tries to dock pieces of different ancestry, by outcome."""
+def overlap_sentence(shared: Mapping[str, Any], strictness: str, crossings: Mapping[str, int]) -> str:
+    """Return `kit_overlap` in words, with the outcomes of tries to join pieces of different ancestry."""
     text = (
-        f"the exemplars share {found['types']} of {found['all_types']} part types and {found['neighbourhoods']:,} of "
-        f"{found['all_neighbourhoods']:,} neighbourhoods; {found['joints']:,} pairs of others might stand side by side"
+        f"the exemplars share {shared['types']} of {shared['all_types']} part types and {shared['neighbourhoods']:,} "
+        f"of {shared['all_neighbourhoods']:,} neighbourhoods; {shared['joints']:,} pairs of others might stand side "
+        "by side"
     )
-    if not found["meets"] and strictness == "multiset":
+    if not shared["mixable"] and strictness == "multiset":
         text += ", so no variant can show both"
     total = sum(crossings.values())
     if total:
-        most = sorted(crossings.items(), key=lambda each: (-each[1], each[0]))
-        text += f"; {total:,} tries across them: " + ", ".join(f"{count:,} {why}" for why, count in most)
+        outcomes = sorted(crossings.items(), key=lambda outcome: (-outcome[1], outcome[0]))
+        text += f"; {total:,} tries across them: " + ", ".join(f"{count:,} {why}" for why, count in outcomes)
     return text

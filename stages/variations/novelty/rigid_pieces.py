@@ -1,10 +1,10 @@
-"""The pieces of a shape that stand rigidly so in an exemplar, and the fewest of them that cover it.
+"""The largest pieces of a shape that stand rigidly so in an exemplar, and a greedy cover of the shape by them.
 
-A part p lies on a part q of an exemplar by symmetry s where the motion that lays pose(p) on pose(q) * s is meant. As
-the motion is rigid, each part that p touches then lies on at most one part that q touches, by one symmetry: the piece
-is what is reached so, and a triple (p, q, s) belongs to one piece alone. Each contact is written as its docking and the
-symmetries of both its parts, pose = symmetry[near] * docking * symmetry[far], so that all of this is counting in
-groups. Symmetries are numbered within their type; the number after the last one stands for none.
+A part p lies on a part q of an exemplar by symmetry s under the transform that lays pose(p) on pose(q) * s. The
+transform is rigid, so each neighbour of p lies on at most one neighbour of q, by one symmetry. A piece is everything
+that is reached so, and a triple (p, q, s) belongs to one piece only. Each contact is written as its docking and the
+symmetries of both parts, pose = symmetry[near] * docking * symmetry[far]; all of this is then arithmetic in groups.
+Symmetries are numbered within their type; the number after the last one means none.
 """
 
 from __future__ import annotations
@@ -16,88 +16,68 @@ import numpy as np
 
 
 class Groups(NamedTuple):
-    """The symmetry groups of part types.
+    """The symmetry groups of part types."""
 
-    orders int64 (types,): numbers of symmetries; starts int64 (types,): where those of a type start in rotations
-    float64 (s, 3, 3) and inverses, signs int64 (s,), the latter -1 for reflections; products int64 (p,): from rows
-    int64 (types,) on, in rows of one more than the order, the number of each product; reach float64 (types,): half
-    diagonals.
-    """
-
-    orders: np.ndarray
-    starts: np.ndarray
-    rotations: np.ndarray
-    inverses: np.ndarray
-    signs: np.ndarray
-    products: np.ndarray
-    rows: np.ndarray
-    reach: np.ndarray
+    orders: np.ndarray  # int64 (types,): numbers of symmetries
+    starts: np.ndarray  # int64 (types,): first symmetry of each type in the next three
+    rotations: np.ndarray  # float64 (s, 3, 3)
+    inverses: np.ndarray  # int64 (s,)
+    signs: np.ndarray  # int64 (s,): -1 for reflections
+    products: np.ndarray  # int64 (p,): product tables, one row and column longer than the order
+    rows: np.ndarray  # int64 (types,): start of each type's table
+    reach: np.ndarray  # float64 (types,): half diagonals
 
 
 class Dockings(NamedTuple):
-    """The directed dockings, by label.
+    """The directed dockings, by label."""
 
-    ends int64 (labels, 2): types of the part that it is seen from and of the other; rotations float64 (labels, 3, 3),
-    translations float64 (labels, 3): one pose of the other; passed int64 (t,): from rows int64 (labels,) on, for each
-    symmetry of the first part the one of the other that does the same to the two, or none; kept int64 (c,): from
-    kept_starts int64 (labels + 1,) on the symmetries of the first part that have one; spots int64 (t,), as passed: the
-    number of the place where the other then stands, among all those around the first part's type, of which there are
-    spot_counts int64 (types,); tolerance: of poses, in kit units.
-    """
-
-    ends: np.ndarray
-    rotations: np.ndarray
-    translations: np.ndarray
-    passed: np.ndarray
-    rows: np.ndarray
-    kept: np.ndarray
-    kept_starts: np.ndarray
-    spots: np.ndarray
-    spot_counts: np.ndarray
-    tolerance: float
+    ends: np.ndarray  # int64 (labels, 2): type it is seen from, type of the other part
+    rotations: np.ndarray  # float64 (labels, 3, 3): one pose of the other part
+    translations: np.ndarray  # float64 (labels, 3)
+    passed: np.ndarray  # int64 (t,): symmetry of the other part that equals each symmetry of the first, or none
+    rows: np.ndarray  # int64 (labels,): start of each label in `passed` and `place_numbers`
+    kept: np.ndarray  # int64 (c,): symmetries of the first part with an equal one
+    kept_starts: np.ndarray  # int64 (labels + 1,)
+    place_numbers: np.ndarray  # int64 (t,): place of the other part among those around the first part's type
+    place_counts: np.ndarray  # int64 (types,)
+    tolerance: float  # of poses, in kit units
 
 
 class Joints(NamedTuple):
-    """The contacts of a shape seen from both ends: starts int64 (n + 1,), ends, labels, near and far int64 (2 m,), the
-    last two being the symmetries of the part they are seen from and of the other."""
+    """The contacts of a shape, seen from both ends."""
 
-    starts: np.ndarray
-    ends: np.ndarray
-    labels: np.ndarray
-    near: np.ndarray
-    far: np.ndarray
+    starts: np.ndarray  # int64 (n + 1,)
+    ends: np.ndarray  # int64 (2 m,)
+    labels: np.ndarray  # int64 (2 m,)
+    near: np.ndarray  # int64 (2 m,): symmetry of the part it is seen from
+    far: np.ndarray  # int64 (2 m,): symmetry of the other part
 
 
 class Target(NamedTuple):
-    """All exemplars as one: rank int64 (n,): number of a part among those of its type; type_sizes int64 (types,);
-    handed int64 (n,), -1 for parts that are placed as mirror images; owner int64 (n,): the exemplar of each part; sizes
-    int64 (exemplars,); joints, and undo_near, undo_far int64 (2 m,): the inverses of their near and far; at int32
-    (c,): from at_starts int64 (n,) on, for each spot around a part the joint to what stands there, or -1; tails int64
-    (2 m,): the part that each joint is seen from; by_label int64 (2 m,): joints in order of their labels, from
-    label_starts int64 (labels + 1,) on."""
+    """All exemplars as one shape."""
 
-    rank: np.ndarray
-    type_sizes: np.ndarray
-    handed: np.ndarray
-    owner: np.ndarray
-    sizes: np.ndarray
+    rank: np.ndarray  # int64 (n,): number of a part among those of its type
+    type_sizes: np.ndarray  # int64 (types,)
+    handed: np.ndarray  # int64 (n,): -1 for mirrored parts
+    owner: np.ndarray  # int64 (n,): exemplar of each part
+    sizes: np.ndarray  # int64 (exemplars,)
     joints: Joints
-    undo_near: np.ndarray
-    undo_far: np.ndarray
-    at: np.ndarray
-    at_starts: np.ndarray
-    tails: np.ndarray
-    by_label: np.ndarray
-    label_starts: np.ndarray
+    undo_near: np.ndarray  # int64 (2 m,): inverses of `joints.near`
+    undo_far: np.ndarray  # int64 (2 m,): inverses of `joints.far`
+    at: np.ndarray  # int32 (c,): joint to what stands at each place around a part, or -1
+    at_starts: np.ndarray  # int64 (n,)
+    tails: np.ndarray  # int64 (2 m,): part that each joint is seen from
+    by_label: np.ndarray  # int64 (2 m,): joints in order of their labels
+    label_starts: np.ndarray  # int64 (labels + 1,)
 
 
 @numba.njit(cache=True)
 def locate(groups, dockings, shape):
-    """The symmetries near and far, int64 (2 m,), by which each contact of a shape is an image of its docking."""
+    """Return the symmetries near and far, int64 (2 m,), by which each contact of a shape is an image of its docking."""
     near, far = np.zeros(len(shape.ends), dtype=np.int64), np.zeros(len(shape.ends), dtype=np.int64)
-    spot, turned, between = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    place_here, turned, between = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     place, pose = np.empty(3), np.empty((3, 3))
-    # An image is taken at once where it is so near that another one as near is the same.
+    # An image this close is unique: take it at once.
     plainly = (dockings.tolerance / 8) ** 2
     for part in range(len(shape.types)):
         for k in range(shape.starts[part], shape.starts[part + 1]):
@@ -123,10 +103,10 @@ def locate(groups, dockings, shape):
                 symmetry = groups.rotations[groups.starts[a] + s]
                 gap = 0.0
                 for i in range(3):
-                    spot[i] = 0.0
+                    place_here[i] = 0.0
                     for m in range(3):
-                        spot[i] += symmetry[i, m] * dockings.translations[label, m]
-                    gap += (spot[i] - place[i]) ** 2
+                        place_here[i] += symmetry[i, m] * dockings.translations[label, m]
+                    gap += (place_here[i] - place[i]) ** 2
                 if gap >= best:
                     continue
                 for i in range(3):
@@ -153,13 +133,13 @@ def locate(groups, dockings, shape):
 
 @numba.njit(cache=True)
 def _product(products, row, order, first, second):
-    """The number of the product of two symmetries of a type."""
+    """Return the number of the product of two symmetries of a type."""
     return products[row + first * (order + 1) + second]
 
 
 @numba.njit(cache=True)
 def _enter(visited, bit):
-    """Whether nobody has been at a triple before; somebody has from now on."""
+    """Mark a triple as visited; return whether it was new."""
     mask = np.uint64(1) << np.uint64(bit & 63)
     if visited[bit >> 6] & mask:
         return False
@@ -169,7 +149,7 @@ def _enter(visited, bit):
 
 @numba.njit(cache=True)
 def _rarest_first(joints, target):
-    """The contacts of a shape, each once, int64 (k,), those first whose docking the exemplars have least of."""
+    """Return the contacts of a shape, each once, int64 (k,), those with the docking rarest in the exemplars first."""
     chosen, times = np.empty(len(joints.ends), dtype=np.int64), np.empty(len(joints.ends), dtype=np.int64)
     count = 0
     for p in range(len(joints.starts) - 1):
@@ -184,8 +164,10 @@ def _rarest_first(joints, target):
 
 @numba.njit(cache=True)
 def _seeds(groups, dockings, types, handed, tails, joints, target, budget):
-    """The ways to lay a contact of a shape on one of an exemplar, rarest dockings first, at most `budget`: int64 (k, 3)
-    triples (p, q, s) of a part, the part that it lies on and by which symmetry."""
+    """Return the ways to lay a contact of a shape on one of an exemplar, rarest dockings first, at most `budget`.
+
+    Rows of int64 (k, 3) are triples (p, q, s): a part, the part that it lies on, and the symmetry.
+    """
     orders, products, rows, signs, firsts = groups.orders, groups.products, groups.rows, groups.signs, groups.starts
     inverses, kept, kept_starts = groups.inverses, dockings.kept, dockings.kept_starts
     labels, near, their_near = joints.labels, joints.near, target.joints.near
@@ -215,21 +197,21 @@ def _seeds(groups, dockings, types, handed, tails, joints, target, budget):
 
 @numba.njit(cache=True)
 def rigid_pieces(groups, dockings, types, handed, tails, joints, target, budget):
-    """The largest connected pieces, of two parts and more, of a shape that stand so in an exemplar by one rigid motion:
-    parts int64 (p,), starts int64 (k + 1,) of each piece in them, and the exemplar of each, int64 (k,).
+    """Return the largest connected pieces, of two parts and more, of a shape that stand so in an exemplar.
 
-    They are grown breadth first from the rarest dockings on, until `budget` contacts have been looked at; no clock
-    decides what is found. types, handed, tails and joints: of the shape, as those of `target`.
+    They grow breadth first from the rarest dockings until `budget` contacts have been looked at; no clock decides.
+    types, handed, tails, joints: of the shape, as those of `target`
+    Returns parts int64 (p,), starts int64 (k + 1,) of each piece in them, and the exemplar of each piece int64 (k,).
     """
-    # To take an array out of a tuple counts a reference, which in the loop would cost more than what is done there.
+    # Taking an array out of a tuple counts a reference, which in the loop would cost more than the work itself.
     orders, products, rows = groups.orders, groups.products, groups.rows
-    passed, spots, turns = dockings.passed, dockings.spots, dockings.rows
+    passed, place_numbers, turns = dockings.passed, dockings.place_numbers, dockings.rows
     joint_starts, ends, labels, near, far = joints
     their_ends, standing, standing_starts = target.joints.ends, target.at, target.at_starts
     undo_near, undo_far, rank, owner = target.undo_near, target.undo_far, target.rank, target.owner
     n = len(types)
     spans = orders[types] * target.type_sizes[types]
-    # A bit for each triple (p, q, s); q and s of the parts of the piece in hand; the last piece that a part was in.
+    # A bit for each triple (p, q, s); q and s of the parts of the current piece; the last piece that a part was in.
     offsets, visited = spans.cumsum() - spans, np.zeros(spans.sum() // 64 + 1, dtype=np.uint64)
     on, by, piece_of = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.full(n, -1, dtype=np.int64)
     parts, filled = np.empty(4 * n, dtype=np.int64), 0
@@ -259,7 +241,7 @@ def rigid_pieces(groups, dockings, types, handed, tails, joints, target, budget)
                 budget -= 1
                 b = types[other]
                 turned = _product(products, rows[a], orders[a], s, near[k])
-                t = standing[standing_starts[q] + spots[turns[label] + turned]]
+                t = standing[standing_starts[q] + place_numbers[turns[label] + turned]]
                 if t < 0:
                     continue
                 over = passed[turns[label] + _product(products, rows[a], orders[a], undo_near[t], turned)]
@@ -279,8 +261,9 @@ def rigid_pieces(groups, dockings, types, handed, tails, joints, target, budget)
 
 @numba.njit(cache=True)
 def cover(parts, starts, n):
-    """How many of the pieces cover n parts, each the one that covers most of what those before it left, and parts in
-    none of them alone (greedy set cover)."""
+    """Return how many of the pieces cover n parts by greedy set cover, counting each part in none of them as one
+    piece.
+    """
     pieces = len(starts) - 1
     first, following = np.full(n + 1, -1, dtype=np.int64), np.full(pieces, -1, dtype=np.int64)
     for piece in range(pieces - 1, -1, -1):

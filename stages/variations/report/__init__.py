@@ -1,1 +1,1 @@
-"""TODO: what this folder holds."""
+"""Reports on variations: measures of the selected samples, splits, advice for poor searches, contact sheets."""

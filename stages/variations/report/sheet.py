@@ -1,26 +1,16 @@
-"""A contact sheet of each kit of a collection: the variants that differ most, and some at random; and one of what took
-the place of what, where pieces of exemplars were replaced.
-
-python -m stages.variations.report.sheet --config configs/castle.yaml [--out datasets]
-
-Reads the finished variations from the work folder and writes `OUT/sheets/<dataset>-<kit>.png` and
-`OUT/sheets/<dataset>-<kit>-replaced.png`.
-"""
+"""Contact sheets of a collection: for each kit the variants that differ most and some at random, and replacements."""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from pipeline.config import load_config
+from pipeline.config import Config
 from pipeline.paths import DatasetPaths, write_file
 from pipeline.randomness import decision_rng
 from pipeline.records import read_record
-from pipeline.registry import find_stages
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_files import load_kit
@@ -33,81 +23,70 @@ from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.variations.substructures.replacement_sheet import replacements_sheet
 
-SHOWN = 24
-COLUMNS = 8
-CELL = 232
+MAX_VARIANTS_SHOWN = 24
+COLUMNS_PER_ROW = 8
+CELL_PIXELS = 232
 CAMERA = Camera(azimuth=-40.0, elevation=25.0)
 
 
-def kit_variants_sheet(kit: Kit, samples: Sequence[Sample], dull: str, rng: np.random.Generator) -> bytes:
-    """The sheet of one kit as PNG. `samples` are its variants in the order in which they were chosen, which is that
-    of how much each differs from the exemplars and from those before it. Where they are `dull`, which it then says,
-    each of the first stands beside the exemplar of which it has copied most."""
-    rest = rng.permutation(np.arange(min(SHOWN, len(samples)), len(samples)))[:SHOWN]
-    drawn = [samples[place] for place in sorted(rest.tolist())]
-    exemplars = {each.name: (each.whole, each.name) for each in kit.exemplars}
-    first = [(each.assembly, each.key) for each in samples[:SHOWN]]
-    if dull:
-        pairs = zip(first[: SHOWN // 2], samples, strict=False)
-        first = [shown for one, each in pairs for shown in (one, exemplars[each.lineage["copied"]["exemplar"]])]
+def kit_variants_sheet(kit: Kit, samples: Sequence[Sample], low_diversity: str, rng: np.random.Generator) -> bytes:
+    """Return the sheet of one kit as PNG.
+
+    samples: its variants in the order of selection: how much each differs from the exemplars and those before it
+    low_diversity: why they have low diversity, or ""; if so, each of the first is next to the exemplar it copies most
+    """
+    rest = rng.permutation(np.arange(min(MAX_VARIANTS_SHOWN, len(samples)), len(samples)))[:MAX_VARIANTS_SHOWN]
+    drawn = [samples[number] for number in sorted(rest.tolist())]
+    exemplars = {exemplar.name: (exemplar.whole, exemplar.name) for exemplar in kit.exemplars}
+    first = [(sample.assembly, sample.key) for sample in samples[:MAX_VARIANTS_SHOWN]]
+    if low_diversity:
+        pairs = zip(first[: MAX_VARIANTS_SHOWN // 2], samples, strict=False)
+        first = [
+            shown for variant, sample in pairs for shown in (variant, exemplars[sample.lineage["copied"]["exemplar"]])
+        ]
+    note = f"each next to its exemplar; {low_diversity}" if low_diversity else "selected first"
     parts = [
-        ("Exemplars", list(exemplars.values()), "what goes in"),
-        ("Most different", first, f"each beside its exemplar; {dull}" if dull else "chosen first"),
-        (
-            "At random",
-            [(each.assembly, each.key) for each in drawn],
-            "of the rest",
-        ),
+        ("Exemplars", list(exemplars.values()), "the input"),
+        ("Most different", first, note),
+        ("At random", [(sample.assembly, sample.key) for sample in drawn], "of the rest"),
     ]
 
     def cell(assembly: Assembly, name: str) -> Cell:
         shape = upright(kit_shape(kit, assembly))
-        picture = portrait(scene_of(shape), CAMERA, (CELL, CELL), part_paint(shape))
+        picture = portrait(scene_of(shape), CAMERA, (CELL_PIXELS, CELL_PIXELS), part_paint(shape))
         return Cell(picture, f"{name}, {len(assembly)} parts")
 
     sections = []
     for title, shown, note in parts:
         cells = [cell(assembly, name) for assembly, name in shown]
-        rows = [cells[start : start + COLUMNS] for start in range(0, len(cells), COLUMNS)]
+        rows = [cells[start : start + COLUMNS_PER_ROW] for start in range(0, len(cells), COLUMNS_PER_ROW)]
         sections.append(Section(title, rows, note))
     title = f"{kit.name}: {len(samples):,} variants"
-    return picture_png(contact_sheet([each for each in sections if each.rows], title, CELL))
+    return picture_png(contact_sheet([section for section in sections if section.rows], title, CELL_PIXELS))
 
 
-def _measures(path: Path) -> Mapping[str, Any]:
-    """The measures of each kit from the record of the assignment. Raises FileNotFoundError where there is none."""
-    record = read_record(path)
-    if record is None:
-        raise FileNotFoundError(f"{path} is no record; make the variations again")
-    measures: Mapping[str, Any] = record.summary["kits"]
-    return measures
+def write_sheets(config: Config, paths: DatasetPaths) -> list[Path]:
+    """Write the sheets of each kit of a dataset to `OUT/sheets`; return their paths.
 
-
-def main() -> None:
-    """Draw the sheet of each kit of a config whose variations are made."""
-    parser = argparse.ArgumentParser(
-        prog="python -m stages.variations.report.sheet", description="Draw contact sheets."
-    )
-    parser.add_argument("--config", type=Path, default=Path("configs/default.yaml"))
-    parser.add_argument("--out", type=Path, default=Path("datasets"), help="the output folder of the run")
-    asked = parser.parse_args()
-    config = load_config(asked.config, {name: stage.config for name, stage in find_stages().items()})
-    places = DatasetPaths(asked.out, config.name)
-    shards = sorted(places.stage("variations").root.glob(f"{config.name}-*-*.tar"))
-    if not shards:
-        parser.error(f"{places.work} holds no variations; make them with: make variations CONFIG={asked.config}")
-    measures = _measures(places.stage("variations").records / f"{config.name}-assignment.json")
-    samples = sorted((each for shard in shards for each in read_samples(shard)), key=lambda each: each.key)
-    for name in [each.name for each in config.section(ExemplarsConfig).kits]:
-        stem = places.stage("exemplars").root / name
+    Raise FileNotFoundError where the variations are not made.
+    """
+    shards = sorted(paths.stage("variations").root.glob(f"{config.name}-*-*.tar"))
+    record = read_record(paths.stage("variations").records / f"{config.name}-assignment.json")
+    if not shards or record is None:
+        raise FileNotFoundError(
+            f"{paths.work} holds no variations; make them with: make variations CONFIG={config.path}"
+        )
+    samples = sorted((sample for shard in shards for sample in read_samples(shard)), key=lambda sample: sample.key)
+    written = []
+    for kit_config in config.section(ExemplarsConfig).kits:
+        name = kit_config.name
+        stem = paths.stage("exemplars").root / name
         kit = load_kit(stem.with_suffix(".json"), stem.with_suffix(".tar"))
-        own = [each for each in samples if each.kit == name]
-        sheet = kit_variants_sheet(kit, own, measures[name]["dull"], decision_rng(config.seed, "sheet", name))
-        print(write_file(asked.out / "sheets" / f"{config.name}-{name}.png", sheet))
+        own = [sample for sample in samples if sample.kit == name]
+        low_diversity, rng = record.summary["kits"][name]["low_diversity"], decision_rng(config.seed, "sheet", name)
+        file = paths.out / "sheets" / f"{config.name}-{name}.png"
+        written.append(write_file(file, kit_variants_sheet(kit, own, low_diversity, rng)))
         replaced = replacements_sheet(kit, own)
         if replaced is not None:
-            print(write_file(asked.out / "sheets" / f"{config.name}-{name}-replaced.png", replaced))
-
-
-if __name__ == "__main__":
-    main()
+            written.append(write_file(file.with_stem(f"{file.stem}-replaced"), replaced))
+    return written

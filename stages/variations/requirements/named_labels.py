@@ -13,15 +13,15 @@ from stages.shape.kit import Kit
 
 
 def named_labels(kit: Kit, names: Iterable[str], key: str) -> BoolArray:
-    """Which labels of a kit are among the `names` that a config has at `key`, bool (labels,).
+    """Return which labels of a kit are among the `names` that a config has at `key`, bool (labels,).
 
-    Raises ConfigError for a name that no part has.
+    Raise ConfigError for a name that no part has.
     """
     names = list(names)
     for name in names:
         if name not in kit.labels:
             close = nearest_word(name, kit.labels)
-            told = f"did you mean {close}?" if close else f"it has {', '.join(kit.labels)}"
-            raise ConfigError(f"{key}: kit {kit.name} has no parts called {name}; {told}")
-    found: BoolArray = np.isin(kit.labels, names)
-    return found
+            hint = f"did you mean {close}?" if close else f"it has {', '.join(kit.labels)}"
+            raise ConfigError(f"{key}: kit {kit.name} has no parts called {name}; {hint}")
+    is_named: BoolArray = np.isin(kit.labels, names)
+    return is_named

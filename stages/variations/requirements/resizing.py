@@ -1,5 +1,4 @@
-"""Resizing: a part is made taller or lower, and what hangs on it moves along, so that a global constraint is met
-(substructures §5.3, figure 11)."""
+"""Resizing: a part is made taller or lower, and the parts attached to it move along (substructures §5.3, figure 11)."""
 
 from __future__ import annotations
 
@@ -16,7 +15,7 @@ UP = {"y": 1, "z": 2}
 
 
 def heights_of(kit: Kit, assembly: Assembly) -> FloatArray:
-    """The height of the centroid of each part, float64 (n,)."""
+    """Return the height of each part's centroid, float64 (n,)."""
     centroids = np.stack([kit.types[index].centroid for index in assembly.types])
     placed, up = assembly.placements, UP[kit.up]
     heights: FloatArray = np.einsum("nj,nj->n", placed[:, up, :3], centroids) + placed[:, up, 3]
@@ -24,7 +23,7 @@ def heights_of(kit: Kit, assembly: Assembly) -> FloatArray:
 
 
 def spans_of(kit: Kit, assembly: Assembly) -> FloatArray:
-    """The heights of the lowest and of the highest point of each part, float64 (n, 2)."""
+    """Return the heights of each part's lowest and highest point, float64 (n, 2)."""
     up, spans = UP[kit.up], []
     for part_type, placed in zip(assembly.types.tolist(), assembly.placements, strict=True):
         heights = kit.types[part_type].vertices @ placed[up, :3] + placed[up, 3]
@@ -33,39 +32,49 @@ def spans_of(kit: Kit, assembly: Assembly) -> FloatArray:
 
 
 def rigid_types(kit: Kit, rigid: Sequence[str]) -> BoolArray:
-    """Which types of a kit have a label that is never stretched, bool (types,). Raises ConfigError for labels that it
-    has not."""
-    found: BoolArray = named_labels(kit, rigid, "variations.search.stretch.rigid")[kit.label_of]
-    return found
+    """Return which types of a kit have a label that is never stretched, bool (types,).
+
+    Raise ConfigError for a label that no part has.
+    """
+    is_rigid: BoolArray = named_labels(kit, rigid, "variations.search.stretch.rigid")[kit.label_of]
+    return is_rigid
 
 
 class Resizer:
-    """Resizes the parts of a kit's assemblies in height, each by `most` at most, those of labels `rigid` never."""
+    """Resizes parts of a kit's assemblies in height.
 
-    def __init__(self, kit: Kit, most: float, rigid: Sequence[str]) -> None:
-        self.kit, self.max_factor = kit, most
+    max_factor: how much taller or lower a part may become
+    rigid: labels of parts that are never resized
+    """
+
+    def __init__(self, kit: Kit, max_factor: float, rigid: Sequence[str]) -> None:
+        self.kit, self.max_factor = kit, max_factor
         self._rigid = rigid_types(kit, rigid)
 
     def may(self, assembly: Assembly, part: int, factor: float) -> bool:
-        """Whether a part may be made so many times taller."""
+        """Return whether a part may be scaled in height by a factor."""
         up = UP[self.kit.up]
-        made = factor * np.linalg.norm(assembly.placements[part, up, :3])
-        return bool(1 / self.max_factor <= made <= self.max_factor and not self._rigid[assembly.types[part]])
+        total = factor * np.linalg.norm(assembly.placements[part, up, :3])
+        return bool(1 / self.max_factor <= total <= self.max_factor and not self._rigid[assembly.types[part]])
 
     def meeting(self, assembly: Assembly, part: int, other: int, end: int) -> float:
-        """The height at which two parts meet: the lower (0) or the upper (1) end of what their spans have in common."""
+        """Return the height where two parts meet: the lower (end 0) or upper (end 1) end of what their spans share."""
         spans = spans_of(self.kit, assembly.select(np.sort([part, other])))
         return float(spans[:, 1].min() if end else spans[:, 0].max())
 
     def stretched(self, assembly: Assembly, part: int, factor: float, level: float) -> Assembly | None:
-        """The assembly with one part made so many times taller about a height, while all others stay; None where it may
-        not be."""
+        """Return the assembly with one part scaled about a height while all others stay, or None where that is not
+        allowed.
+        """
         return self._resized(assembly, part, factor, level, np.zeros(len(assembly)))
 
     def resized(self, assembly: Assembly, part: int, factor: float, held: int, end: int) -> Assembly | None:
-        """The assembly with one part made so many times taller about the height at which it meets its neighbour `held`.
-        That stays where it is, with all that hangs on it, and what hangs on the part elsewhere moves along. None where
-        it may not be, or where something would have to move in two ways at once. end: as for `meeting`.
+        """Return the assembly with one part scaled about the height where it meets its neighbour `held`.
+
+        `held` and everything attached to it stay; what is attached to the part elsewhere moves along. None where
+        scaling is
+        not allowed or something would have to move in two ways at once.
+        end: as for `meeting`
         """
         level = self.meeting(assembly, part, held, end)
         shifts = self._shifts(assembly, part, factor, level, held, end)
@@ -85,12 +94,15 @@ class Resizer:
     def _shifts(
         self, assembly: Assembly, part: int, factor: float, level: float, held: int, end: int
     ) -> FloatArray | None:
-        """How far up each part goes as `part` is resized, float64 (n,): as far as the place where it, or what it hangs
-        on, meets that part."""
+        """Return how far up each part moves as `part` is resized, float64 (n,).
+
+        A part moves as far as the place where it, or what it is attached to, meets the resized part. None on
+        contradiction.
+        """
         neighbours = assembly.neighbours()
         shifts = np.full(len(assembly), np.nan)
         shifts[part] = 0.0
-        for other in [held, *(each for each in neighbours[part] if each != held)]:
+        for other in [held, *(neighbour for neighbour in neighbours[part] if neighbour != held)]:
             meets = self.meeting(assembly, part, other, end)
             shift = 0.0 if other == held else (factor - 1.0) * (meets - level)
             waiting = [other]
@@ -101,5 +113,4 @@ class Resizer:
                     waiting += neighbours[at]
             if abs(shifts[other] - shift) > self.kit.contact_tolerance:
                 return None
-        found: FloatArray = np.nan_to_num(shifts)  # what does not hang on it at all stays
-        return found
+        return np.asarray(np.nan_to_num(shifts))  # parts that are not attached to it stay

@@ -1,5 +1,7 @@
-"""Do the contacts of a shape with stretched parts still hold, and no others? Asked of the meshes themselves, for
-answers by relative pose are about parts as they are (substructures §5.2)."""
+"""Contacts of shapes with stretched parts, tested on the meshes (substructures §5.2).
+
+The contact oracle knows parts only in their own size.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +12,21 @@ from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
 from stages.shape.stretch import STRETCHED_DEPTH
 
-NEAR = 1.1
-"""Parts nearer to each other than so many contact tolerances are held against the record, as when it is verified."""
+MAX_GAP_TOLERANCES = 1.1
+"""Pairs of parts up to this many contact tolerances apart are tested, as in verification."""
 
 
 def broken_contact(kit: Kit, assembly: Assembly) -> str | None:
-    """Why an assembly is none, or None: `contact lost`, `touches what it should not`, or `parts clash`, where a pair of
-    parts reaches deeper into each other than in the exemplars by more than STRETCHED_DEPTH of the smaller one."""
+    """Return why the contacts of an assembly are not those of its edges, or None.
+
+    Reasons: `contact lost`, `touches what it should not`, or `parts clash`, where parts interpenetrate deeper than in
+        the
+    exemplars by more than STRETCHED_DEPTH of the smaller one.
+    """
     shape = kit_shape(kit, assembly)
     meshes, types, poses = shape.meshes, shape.assembly.types, shape.assembly.poses
     boxes = world_boxes(meshes, types, poses)
-    pairs = overlapping_boxes(boxes, NEAR * kit.contact_tolerance)
+    pairs = overlapping_boxes(boxes, MAX_GAP_TOLERANCES * kit.contact_tolerance)
     contact, penetration = ContactTest(meshes, kit.contact_tolerance), PenetrationTest(meshes)
     wanted = {(i, j) for i, j in assembly.edges.tolist()}
     if not wanted <= {(i, j) for i, j in pairs.tolist()}:

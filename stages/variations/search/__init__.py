@@ -1,1 +1,1 @@
-"""The search that all methods share: parents, what to try next, and what counts as a new variant."""
+"""The search for variants: rounds of parallel searches, operator selection, parents, and the pool of what was found."""

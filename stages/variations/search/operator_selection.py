@@ -1,8 +1,8 @@
-"""What to try next: which parents and which way of cutting, learnt from what each has found so far.
+"""Operator selection: which parents and which operator to try next, learnt from what each has found (a bandit).
 
-A choice is a way of drawing parents together with a way of cutting. Each is tried now and then; most tries go to the
-choices that have lately found most histograms for their work. Plain random parents are one of them, so the search
-does what random search does where nothing else finds more.
+A choice is a way of drawing parents together with an operator. Every choice is tried now and then; most tries go to the
+choices that lately found most histograms for their work. Plain random parents are one of them, so the search does what
+random search does where nothing else finds more.
 """
 
 from __future__ import annotations
@@ -13,48 +13,55 @@ from itertools import product
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.variations.kernels.structs import GROWN, JOINTS, MEANINGS, NOTHING, PLANES, REPLACED, UNITS
+from stages.variations.kernels.operators import (
+    GROWN_CUT,
+    GROWTH,
+    JOINT_CUT,
+    PLANE_CUT,
+    REPEATED_UNIT,
+    REPLACEMENT,
+    SUBSTITUTION,
+)
 from stages.variations.novelty.archive import Archive
 from stages.variations.search.parents import Parent, Parents
 from stages.variations.settings import SearchConfig
 
-CUTS = ((GROWN, False), (PLANES, False), (PLANES, True), (JOINTS, False), (UNITS, False))
-"""Ways of cutting, and whether the piece must be large."""
+CUTS = ((GROWN_CUT, False), (PLANE_CUT, False), (PLANE_CUT, True), (JOINT_CUT, False), (REPEATED_UNIT, False))
+"""Operators of the exchange, and whether the piece must be large."""
 PLAIN, RARE, FAMILY, CROSSED = range(4)
-"""Ways of drawing parents: at random; rare ones likelier; rare ones of a random family; a rare one and, of some, that
-of most other ancestry."""
-CHOICES = tuple((draw, *cut) for draw, cut in product(range(4), CUTS))
-SUBSTITUTIONS = tuple((draw, MEANINGS, False) for draw in range(4))
-"""Choices beside these for kits whose types are told by meaning: no cut, but parts of some meanings."""
-REPLACEMENTS = tuple((draw, REPLACED, False) for draw in range(4))
-"""Choices for replacement: no cut either, but one of all pieces that can take each other's place."""
-GROWTH = (PLAIN, NOTHING, False)
-"""The last choice: no parents, but a shape grown from nothing."""
-BATCH = 64
-"""Tries that are planned at once."""
-MEMORY = 4000.0
-"""Tries after which what was learnt counts for a third."""
+"""Ways of drawing parents: at random; rare ones more often; rare ones of a random family; a rare one and, of some, the
+one with most other ancestry."""
+EXCHANGES = tuple((draw, *cut) for draw, cut in product(range(4), CUTS))
+SUBSTITUTIONS = tuple((draw, SUBSTITUTION, False) for draw in range(4))
+"""Further choices for kits with `types: meaning`."""
+REPLACEMENTS = tuple((draw, REPLACEMENT, False) for draw in range(4))
+GROWTH_CHOICE = (PLAIN, GROWTH, False)
+"""The last choice: no parents."""
+TRIES_PER_PLAN = 64
+MEMORY_TRIES = 4000.0
+"""Tries after which what was learnt counts for 1/e."""
 TRY_WORK = 1.5
-"""What a try of the exchange costs on average."""
-LEAST = 0.2
-"""Least share of the work for either method."""
-IN_VAIN = 5000.0
-"""Growth that brings nothing for so much work has the least share from then on, until it does: a grown shape of a large
-kit costs as much as thousands of exchanges, and what was learnt of it is forgotten between two of them."""
-FIRST_GUESS = 100.0
-"""What growing a shape costs, before any is grown."""
-PARTNERS = 4
-"""Variants of which the one of most other ancestry is taken."""
+"""Average work of a try of the exchange."""
+MIN_WORK_SHARE = 0.2
+"""Smallest share of the work for growth, and for everything else."""
+MAX_WORK_IN_VAIN = 5000.0
+"""Work after which growth that has brought nothing gets MIN_WORK_SHARE. A grown shape of a large kit costs as much as
+thousands of exchanges, and what was learnt of growth is forgotten between two of them."""
+GROWTH_WORK_GUESS = 100.0
+"""Assumed work of growing a shape before any is grown."""
+PARTNERS_DRAWN = 4
+"""Number of parents among which the one with most other ancestry is taken."""
+UNGUIDED_REPLACEMENT_SHARE = 0.1
 
 
 @dataclass(frozen=True)
 class PlannedTry:
-    """One try: its number among the choices, the parents, the way of cutting and whether the piece must be large."""
+    """One try. number: index among the choices; a, b: parents; large: whether the piece must be large."""
 
     number: int
     a: Parent
     b: Parent
-    way: int
+    operator: int
     large: bool
 
 
@@ -63,50 +70,49 @@ class OperatorSelector:
 
     def __init__(self, config: SearchConfig, by_meaning: bool = False) -> None:
         self.config = config
-        exchanged = (*CHOICES, *SUBSTITUTIONS) if by_meaning else CHOICES
+        exchanged = (*EXCHANGES, *SUBSTITUTIONS) if by_meaning else EXCHANGES
         if config.method == "substructures":
             exchanged = REPLACEMENTS
         elif config.method == "all":
             exchanged = (*exchanged, *REPLACEMENTS)
         self._grows = config.method in ("both", "growth", "all")
-        self.choices = (*exchanged, GROWTH) if self._grows else exchanged
+        self.choices = (*exchanged, GROWTH_CHOICE) if self._grows else exchanged
         self._exchanged = len(exchanged)
         self._gains = np.zeros(len(self.choices))
         self._work = np.zeros(len(self.choices))
-        self._grown_work, self._grown, self._grown_gain = FIRST_GUESS, 1, 0.0
+        self._grown_work, self._grown, self._grown_gain = GROWTH_WORK_GUESS, 1, 0.0
 
     def plan(self, rng: np.random.Generator, parents: Parents, archive: Archive, count: int) -> list[PlannedTry]:
-        """The next `count` tries."""
+        """Return the next `count` tries."""
         if self.config.novelty.guided:
-            odds = self._odds(len(parents.exemplars)).cumsum()
-            last = int(np.flatnonzero(np.diff(odds, prepend=0.0))[-1])
-            numbers = np.searchsorted(odds, rng.random(count) * odds[-1], side="right").clip(0, last)
+            cumulated = self._chances(len(parents.exemplars)).cumsum()
+            last = int(np.flatnonzero(np.diff(cumulated, prepend=0.0))[-1])
+            numbers = np.searchsorted(cumulated, rng.random(count) * cumulated[-1], side="right").clip(0, last)
         else:
-            numbers = self._plain(rng, count)
+            numbers = self._unguided(rng, count)
         draws = np.array([self.choices[number][0] for number in numbers.tolist()])
         first = self._draw(rng, parents, archive, draws)
         second = self._draw(rng, parents, archive, np.where(draws == CROSSED, RARE, draws))
-        crossed = np.flatnonzero(draws == CROSSED).tolist()
-        for place in crossed:
-            second[place] = self._stranger(rng, parents, first[place], second[place])
-        self._gains *= np.exp(-count / MEMORY)
-        self._work *= np.exp(-count / MEMORY)
+        for row in np.flatnonzero(draws == CROSSED).tolist():
+            second[row] = self._stranger(rng, parents, first[row], second[row])
+        self._gains *= np.exp(-count / MEMORY_TRIES)
+        self._work *= np.exp(-count / MEMORY_TRIES)
         return [
-            PlannedTry(number, a, a if self.choices[number][1] == UNITS else b, *self.choices[number][1:])
+            PlannedTry(number, a, a if self.choices[number][1] == REPEATED_UNIT else b, *self.choices[number][1:])
             for number, a, b in zip(numbers.tolist(), first, second, strict=True)
         ]
 
-    def learn(self, choice: PlannedTry, gain: float, work: float) -> None:
-        """What a try has brought, and what it cost."""
-        self._gains[choice.number] += gain
-        self._work[choice.number] += work
-        if choice.way == NOTHING:
+    def learn(self, planned: PlannedTry, gain: float, work: float) -> None:
+        """Count what a try has brought and what it cost."""
+        self._gains[planned.number] += gain
+        self._work[planned.number] += work
+        if planned.operator == GROWTH:
             self._grown_work += work
             self._grown += 1
             self._grown_gain += gain
 
-    def _odds(self, exemplars: int) -> FloatArray:
-        """How likely each choice is: of the exchange a share for all alike, the rest by the square of what it gains."""
+    def _chances(self, exemplars: int) -> FloatArray:
+        """Return the probability of each choice: an equal share for exploration, the rest by squared gain per work."""
         end = self._exchanged
         if self.config.method == "growth":
             only: FloatArray = np.eye(len(self.choices))[end]
@@ -117,39 +123,41 @@ class OperatorSelector:
         chances: FloatArray = explored + (1.0 - self.config.novelty.exploration) * rates / rates.sum()
         if not self._grows:
             return chances
-        share = self._grown_share()
-        return np.append(chances * (1.0 - share), share / self._cost())
+        share = self._growth_share()
+        return np.append(chances * (1.0 - share), share / self._relative_growth_work())
 
-    def _grown_share(self) -> float:
-        """The share of the work that is given to growth: that of what it gains for its work, within limits."""
-        if not self._grown_gain and self._grown_work > IN_VAIN:
-            return LEAST
+    def _growth_share(self) -> float:
+        """Return the share of the work for growth: its share of all gain per work, within limits."""
+        if not self._grown_gain and self._grown_work > MAX_WORK_IN_VAIN:
+            return MIN_WORK_SHARE
         gains, work = self._gains[: self._exchanged].sum(), self._work[: self._exchanged].sum()
         exchanged, grown = (gains + 1.0) / (work + 50.0), (self._gains[-1] + 1.0) / (self._work[-1] + 50.0)
-        return float(np.clip(grown / (grown + exchanged), LEAST, 1.0 - LEAST))
+        return float(np.clip(grown / (grown + exchanged), MIN_WORK_SHARE, 1.0 - MIN_WORK_SHARE))
 
-    def _cost(self) -> float:
-        """What growing a shape costs beside a try of the exchange."""
+    def _relative_growth_work(self) -> float:
+        """Return the work of growing a shape in tries of the exchange."""
         return max(self._grown_work / self._grown / TRY_WORK, 1.0)
 
-    def _plain(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Choices by no experience: growth gets half of the work where it is not the only method, and replacement a
-        tenth of the other tries."""
+    def _unguided(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Draw choices without experience.
+
+        Growth gets half of the work unless it is the only method; replacement gets a tenth of the other tries.
+        """
         if self.config.method == "growth":
             return np.full(count, self._exchanged)
         if self.config.method == "substructures":
             return np.zeros(count, dtype=np.int64)
         numbers = np.where(rng.random(count) < self.config.growth_share, 0, 1)
         if self.config.method == "all":
-            numbers[rng.random(count) < 0.1] = self._exchanged - len(REPLACEMENTS)
+            numbers[rng.random(count) < UNGUIDED_REPLACEMENT_SHARE] = self._exchanged - len(REPLACEMENTS)
         if self._grows:
-            numbers[rng.random(count) < 1.0 / (1.0 + self._cost())] = self._exchanged
+            numbers[rng.random(count) < 1.0 / (1.0 + self._relative_growth_work())] = self._exchanged
         return numbers
 
     def _draw(self, rng: np.random.Generator, parents: Parents, archive: Archive, draws: np.ndarray) -> list[Parent]:
-        """A parent for each of `draws`: an exemplar, or an earlier variant in the way that it says."""
+        """Draw a parent for each of `draws`: an exemplar, or an earlier variant in that way."""
         known, exemplars = len(parents.variants), parents.exemplars
-        chosen = [exemplars[int(place)] for place in (rng.random(len(draws)) * len(exemplars)).tolist()]
+        chosen = [exemplars[int(number)] for number in (rng.random(len(draws)) * len(exemplars)).tolist()]
         earlier = rng.random(len(draws)) >= self.config.exemplar_share
         families = (rng.random(len(draws)) * (len(exemplars) + 1)).astype(np.int64)
         if not known:
@@ -162,16 +170,16 @@ class OperatorSelector:
             for family in range(len(exemplars) + 1)
         ]
         for wanted, weights in groups:
-            places = np.flatnonzero(wanted & earlier).tolist()
-            if places and weights.any():
-                for place, parent in zip(places, parents.draw(rng, weights, len(places)), strict=True):
-                    chosen[place] = parent
+            rows = np.flatnonzero(wanted & earlier).tolist()
+            if rows and weights.any():
+                for row, parent in zip(rows, parents.draw(rng, weights, len(rows)), strict=True):
+                    chosen[row] = parent
         return chosen
 
     def _stranger(self, rng: np.random.Generator, parents: Parents, a: Parent, b: Parent) -> Parent:
-        """Of `b`, an exemplar and some variants the one that has least of the ancestry of `a`."""
+        """Return of `b`, an exemplar and some variants the one that shares least ancestry with `a`."""
         rivals = [b, parents.exemplars[int(rng.random() * len(parents.exemplars))]]
         if parents.variants:
-            places = (rng.random(PARTNERS - 2) * len(parents.variants)).astype(np.int64).tolist()
-            rivals += [parents.variants[place] for place in places]
-        return min(rivals, key=lambda each: float(np.minimum(each.shares, a.shares).sum()))
+            numbers = (rng.random(PARTNERS_DRAWN - 2) * len(parents.variants)).astype(np.int64).tolist()
+            rivals += [parents.variants[number] for number in numbers]
+        return min(rivals, key=lambda rival: float(np.minimum(rival.shares, a.shares).sum()))

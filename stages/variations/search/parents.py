@@ -13,57 +13,58 @@ from stages.variations.kernels.structs import ShapeTables
 from stages.variations.novelty.archive import Archive, Place
 from stages.variations.novelty.features import MIN_MIXTURE
 
-RIVALS = 6
-"""Of so many variants of the largest family the most crowded makes room for another."""
+RIVALS_DRAWN = 6
+"""Variants drawn from the largest family; a new variant replaces the most crowded of them."""
 
 
 @dataclass(frozen=True)
 class Parent:
-    """A shape that pieces are cut from and docked to; `name` is an exemplar's name or a variant's place in the pool.
-
-    origins: int8 (n,), the exemplar that each part came from; shares: float64 (exemplars,) of them; place: where it
-    stands in the archive.
-    """
+    """A shape that pieces are cut from and docked to."""
 
     name: str
+    """Name of an exemplar, or of a variant in the pool."""
     assembly: Assembly
     labels: IntArray
+    """int32 (m, 2), directed docking labels of its edges."""
     tables: ShapeTables
     origins: np.ndarray
+    """int8 (n,), the exemplar that each part came from."""
     shares: FloatArray
+    """float64 (exemplars,), share of parts from each."""
     place: Place
+    """Its place in the archive."""
 
 
 class Parents:
-    """Exemplars, which stay, and at most `most` variants, kept so that no family crowds out another.
+    """The exemplars, which stay, and a limited number of variants, kept so that no family crowds out another.
 
-    The offspring of each exemplar is a family; those that mix material are one more.
+    The offspring of each exemplar is a family; variants that mix exemplars are one more.
     """
 
-    def __init__(self, exemplars: Sequence[Parent], most: int) -> None:
+    def __init__(self, exemplars: Sequence[Parent], max_variants: int) -> None:
         self.exemplars = list(exemplars)
         self.variants: list[Parent] = []
-        self.places = np.zeros((most, 2), dtype=np.int64)
-        self.families = np.zeros(most, dtype=np.int64)
-        self.shares = np.zeros((most, len(exemplars)))
+        self.places = np.zeros((max_variants, 2), dtype=np.int64)
+        self.families = np.zeros(max_variants, dtype=np.int64)
+        self.shares = np.zeros((max_variants, len(exemplars)))
 
     def adopt(self, rng: np.random.Generator, parent: Parent, archive: Archive) -> None:
-        """Add a variant; where there are as many as may be, the most crowded of some of the largest family leaves."""
-        place = len(self.variants)
-        if place == len(self.places):
+        """Add a variant; at the limit it replaces the most crowded of some variants of the largest family."""
+        number = len(self.variants)
+        if number == len(self.places):
             members = np.flatnonzero(self.families == np.bincount(self.families).argmax())
-            rivals = members[(rng.random(RIVALS) * len(members)).astype(np.int64)]
-            place = int(rivals[archive.crowds(self.places[rivals]).argmax()])
-            self.variants[place] = parent
+            rivals = members[(rng.random(RIVALS_DRAWN) * len(members)).astype(np.int64)]
+            number = int(rivals[archive.crowds(self.places[rivals]).argmax()])
+            self.variants[number] = parent
         else:
             self.variants.append(parent)
-        self.places[place] = parent.place
+        self.places[number] = parent.place
         mixed = 1.0 - parent.shares.max() >= MIN_MIXTURE
-        self.families[place] = len(self.exemplars) if mixed else parent.shares.argmax()
-        self.shares[place] = parent.shares
+        self.families[number] = len(self.exemplars) if mixed else parent.shares.argmax()
+        self.shares[number] = parent.shares
 
     def draw(self, rng: np.random.Generator, weights: FloatArray, count: int) -> list[Parent]:
-        """So many variants with replacement, with chances in proportion to `weights`, float64 (variants,)."""
-        odds = weights.cumsum()
-        drawn = np.searchsorted(odds, rng.random(count) * odds[-1], side="right").clip(0, len(odds) - 1)
-        return [self.variants[place] for place in drawn.tolist()]
+        """Draw `count` variants with replacement, with chances in proportion to `weights` float64 (variants,)."""
+        cumulated = weights.cumsum()
+        numbers = np.searchsorted(cumulated, rng.random(count) * cumulated[-1], side="right")
+        return [self.variants[number] for number in numbers.clip(0, len(cumulated) - 1).tolist()]

@@ -1,4 +1,4 @@
-"""Who comes from whom in a pool: parents, children and siblings of one cut, and the ancestors that a sample names."""
+"""Ancestry in a pool: parents, children and siblings of one cut, and the ancestors that a sample names."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from pipeline.stage import Task
 from stages.variations.search.pool import FoundVariants, PoolIndex
 
 Ancestor = int | str
-"""A variant by its place in the pool, or an exemplar by its name."""
+"""A variant by its number in the pool, or an exemplar by its name."""
 
 
 @dataclass(frozen=True)
 class Ancestry:
-    """parents: of each variant of the pool the nearest ancestors that are in the pool too, or exemplars: those that it
-    was made of, or theirs where the pool did not keep one. cuts: what tells the cut that it was made by, the same
-    for pieces cut alike out of one variant and docked to one other; empty for cuts of exemplars docked to exemplars."""
+    """The ancestors of the variants of a pool."""
 
     parents: Sequence[tuple[Ancestor, ...]]
+    """For each variant the nearest ancestors in the pool or among the exemplars."""
     cuts: Sequence[str]
+    """For each variant its cut: the same for pieces cut alike from one variant and docked to the same other one, empty
+    for cuts of exemplars docked to exemplars."""
 
     def kin(self) -> list[np.ndarray]:
-        """For each variant its parents, children and siblings of one cut in the pool, int64 (k,), ascending."""
+        """Return for each variant its parents, children and siblings of one cut in the pool, int64 (k,), ascending."""
         kin: list[set[int]] = [set() for _ in self.parents]
         for child, parents in enumerate(self.parents):
             for parent in parents:
@@ -38,13 +39,17 @@ class Ancestry:
         for group in siblings.values():
             for variant in group:
                 kin[variant].update(group)
-        return [np.array(sorted(each - {variant}), dtype=np.int64) for variant, each in enumerate(kin)]
+        return [np.array(sorted(relatives - {variant}), dtype=np.int64) for variant, relatives in enumerate(kin)]
 
     def named(self, key_of: Mapping[int, str], split_of: Mapping[int, int]) -> dict[int, list[str]]:
-        """For each variant that becomes a sample, with its key and split, the names of its nearest ancestors among the
-        samples of its own split and the exemplars. What was left out, or stands in another split, is passed over for
-        what it came from."""
-        found: dict[int, list[str]] = {}
+        """Return for each variant that becomes a sample the names of its nearest ancestors.
+
+        These are samples of its own split and exemplars. Variants that are left out or in another split are replaced by
+        their
+        own ancestors.
+        key_of: key of each sample by variant; split_of: its split
+        """
+        named_parents: dict[int, list[str]] = {}
         known: dict[int, list[tuple[str, ...]]] = {split: [] for split in set(split_of.values())}
         for variant, parents in enumerate(self.parents):
             for split, names_of in known.items():
@@ -53,31 +58,33 @@ class Ancestry:
                     names.update(dict.fromkeys([parent] if isinstance(parent, str) else names_of[parent]))
                 own = split_of.get(variant) == split
                 if own:
-                    found[variant] = list(names)
+                    named_parents[variant] = list(names)
                 names_of.append((key_of[variant],) if own else tuple(names))
-        return found
+        return named_parents
 
 
 def read_ancestry(task: Task, pool: PoolIndex) -> Ancestry:
-    """The ancestry of a kit's pool, from the lineages of everything that its lanes found. A parent stands before its
-    children: in an earlier round, or earlier in the same lane."""
-    places = {(lane, index): place for place, (lane, index) in enumerate(pool.rows.tolist())}
+    """Return the ancestry of a kit's pool, read from the lineages of all that its searches found.
+
+    Parents come before their children: in an earlier round, or earlier in the same search.
+    """
+    numbers = {(search, index): number for number, (search, index) in enumerate(pool.rows.tolist())}
     ancestors: dict[str, tuple[Ancestor, ...]] = {}
     parents: list[tuple[Ancestor, ...]] = [()] * len(pool)
     cuts = [""] * len(pool)
-    for lane, name in enumerate(pool.lanes):
+    for search, name in enumerate(pool.searches):
         found = FoundVariants.of(task, name)
         for index in range(len(found)):
             lineage = found.described(index)
             made_of = lineage["parents"]
-            joined = [each for parent in made_of for each in ancestors.get(parent, (parent,))]
+            joined = [ancestor for parent in made_of for ancestor in ancestors.get(parent, (parent,))]
             nearest = tuple(dict.fromkeys(joined))
-            place = places.get((lane, index))
-            if place is None:
+            number = numbers.get((search, index))
+            if number is None:
                 ancestors[f"{name}-{index}"] = nearest
                 continue
-            ancestors[f"{name}-{index}"] = (place,)
-            parents[place] = nearest
+            ancestors[f"{name}-{index}"] = (number,)
+            parents[number] = nearest
             if any(parent in ancestors for parent in made_of):
-                cuts[place] = f"{made_of} {lineage['boundary']}"
+                cuts[number] = f"{made_of} {lineage['boundary']}"
     return Ancestry(parents, cuts)

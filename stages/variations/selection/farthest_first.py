@@ -1,4 +1,4 @@
-"""The selection: which of the found variants make the dataset, so that few cover what many hold."""
+"""The selection of diverse variants: farthest-first traversal (greedy k-centre)."""
 
 from __future__ import annotations
 
@@ -17,18 +17,20 @@ _SKIPPED = "dominant"
 def select_diverse(
     kit: Kit, counts: np.ndarray, features: np.ndarray, wanted: int, config: SelectionConfig, rng: np.random.Generator
 ) -> np.ndarray:
-    """Which of k variants are taken, int64 (min(wanted, k),), the most telling first.
+    """Return which of k variants are taken, int64 (min(wanted, k),), the most different first.
 
-    Each is the one farthest from the kit's exemplars and from all taken before (greedy k-centre). When more than
-    `config.max_farthest_first` are wanted the rest are drawn at random.
-    counts: int32 (k, types); features: float32 (k, 10).
+    Each is the farthest from the kit's exemplars and from all taken before. Beyond `config.max_farthest_first` the rest
+    are
+    drawn at random.
+    counts: int32 (k, types), parts by type
+    features: float32 (k, 10)
     """
-    exemplars = [each.assembly for each in kit.exemplars]
-    test = FeatureExtractor(kit)
+    exemplars = [exemplar.assembly for exemplar in kit.exemplars]
+    extractor = FeatureExtractor(kit)
     pure = np.ones(1)
-    known = [test.features(each, pure, test.marks(each), 1.0) for each in exemplars]
+    known = [extractor.features(shape, pure, extractor.marks(shape), 1.0) for shape in exemplars]
     all_features = np.concatenate([features, known])
-    all_counts = np.concatenate([counts, [np.bincount(each.types, minlength=len(kit.types)) for each in exemplars]])
+    all_counts = np.concatenate([counts, [np.bincount(shape.types, minlength=len(kit.types)) for shape in exemplars]])
     space = selection_space(all_counts, all_features)
     near = min(wanted, config.max_farthest_first, len(counts))
     taken = farthest_first(space[: len(counts)], space[len(counts) :], near)
@@ -37,10 +39,10 @@ def select_diverse(
 
 
 def selection_space(counts: np.ndarray, features: np.ndarray) -> FloatArray:
-    """Points whose distances say how different variants are, float64 (k, types + axes).
+    """Return points whose distances say how different variants are, float64 (k, types + axes).
 
-    Shares of part types, which together weigh as much as all axes of the archive; each axis varies alike, sizes by
-    their logarithm.
+    Shares of part types together weigh as much as all features; each feature has unit variance, sizes by their
+    logarithm.
     """
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
     axes = [axis for axis in AXES if axis != _SKIPPED]
@@ -59,8 +61,12 @@ def selection_space(counts: np.ndarray, features: np.ndarray) -> FloatArray:
 
 @numba.njit(cache=True)
 def farthest_first(points, starts, wanted):
-    """Greedy k-centre: `wanted` of the points, int64, each the farthest from the starts and all taken before; the
-    first of equals. points: float64 (n, d); starts: float64 (s, d)."""
+    """Return `wanted` of the points, int64, each the farthest from the starts and all taken before; of equals the
+    first.
+
+    points: float64 (n, d)
+    starts: float64 (s, d)
+    """
     n, d = points.shape
     gaps = np.full(n, np.inf)
     taken = np.empty(wanted, dtype=np.int64)

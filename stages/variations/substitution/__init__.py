@@ -1,1 +1,1 @@
-"""Variation by substitution: parts of some meanings take their place from those of another shape (substructures §4)."""
+"""Substitution: parts of some labels are replaced by those of another shape, where types go by meaning."""

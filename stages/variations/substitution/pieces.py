@@ -1,4 +1,4 @@
-"""What is taken out and what is put in its place: the parts of some labels that touch each other, all or one group."""
+"""What is taken out and what replaces it: parts of some labels that touch each other, all of them or one group."""
 
 from __future__ import annotations
 
@@ -10,26 +10,32 @@ import numpy.typing as npt
 from stages.shape.arrays import TypeArray
 from stages.shape.kit import Assembly
 
-ALL_GROUPS = 0.75
-"""How likely all groups of the chosen parts are exchanged together: four legs, which only the seat joins."""
+ALL_GROUPS_PROBABILITY = 0.75
+"""Probability that all groups of the chosen parts are exchanged together, such as four legs that only the seat joins.
+"""
 
 Chosen = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Exchanged:
-    """taken: bool (n,), the parts of the base that leave; piece: bool (m,), the parts of the giver that come."""
+    """The parts that a substitution or replacement exchanges."""
 
     taken: Chosen
+    """bool (n,), parts of the base that leave."""
     piece: Chosen
+    """bool (m,), parts of the giver that come."""
 
 
 def draw_pieces(rng: np.random.Generator, base: Assembly, giver: Assembly) -> Exchanged | None:
-    """Parts of random labels that touch each other somewhere in the two shapes, whose types are labels here. `taken`
-    may be empty: then something is added. None where nothing would come, or nothing of the base or the giver stay."""
+    """Draw parts of random labels that touch each other somewhere in the two shapes, whose types are labels here.
+
+    `taken` may be empty: then something is added. None where nothing would come, or nothing of the base or giver would
+        stay.
+    """
     labels = _draw_labels(rng, base, giver)
     taken, piece = np.isin(base.types, labels), np.isin(giver.types, labels)
-    if rng.random() >= ALL_GROUPS:
+    if rng.random() >= ALL_GROUPS_PROBABILITY:
         taken, piece = _one_group(rng, base, taken), _one_group(rng, giver, piece)
     if not piece.any() or piece.all() or taken.all():
         return None
@@ -37,21 +43,21 @@ def draw_pieces(rng: np.random.Generator, base: Assembly, giver: Assembly) -> Ex
 
 
 def _draw_labels(rng: np.random.Generator, base: Assembly, giver: Assembly) -> TypeArray:
-    """Labels of the two shapes, grown from a random one along contacts."""
+    """Draw labels of the two shapes, grown from a random one along contacts."""
     present = np.union1d(base.types, giver.types)
     edges = np.concatenate([base.types[base.edges], giver.types[giver.edges]])
     chosen = present[[int(rng.random() * len(present))]]
     for _ in range(int(rng.random() * max(len(present) - 1, 1))):
         ends = np.isin(edges, chosen)
-        beside = np.setdiff1d(edges[ends.any(axis=1)], chosen)
-        if not len(beside):
+        adjacent = np.setdiff1d(edges[ends.any(axis=1)], chosen)
+        if not len(adjacent):
             break
-        chosen = np.append(chosen, beside[int(rng.random() * len(beside))])
+        chosen = np.append(chosen, adjacent[int(rng.random() * len(adjacent))])
     return chosen
 
 
 def _one_group(rng: np.random.Generator, assembly: Assembly, chosen: Chosen) -> Chosen:
-    """One of the connected groups of the chosen parts, at random."""
+    """Return one of the connected groups of the chosen parts, at random."""
     if not chosen.any():
         return chosen
     parts = np.flatnonzero(chosen)
@@ -62,5 +68,5 @@ def _one_group(rng: np.random.Generator, assembly: Assembly, chosen: Chosen) -> 
         part = waiting.pop()
         if not group[part]:
             group[part] = True
-            waiting.extend(each for each in neighbours[part] if chosen[each])
+            waiting.extend(neighbour for neighbour in neighbours[part] if chosen[neighbour])
     return group

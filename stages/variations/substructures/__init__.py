@@ -1,2 +1,1 @@
-"""Variation by replaceable substructures: all that can take each other's place along a common boundary (substructures
-§4)."""
+"""Replaceable substructures: all pieces of two shapes that can take each other's place (substructures §4, §5)."""

@@ -1,9 +1,9 @@
-"""All replacements along a rigid motion: one shape laid upon another, part upon part as far as they coincide
-(substructures §4.3.1).
+"""All region swaps along alignments: one shape laid on another, part on part as far as they coincide (substructures
+§4.3.1).
 
 Where the docking of every edge is known, a partial symmetry need not be read off the order of docking sites: laying one
-part upon another says by a rigid motion where each further part comes to lie. So parts may be matched that have not as
-many neighbours, a docking site that is empty in one of the two being one of the boundary, as the paper's sites of a
+part on another gives a rigid transform, which says where each further part lies. So matched parts can have different
+numbers of neighbours; a docking site that is empty in one of the two is one of the boundary, as the paper's sites of a
 type are. What does not coincide falls into regions, and each can be replaced: no other part has to move.
 """
 
@@ -14,38 +14,35 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import mix
+from stages.shape.geometry.hash_tables import contains, mix, with_key
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
-from stages.variations.kernels.structs import UPRIGHT
-from stages.variations.substructures.keys import grown, holds, with_key
+from stages.variations.kernels.structs import MIN_UPRIGHT_COSINE
+from stages.variations.substructures.growing_arrays import grown
 from stages.variations.substructures.ordered_graph import OrderedGraph
 from stages.variations.substructures.partial_symmetry import pair_hash
 from stages.variations.substructures.region_swaps import RegionSwaps
 
-MOST_MOVES = 1 << 13
-"""Replacements along motions that are listed between two shapes at most: what bounds memory."""
-MOST_WORK = 1 << 24
-"""Parts that are laid upon others at most, between two shapes: a second or two."""
-GOLDEN = 0.6180339887
-"""Multiples of it lie spread out between whole numbers."""
-SAME_TURN = 1e-3
+MAX_SWAPS = 1 << 13
+"""Region swaps listed between two shapes at most, which bounds memory."""
+MAX_WORK = 1 << 24
+"""Parts laid on others at most, between two shapes: a second or two."""
+GOLDEN_RATIO = 0.6180339887
+"""Multiples of it are spread evenly between whole numbers."""
+SAME_ROTATION = 1e-3
 """Entries of rotations that differ by less are equal."""
 
 
 class _Placed(NamedTuple):
-    """The parts of a shape: types int64 (n,), of meshes; rotations (n, 3, 3) and translations (n, 3) of their poses;
-    centroids (n, 3); radii (n,), half their diagonals; order int64 (n,), parts by type, then by the first coordinate of
-    their centroids, and firsts (types + 1,), where in it each type begins.
-    """
+    """The parts of a shape."""
 
-    types: np.ndarray
-    rotations: np.ndarray
-    translations: np.ndarray
-    centroids: np.ndarray
-    radii: np.ndarray
-    order: np.ndarray
-    firsts: np.ndarray
+    types: np.ndarray  # int64 (n,): of meshes
+    rotations: np.ndarray  # float64 (n, 3, 3)
+    translations: np.ndarray  # float64 (n, 3)
+    centroids: np.ndarray  # float64 (n, 3)
+    radii: np.ndarray  # float64 (n,): half diagonals
+    order: np.ndarray  # int64 (n,): parts by type, then by the first coordinate of their centroids
+    firsts: np.ndarray  # int64 (types + 1,): first of each type in `order`
 
 
 def find_region_swaps(
@@ -53,40 +50,34 @@ def find_region_swaps(
     up: int,
     base: tuple[Assembly, OrderedGraph],
     giver: tuple[Assembly, OrderedGraph],
-    most_work: int = MOST_WORK,
+    max_work: int = MAX_WORK,
 ) -> RegionSwaps:
-    """All replacements of a piece of the base by one of the giver, which may be the same, that are a region of what two
-    greatest pieces that coincide leave over, where they leave several: of one the result is the giver.
+    """Return all region swaps between two shapes, which may be the same, in which several regions are left over.
 
-    up: the axis that motions keep upright, or -1; most_work: parts that are laid upon others at most. Pairs of parts
-    are taken from all over both shapes, so that a list that is cut short has those motions by which most coincides.
+    Where one region is left over the result would be the giver.
+    up: axis that alignments keep, or -1
+    max_work: parts laid on others at most; pairs of parts are taken from everywhere in both shapes, so that a list that
+        is
+    cut short has the alignments under which most coincides
     """
-    symmetries = np.concatenate([each.symmetries for each in kit.types])
-    starts = np.cumsum([0, *(len(each.symmetries) for each in kit.types)])
-    found = _enumerate(
+    symmetries = np.concatenate([part_type.symmetries for part_type in kit.types])
+    starts = np.cumsum([0, *(len(part_type.symmetries) for part_type in kit.types)])
+    turns, shifts, regions, images, listed, meetings, work, is_whole = _enumerate(
         base[1], giver[1], _placed(kit, base[0]), _placed(kit, giver[0]), np.ascontiguousarray(symmetries[:, :3, :3]),
-        np.ascontiguousarray(symmetries[:, :3, 3]), starts, up, kit.pose_tolerance, base[0] is giver[0], most_work,
+        np.ascontiguousarray(symmetries[:, :3, 3]), starts, up, kit.pose_tolerance, base[0] is giver[0], max_work,
     )  # fmt: skip
-    turns, shifts, regions, images, listed, meetings, work, is_whole = found
-    motions = np.tile(np.eye(4), (len(turns), 1, 1))
-    motions[:, :3, :3], motions[:, :3, 3] = turns, shifts
-    return RegionSwaps(
-        np.array([invert(each) for each in motions]).reshape(-1, 4, 4),
-        regions,
-        images,
-        listed,
-        meetings,
-        work,
-        is_whole,
-    )
+    alignments = np.tile(np.eye(4), (len(turns), 1, 1))
+    alignments[:, :3, :3], alignments[:, :3, 3] = turns, shifts
+    inverses = np.array([invert(alignment) for alignment in alignments]).reshape(-1, 4, 4)
+    return RegionSwaps(inverses, regions, images, listed, meetings, work, is_whole)
 
 
 def _placed(kit: Kit, assembly: Assembly) -> _Placed:
     own = [kit.types[index] for index in assembly.types.tolist()]
     rotations = np.ascontiguousarray(assembly.poses[:, :3, :3])
     translations = np.ascontiguousarray(assembly.poses[:, :3, 3])
-    centroids = np.einsum("nij,nj->ni", rotations, np.stack([each.centroid for each in own])) + translations
-    radii = np.array([each.diagonal / 2 for each in own])
+    centroids = np.einsum("nij,nj->ni", rotations, np.stack([part.centroid for part in own])) + translations
+    radii = np.array([part.diagonal / 2 for part in own])
     types = assembly.types.astype(np.int64)
     order = np.lexsort((centroids[:, 0], types))
     firsts = np.searchsorted(types[order], np.arange(len(kit.types) + 1))
@@ -94,15 +85,24 @@ def _placed(kit: Kit, assembly: Assembly) -> _Placed:
 
 
 @numba.njit(cache=True)
-def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same, most_work):
-    """Turns and shifts that lay the base upon the giver, their regions and images, what is listed of them, meetings,
-    work, whether it is all."""
+def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same, max_work):
+    """List region swaps: `here` of graph `a` is the base, `there` of graph `b` the giver.
+
+    state: leader, the union-find forest of regions: parts of the base, then of the giver, -1 where they coincide;
+    image and back, the part of the other shape that a part coincides with, or -1; queue, the matched parts of the base;
+    visited, the (part, part, symmetry) triples whose alignment was seen
+    Invariant: between two alignments `image` and `back` are -1 everywhere.
+    ends: all pairs are visited (`is_whole`), MAX_SWAPS are listed, or max_work is spent
+    Returns turns and shifts that lay the base on the giver, regions and images of each, what is listed, meetings, work,
+    and
+    is_whole.
+    """
     n, m = len(a.types), len(b.types)
-    most = 0
+    max_symmetries = 0
     for kind in range(len(starts) - 1):
-        most = max(most, starts[kind + 1] - starts[kind])
-    visited = np.zeros((n, m, most), dtype=np.bool_)
-    known, count, laid, work, meetings = np.zeros(1 << 10, dtype=np.uint64), 0, 0, 0, 0
+        max_symmetries = max(max_symmetries, starts[kind + 1] - starts[kind])
+    visited = np.zeros((n, m, max_symmetries), dtype=np.bool_)
+    known, count, aligned, work, meetings = np.zeros(1 << 10, dtype=np.uint64), 0, 0, 0, 0
     is_whole = True
     out_turns, out_shifts = np.empty((64, 9)), np.empty((64, 3))
     regions, images = np.empty((64, n + m), dtype=np.int16), np.empty((64, m), dtype=np.int16)
@@ -115,18 +115,18 @@ def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same, mo
         if here.types[v] != there.types[w]:
             continue
         first, last = starts[here.types[v]], starts[here.types[v] + 1]
-        for g in range(first, last):
-            if visited[v, w, g - first] or not is_whole or (same and v == w and g == first):
+        for symmetry in range(first, last):
+            if visited[v, w, symmetry - first] or not is_whole or (same and v == w and symmetry == first):
                 continue
-            turn = there.rotations[w] @ turns[g] @ here.rotations[v].T
-            shift = there.rotations[w] @ shifts[g] + there.translations[w] - turn @ here.translations[v]
-            if up >= 0 and turn[up, up] < UPRIGHT:
+            turn = there.rotations[w] @ turns[symmetry] @ here.rotations[v].T
+            shift = there.rotations[w] @ shifts[symmetry] + there.translations[w] - turn @ here.translations[v]
+            if up >= 0 and turn[up, up] < MIN_UPRIGHT_COSINE:
                 continue
-            if same and v == w and np.abs(turn - np.eye(3)).max() < SAME_TURN:
+            if same and v == w and np.abs(turn - np.eye(3)).max() < SAME_ROTATION:
                 continue
-            matched, ways = _lay(here, there, turn, shift, turns, starts, tolerance, image, back, queue, visited)
+            matched, triples = _lay(here, there, turn, shift, turns, starts, tolerance, image, back, queue, visited)
             work += len(here.types)
-            is_whole = work < most_work
+            is_whole = work < max_work
             if matched == 0:
                 continue
             _join_across(a, b, here, there, turn, shift, image, back, queue, matched, leader)
@@ -144,31 +144,31 @@ def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same, mo
                 for root in range(n + m):
                     if leader[root] != root or not comes[root] or not met[root]:
                         continue
-                    meetings += ways
+                    meetings += triples
                     key = keys[root] | np.uint64(1)
-                    if holds(known, key):
+                    if contains(known, key):
                         continue
-                    if count == MOST_MOVES:
+                    if count == MAX_SWAPS:
                         is_whole = False
                         break
                     known = with_key(known, count, key)
                     listed = grown(listed, count + 1)
-                    listed[count] = laid, root
+                    listed[count] = aligned, root
                     count += 1
                 if count > before:
-                    regions, images = grown(regions, laid + 1), grown(images, laid + 1)
-                    out_turns, out_shifts = grown(out_turns, laid + 1), grown(out_shifts, laid + 1)
-                    regions[laid], images[laid] = leader, back
-                    out_turns[laid], out_shifts[laid] = turn.copy().reshape(9), shift
-                    laid += 1
+                    regions, images = grown(regions, aligned + 1), grown(images, aligned + 1)
+                    out_turns, out_shifts = grown(out_turns, aligned + 1), grown(out_shifts, aligned + 1)
+                    regions[aligned], images[aligned] = leader, back
+                    out_turns[aligned], out_shifts[aligned] = turn.copy().reshape(9), shift
+                    aligned += 1
             for k in range(matched):
                 back[image[queue[k]]] = -1
                 image[queue[k]] = -1
     return (
-        out_turns[:laid].copy().reshape((laid, 3, 3)),
-        out_shifts[:laid],
-        regions[:laid],
-        images[:laid],
+        out_turns[:aligned].copy().reshape((aligned, 3, 3)),
+        out_shifts[:aligned],
+        regions[:aligned],
+        images[:aligned],
         listed[:count],
         meetings,
         work,
@@ -178,15 +178,15 @@ def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same, mo
 
 @numba.njit(cache=True)
 def _spread(n, m):
-    """All pairs (v, w) of v < n and w < m, int64 (n * m, 2), each far from those before it."""
+    """Return all pairs (v, w) of v < n and w < m, int64 (n * m, 2), each far from those before it."""
     total = n * m
-    step = max(int(total * GOLDEN), 1)
+    step = max(int(total * GOLDEN_RATIO), 1)
     while _divisor(step, total) > 1:
         step += 1
-    pairs, place = np.empty((total, 2), dtype=np.int64), 0
+    pairs, index = np.empty((total, 2), dtype=np.int64), 0
     for k in range(total):
-        pairs[k, 0], pairs[k, 1] = place // m, place % m
-        place = (place + step) % total
+        pairs[k, 0], pairs[k, 1] = index // m, index % m
+        index = (index + step) % total
     return pairs
 
 
@@ -199,8 +199,10 @@ def _divisor(i, j):
 
 @numba.njit(cache=True)
 def _lay(here, there, turn, shift, turns, starts, tolerance, image, back, queue, visited):
-    """Lay part upon part and tick off what lays them so; how many coincide, and how many ways were ticked off."""
-    count, ways = 0, 0
+    """Lay part on part and mark the triples that give this alignment; return the numbers of matched parts and
+    triples.
+    """
+    count, triples = 0, 0
     for x in range(len(here.types)):
         (px, py, pz), kind = _moved(turn, shift, here.centroids[x]), here.types[x]
         low, end = there.firsts[kind], there.firsts[kind + 1]
@@ -221,21 +223,21 @@ def _lay(here, there, turn, shift, turns, starts, tolerance, image, back, queue,
             ):
                 continue
             rest = there.rotations[y].T @ turn @ here.rotations[x]
-            for h in range(starts[kind], starts[kind + 1]):
-                if np.abs(rest - turns[h]).max() < SAME_TURN:
-                    visited[x, y, h - starts[kind]] = True
+            for symmetry in range(starts[kind], starts[kind + 1]):
+                if np.abs(rest - turns[symmetry]).max() < SAME_ROTATION:
+                    visited[x, y, symmetry - starts[kind]] = True
                     image[x], back[y] = y, x
-                    ways += 1
+                    triples += 1
             if image[x] >= 0:
                 queue[count] = x
                 count += 1
                 break
-    return count, ways
+    return count, triples
 
 
 @numba.njit(cache=True)
 def _moved(turn, shift, place):
-    """The coordinates of a place that is turned and shifted."""
+    """Return the coordinates of a place under an alignment."""
     return (
         turn[0, 0] * place[0] + turn[0, 1] * place[1] + turn[0, 2] * place[2] + shift[0],
         turn[1, 0] * place[0] + turn[1, 1] * place[1] + turn[1, 2] * place[2] + shift[1],
@@ -245,8 +247,10 @@ def _moved(turn, shift, place):
 
 @numba.njit(cache=True)
 def _join_across(a, b, here, there, turn, shift, image, back, queue, matched, leader):
-    """Make each node a region of its own, those of the giver counted on, -1 of matched ones; and join those across a
-    part that coincides, where two of its neighbours take one place."""
+    """Make each unmatched node a region, those of the giver counted on, and join regions whose parts take one place.
+
+    Such parts are neighbours of one matched part.
+    """
     n, m = len(a.types), len(b.types)
     for node in range(n + m):
         is_matched = image[node] >= 0 if node < n else back[node - n] >= 0
@@ -273,20 +277,19 @@ def _join_across(a, b, here, there, turn, shift, image, back, queue, matched, le
 
 @numba.njit(cache=True)
 def _is_one(a, b, image, queue, matched, leader, line):
-    """Whether all that does not coincide is one region; else `leader` says what is: what hangs together in either shape
-    is joined.
+    """Return whether everything unmatched is one region; otherwise `leader` says what is.
 
-    It is looked at breadth-first from next to what coincides, and no farther than until one is seen, which is soon.
-    `line` int64 (n + m,) is room for what waits.
+    What is connected in either shape is joined, breadth first from what coincides, until one region is left.
+    line: int64 (n + m,), room for the queue
     """
     n, count, regions = len(a.types), 0, 0
-    is_met = np.zeros(len(leader), dtype=np.bool_)
+    is_reached = np.zeros(len(leader), dtype=np.bool_)
     for k in range(matched):
         for graph, node, offset in ((a, queue[k], 0), (b, image[queue[k]], n)):
             for d in range(graph.starts[node], graph.starts[node + 1]):
                 near = offset + graph.tails[graph.twins[d]]
-                if leader[near] >= 0 and not is_met[near]:
-                    is_met[near] = True
+                if leader[near] >= 0 and not is_reached[near]:
+                    is_reached[near] = True
                     line[count] = near
                     regions += _root(leader, near) == near
                     count += 1
@@ -299,8 +302,8 @@ def _is_one(a, b, image, queue, matched, leader, line):
             near = offset + graph.tails[graph.twins[d]]
             if leader[near] < 0:
                 continue
-            if not is_met[near]:
-                is_met[near] = True
+            if not is_reached[near]:
+                is_reached[near] = True
                 line[count] = near
                 count += 1
             else:

@@ -1,9 +1,11 @@
-"""The cyclic order of the docking sites of each part, from where its neighbours stand (substructures §4.3.2).
+"""The cyclic order of the docking sites of each part, from the positions of its neighbours (substructures §4.3.2).
 
-Parts are meshes of their own, so no surface runs through a whole shape along which their borders could be followed; the
-order is that of the neighbours' centroids, projected into the plane that fits them best. Of 753 parts of seven real
-models, closed solids and cut surfaces, 23 have an open border along which all of three or more neighbours lie, and the
-order along it is that of the projection in each.
+Parts are separate meshes, so no surface runs through a whole shape along which their borders could be followed. The
+order
+is that of the neighbours' centroids, projected into the plane that fits them best. Of 753 parts of seven real models,
+23
+have an open border along which all of three or more neighbours lie; in each the order along it is that of the
+projection.
 """
 
 from __future__ import annotations
@@ -15,14 +17,15 @@ from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
 from stages.variations.substructures.ordered_graph import OrderedGraph, ordered_graph
 
-SAME = 1e-3
-"""Directions that differ by less (as a share of a radian, or of a spread) are the same."""
+SAME_DIRECTION = 1e-3
+"""Directions that differ by less, as a share of a radian or of a spread, are equal."""
 
 
 def docking_graph(kit: Kit, assembly: Assembly, labels: IntArray) -> OrderedGraph:
-    """The shape graph of an assembly with its docking sites in order; labels int32 (m, 2) are those of its edges.
+    """Return the shape graph of an assembly with its docking sites in order.
 
     Nodes are of the kit's labels, not of its meshes; dockings count from 1.
+    labels: int32 (m, 2), those of its edges
     """
     centroids = np.stack([kit.types[index].centroid for index in assembly.types])
     centroids = np.einsum("nij,nj->ni", assembly.poses[:, :3, :3], centroids) + assembly.poses[:, :3, 3]
@@ -34,32 +37,37 @@ def docking_graph(kit: Kit, assembly: Assembly, labels: IntArray) -> OrderedGrap
     for part, near in enumerate(assembly.neighbours()):
         own = invert(assembly.poses[part])[:3, :3].T @ kit.types[assembly.types[part]].frame[:3, :3]
         order = cyclic_order(centroids[near] - centroids[part], np.stack([up, *own.T]))
-        orders.append([near[place] for place in order])
+        orders.append([near[index] for index in order])
     docked = [[label_of[part, other] for other in order] for part, order in enumerate(orders)]
     return ordered_graph(kit.label_of[assembly.types], orders, docked)
 
 
 def contact_graph(kit: Kit, assembly: Assembly, labels: IntArray) -> OrderedGraph:
-    """The same with the docking sites of each part in the order of its neighbours' numbers, for what asks for none."""
+    """Return the same with docking sites in the order of the neighbours' numbers, for uses that need no cyclic
+    order.
+    """
     tails, heads = np.concatenate([assembly.edges, assembly.edges[:, ::-1]]).T.astype(np.int64)
     order = np.lexsort((heads, tails))
-    place = np.empty(len(order), dtype=np.int64)
-    place[order] = np.arange(len(order))
+    position = np.empty(len(order), dtype=np.int64)
+    position[order] = np.arange(len(order))
     return OrderedGraph(
         types=kit.label_of[assembly.types].astype(np.int64),
         starts=np.searchsorted(tails[order], np.arange(len(assembly) + 1)),
         tails=tails[order],
-        twins=place[(order + len(order) // 2) % max(len(order), 1)],
+        twins=position[(order + len(order) // 2) % max(len(order), 1)],
         labels=labels.T.reshape(-1)[order].astype(np.int64) + 1,
     )
 
 
 def cyclic_order(sites: FloatArray, axes: FloatArray) -> list[int]:
-    """The places of `sites` float64 (k, 3), which are seen from their part, counter-clockwise round the plane's normal.
+    """Return the order of `sites` float64 (k, 3), seen from their part, counter-clockwise round the plane's normal.
 
-    axes: float64 (a, 3), directions that settle what the sites leave open, the most telling first: the normal where
-    they lie on a line or no plane fits best, and its side. What stands in one direction goes from the far side of the
-    plane to the near one, then by distance; what stands over the part itself goes before all.
+    Sites in one direction go from the far side of the plane to the near one, then by distance; those over the part
+    itself
+    go first.
+    axes: float64 (a, 3), directions that decide what the sites leave open, the most decisive first: the normal where
+        they
+    lie on a line or no plane fits best, and its side
     """
     if len(sites) < 3 or not sites.any():
         return list(range(len(sites)))
@@ -67,39 +75,41 @@ def cyclic_order(sites: FloatArray, axes: FloatArray) -> list[int]:
     heights = sites @ normal
     flat = sites - heights[:, None] * normal
     reach = np.linalg.norm(flat, axis=1)
-    if reach.max() <= SAME * np.abs(heights).max():
-        return [int(each) for each in np.argsort(heights, kind="stable")]
+    if reach.max() <= SAME_DIRECTION * np.abs(heights).max():
+        return [int(site) for site in np.argsort(heights, kind="stable")]
     first = _first(flat / reach.max(), heights, np.cross(axes, normal))
     angles = np.arctan2(flat @ np.cross(normal, first), flat @ first) % (2 * np.pi)
-    steps = np.round(angles / SAME) % round(2 * np.pi / SAME)
-    steps[reach <= SAME * reach.max()] = -1
-    return [int(each) for each in np.lexsort((reach, heights, steps))]
+    steps = np.round(angles / SAME_DIRECTION) % round(2 * np.pi / SAME_DIRECTION)
+    steps[reach <= SAME_DIRECTION * reach.max()] = -1
+    return [int(site) for site in np.lexsort((reach, heights, steps))]
 
 
 def _first(flat: FloatArray, heights: FloatArray, across: FloatArray) -> FloatArray:
-    """The direction from which angles are counted, float64 (3,): that of the site farthest from the normal; of equals
-    the lowest, then the one farthest along the first of `across` that tells."""
+    """Return the direction from which angles are counted, float64 (3,): that of the site farthest from the normal.
+
+    Of equals it is the lowest, then the one farthest along the first of `across` that decides.
+    """
     reach = np.linalg.norm(flat, axis=1)
-    keys = [*(np.round(flat @ each, 6) for each in across[::-1]), heights.round(6), -reach.round(6)]
+    keys = [*(np.round(flat @ axis, 6) for axis in across[::-1]), heights.round(6), -reach.round(6)]
     first = flat[int(np.lexsort(keys)[0])]
     direction: FloatArray = first / np.linalg.norm(first)
     return direction
 
 
 def _normal(sites: FloatArray, axes: FloatArray) -> FloatArray:
-    """The normal of the plane through the part that fits its sites best, on a side that the sites or `axes` choose."""
+    """Return the normal of the best-fitting plane through the part, on a side that the sites or `axes` choose."""
     spreads, directions = np.linalg.eigh(np.cov(np.concatenate([np.zeros((1, 3)), sites]).T, bias=True))
-    free = directions[:, spreads <= spreads[0] + SAME * spreads[2]]
-    # Where several normals fit alike the first axis that is not across all of them chooses.
+    free = directions[:, spreads <= spreads[0] + SAME_DIRECTION * spreads[2]]
+    # Of several equally good normals the first axis that is perpendicular to none of them chooses.
     for axis in axes:
         chosen = free @ (free.T @ axis)
-        if np.linalg.norm(chosen) > SAME:
+        if np.linalg.norm(chosen) > SAME_DIRECTION:
             normal = chosen / np.linalg.norm(chosen)
             break
     else:
         normal = free[:, 0]
     leanings = [float(normal @ axes[0]), float(((sites @ normal) ** 3).sum() / np.abs(sites).max() ** 3)]
     leanings += [float(normal @ axis) for axis in axes[1:]]
-    leaning = next((each for each in leanings if abs(each) > SAME), 1.0)
+    leaning = next((value for value in leanings if abs(value) > SAME_DIRECTION), 1.0)
     side: FloatArray = normal if leaning > 0 else -normal
     return side

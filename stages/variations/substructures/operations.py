@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import mix
+from stages.shape.geometry.hash_tables import contains, mix, with_key
 from stages.variations.substructures.dummy_edges import is_alike, pass_over
-from stages.variations.substructures.keys import grown, holds, with_key
+from stages.variations.substructures.growing_arrays import grown
 from stages.variations.substructures.ordered_graph import OrderedGraph
 from stages.variations.substructures.partial_symmetry import (
     CONFLICTS,
@@ -26,63 +26,67 @@ from stages.variations.substructures.partial_symmetry import (
 )
 from stages.variations.substructures.regions import find_regions, region_of
 
-DUMMY_WORK = 5_500_000
-"""Darts that are looked at for symmetries with dummy edges, which are for sparse outliers, about a third of a second:
-in dense graphs the rest is left, those with most dummy edges first."""
-MOST_WAITING = 1 << 17
-"""Symmetries that are gone on with over dummy edges, and wait to be, at most: what bounds memory."""
+MAX_DUMMY_WORK = 5_500_000
+"""Darts looked at for symmetries with dummy edges, about a third of a second. These are for sparse outliers: in dense
+graphs
+the rest is left out, those with most dummy edges first.
+"""
+MAX_WAITING = 1 << 17
+"""Symmetries that wait to be continued over dummy edges at most, which bounds memory."""
 FOUND, LISTED, KNOWN = range(3)
-"""Places in `filled`: rows, operations, and keys of symmetries."""
+"""Indices of `filled`: numbers of rows, operations, and keys of symmetries."""
 
 
 @dataclass(frozen=True)
 class Operations:
-    """Operations that replace a piece of one graph by a piece of another, each the other way round too.
-
-    pairs: int64 (p, 2), darts of the first and of the second graph, each pointing from what stays into what is
-    replaced; the rows of an operation are its boundary. A row (d, -1) or (-1, e) is a dart that a dummy edge passes
-    over: it loses what it points to. starts: int64 (k + 1,), the rows of each of k operations. plain: how many of them,
-    the first, need no dummy edge. meetings: how often these, at least, are met from all pairs of darts that are alike,
-    each of which would have to be tried if equivalent operations were not factored out. work: how many darts were
-    looked at to find them. is_whole: whether these are all; else a limit on what is looked at with dummy edges was met,
-    and the plain ones are all.
-    """
+    """Operations that replace a piece of one graph by a piece of another, and vice versa."""
 
     pairs: np.ndarray
+    """int64 (p, 2), darts of the first and second graph, each pointing from what stays into what is replaced; the rows
+    of an operation are its boundary. A row (d, -1) or (-1, e) is a dart that a dummy edge passes over: it loses its
+    end.
+    """
     starts: np.ndarray
+    """int64 (k + 1,), the rows of each of k operations."""
     plain: int
+    """Number of operations, the first ones, without dummy edges."""
     meetings: int
+    """Lower bound of how often these are met from all pairs of darts that are alike: the tries without factoring out
+    equivalent operations."""
     work: int
+    """Number of darts looked at."""
     is_whole: bool
+    """Whether these are all; otherwise the limit on dummy edges was met, and only the plain ones are complete."""
 
     def __len__(self) -> int:
         return len(self.starts) - 1
 
     def boundary(self, number: int) -> np.ndarray:
-        """The boundary of one operation, int64 (b, 2)."""
+        """Return the boundary of one operation, int64 (b, 2)."""
         rows: np.ndarray = self.pairs[self.starts[number] : self.starts[number + 1]]
         return rows
 
 
 def find_operations(a: OrderedGraph, b: OrderedGraph, violations: int = 0, by_docking: bool = False) -> Operations:
-    """All operations between a piece of `a` and a piece of `b`, which may be the same graph.
+    """Return all operations between a piece of `a` and a piece of `b`, which may be the same graph.
 
-    An operation is one unmatched region of a greatest partial symmetry, so no pair of parts that are alike can be left
-    out at its boundary. violations: how many dummy edges a symmetry may use at most, 0 to 3 (§4.4, "robust matching"),
-    in which the search is exponential; those with fewer come first. by_docking: whether edges match by their dockings
-    too, not by types alone.
-
-    Without violations each is found from a pair of darts, so there are at most as many as pairs: O(k² n²), and in
-    practice far below k n². A symmetry that meets no part twice is the same from all its pairs and is found once, and
-    none costs more than it and the smaller regions that it leaves are large.
+    An operation is one unmatched region of a maximal partial symmetry, so no alike pair of parts is left out at its
+    boundary. Without violations each is found from a pair of darts: O(k² n²), in practice far below k n². A symmetry
+    that
+    meets no part twice is the same from all its pairs and is found once.
+    violations: dummy edges of a symmetry at most, 0 to 3 (§4.4, "robust matching"); the work is exponential in it, and
+    operations with fewer come first
+    by_docking: whether edges match by their dockings too, not by types alone
     """
     return Operations(*_enumerate(side_by_side(a, b), len(a.tails), a is b, by_docking, violations))
 
 
 @numba.njit(cache=True)
 def _enumerate(graph, darts, same, by_docking, violations):
-    """Rows and starts of all operations between two graphs side by side, of which the first has so many darts, `same`
-    where they are one graph; how many are plain; how often these are met; the work; and whether these are all."""
+    """List the operations between two graphs side by side; the first has `darts` darts, `same` if they are one graph.
+
+    Returns rows and starts, the number of plain ones, meetings, work, and whether these are all.
+    """
     over = overlay(len(graph.types), len(graph.tails))
     visited = np.zeros((darts, len(graph.tails) - darts), dtype=np.bool_)
     known, listed = np.zeros(1 << 10, dtype=np.uint64), np.zeros(1 << 10, dtype=np.uint64)
@@ -96,22 +100,22 @@ def _enumerate(graph, darts, same, by_docking, violations):
             if visited[d, e - darts] or not is_alike(graph, d, e):
                 continue
             key = mix(lay_over(graph, d, e, by_docking, nowhere, over)) | np.uint64(1)
-            ways = _visit(graph, darts, same, over, visited) if over.counts[CONFLICTS] == 0 else 1
-            if not holds(known, key):
+            pairs_met = _visit(graph, darts, same, over, visited) if over.counts[CONFLICTS] == 0 else 1
+            if not contains(known, key):
                 known = with_key(known, filled[KNOWN], key)
                 filled[KNOWN] += 1
                 find_regions(graph, by_docking, over)
                 pairs, starts, listed, regions = _emit(darts, same, over, pairs, starts, listed, filled)
-                meetings += ways * regions
+                meetings += pairs_met * regions
                 if violations > 0:
-                    is_whole &= tail < MOST_WAITING
+                    is_whole &= tail < MAX_WAITING
                     waiting, tail = _wait(waiting, tail, d, e, nowhere)
             lift(graph, over, 0)
-    plain, limit, taken = filled[LISTED], over.counts[WORK] + DUMMY_WORK, 0
+    plain, limit, taken = filled[LISTED], over.counts[WORK] + MAX_DUMMY_WORK, 0
     while taken < tail and over.counts[WORK] < limit:
         depth = waiting[taken, 2]
-        dummies = waiting[taken, 3 : 3 + 4 * depth].copy().reshape((depth, 4))
-        total = lay_over(graph, waiting[taken, 0], waiting[taken, 1], by_docking, dummies, over)
+        passed = waiting[taken, 3 : 3 + 4 * depth].copy().reshape((depth, 4))
+        total = lay_over(graph, waiting[taken, 0], waiting[taken, 1], by_docking, passed, over)
         find_regions(graph, by_docking, over)
         matched, defects = over.counts[MATCHED], over.counts[DEFECTS]
         for dummy in pass_over(graph, over):
@@ -120,14 +124,14 @@ def _enumerate(graph, darts, same, by_docking, violations):
             more = go_on(graph, dummy, by_docking, over)
             if more != 0:
                 key = mix(total + more) | np.uint64(1)
-                if not holds(known, key):
+                if not contains(known, key):
                     known = with_key(known, filled[KNOWN], key)
                     filled[KNOWN] += 1
                     find_regions(graph, by_docking, over)
                     pairs, starts, listed, _ = _emit(darts, same, over, pairs, starts, listed, filled)
                     if depth + 1 < violations:
-                        is_whole &= tail < MOST_WAITING
-                        further = np.concatenate((dummies.ravel(), dummy)).reshape((depth + 1, 4))
+                        is_whole &= tail < MAX_WAITING
+                        further = np.concatenate((passed.ravel(), dummy)).reshape((depth + 1, 4))
                         waiting, tail = _wait(waiting, tail, waiting[taken, 0], waiting[taken, 1], further)
             lift(graph, over, matched)
             over.counts[DEFECTS] = defects
@@ -139,20 +143,21 @@ def _enumerate(graph, darts, same, by_docking, violations):
 
 
 @numba.njit(cache=True)
-def _wait(waiting, tail, d, e, dummies):
-    """The symmetries that wait to be gone on with over dummy edges, of which there are `tail`, with one more where
-    there is room; and how many there are."""
-    if tail == MOST_WAITING:
+def _wait(waiting, tail, d, e, passed):
+    """Append a symmetry to those that wait to be continued over dummy edges, if there is room; return these and their
+    number.
+    """
+    if tail == MAX_WAITING:
         return waiting, tail
     waiting = grown(waiting, tail + 1)
-    waiting[tail, 0], waiting[tail, 1], waiting[tail, 2] = d, e, len(dummies)
-    waiting[tail, 3 : 3 + 4 * len(dummies)] = dummies.ravel()
+    waiting[tail, 0], waiting[tail, 1], waiting[tail, 2] = d, e, len(passed)
+    waiting[tail, 3 : 3 + 4 * len(passed)] = passed.ravel()
     return waiting, tail + 1
 
 
 @numba.njit(cache=True)
 def _visit(graph, darts, same, over, visited):
-    """Tick off all pairs of darts from which the symmetry in hand would come again; how many they are."""
+    """Mark all pairs of darts from which the current symmetry would be found again; return their number."""
     count = 0
     for k in range(over.counts[MATCHED]):
         for x in range(graph.starts[over.queue[k]], graph.starts[over.queue[k] + 1]):
@@ -164,8 +169,9 @@ def _visit(graph, darts, same, over, visited):
 
 @numba.njit(cache=True)
 def _emit(darts, same, over, pairs, starts, listed, filled):
-    """Add the regions of the symmetry in hand that are new, by a hash of their boundaries; and how many there are, new
-    or not."""
+    """Add the new regions of the current symmetry, by a hash of their boundaries; return the number of regions, new or
+    not.
+    """
     regions, count = 0, over.counts[ROWS]
     rows = over.rows[:count]
     keys, turned = np.zeros(count, dtype=np.uint64), np.zeros(count, dtype=np.uint64)
@@ -183,14 +189,14 @@ def _emit(darts, same, over, pairs, starts, listed, filled):
             continue
         regions += 1
         key = (min(keys[row], turned[row]) if same else keys[row]) | np.uint64(1)
-        if holds(listed, key):
+        if contains(listed, key):
             continue
         listed = with_key(listed, filled[LISTED], key)
         pairs = grown(pairs, filled[FOUND] + count)
-        for each in range(row, count):
-            if region_of(over.lines, each) == row:
-                pairs[filled[FOUND], 0] = rows[each, 0]
-                pairs[filled[FOUND], 1] = rows[each, 1] - darts if rows[each, 1] >= 0 else -1
+        for other in range(row, count):
+            if region_of(over.lines, other) == row:
+                pairs[filled[FOUND], 0] = rows[other, 0]
+                pairs[filled[FOUND], 1] = rows[other, 1] - darts if rows[other, 1] >= 0 else -1
                 filled[FOUND] += 1
         filled[LISTED] += 1
         starts = grown(starts, filled[LISTED] + 1)

@@ -1,7 +1,11 @@
-"""Partial symmetries: two graphs laid upon each other from a pair of darts on, as far as they agree (substructures
-§4.3.1, §4.3.2).
+"""Partial symmetries: two graphs laid on each other from a pair of darts, as far as they agree (substructures §4.3.1,
+§4.3.2).
 
-Kernels see the two as one graph: the nodes and darts of the second are counted on from those of the first.
+Compiled code sees the two as one graph: nodes and darts of the second are counted on from those of the first.
+
+state: `Overlay`; the current symmetry is image, partner and queue
+invariant: after `lift(graph, over, k)` everything but the first k matched pairs is as before they were laid on
+ends: `lay_over` and `go_on` return a sum of hashes that identifies the symmetry, or 0 where nothing matches
 """
 
 from __future__ import annotations
@@ -11,40 +15,32 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import mix
+from stages.shape.geometry.hash_tables import mix
 from stages.variations.substructures.ordered_graph import OrderedGraph
 
 CONFLICTS, DEFECTS, MATCHED, ROWS, WORK = range(5)
-"""Places in `counts`: parts that were met again in another place; pairs of parts that a dummy edge would match; matched
-parts; rows of the boundary; darts looked at, which nobody sets back."""
-MOST_DEFECTS = 64
-"""Defects of one partial symmetry that dummy edges are tried on."""
+"""Indices of `Overlay.counts`: parts met again in another place, pairs of parts that a dummy edge would match, matched
+parts, rows of the boundary, and darts looked at, which is never reset."""
+MAX_DEFECTS = 64
+"""Defects of one partial symmetry on which dummy edges are tried."""
 
 
 class Overlay(NamedTuple):
-    """What one partial symmetry is laid out in; all but `counts` is as it was after `lift`, so that none costs more
-    than it is large. Of n nodes and m darts of both graphs:
+    """The current partial symmetry, for n nodes and m darts of both graphs."""
 
-    image int64 (n,) and partner (m,): the node or dart of the other graph, or -1; queue (n,): the matched nodes of the
-    first in the order in which they were met; defects (d, 2); counts (5,). For `find_regions`: rows (m, 2), the
-    boundary; row_of (m,), the row of a dart, or -1; lines (m, 4), of each row the first row of its region, the first
-    and the last node that wait in it, and a row where some do; marks (n, 3), of each node the row that it was reached
-    from, or -1, and the node that waits after it, and the nodes that were reached.
-    """
-
-    image: np.ndarray
-    partner: np.ndarray
-    queue: np.ndarray
-    defects: np.ndarray
-    counts: np.ndarray
-    rows: np.ndarray
-    row_of: np.ndarray
-    lines: np.ndarray
-    marks: np.ndarray
+    image: np.ndarray  # int64 (n,): node of the other graph, or -1
+    partner: np.ndarray  # int64 (m,): dart of the other graph, or -1
+    queue: np.ndarray  # int64 (n,): matched nodes of the first graph, in the order in which they were met
+    defects: np.ndarray  # int64 (d, 2)
+    counts: np.ndarray  # int64 (5,): see CONFLICTS
+    rows: np.ndarray  # int64 (m, 2): the boundary, for `find_regions`
+    row_of: np.ndarray  # int64 (m,): row of a dart, or -1
+    lines: np.ndarray  # int64 (m, 4): of each row see `regions.LEADER`
+    marks: np.ndarray  # int64 (n, 3): of each node see `regions.FROM`
 
 
 def side_by_side(a: OrderedGraph, b: OrderedGraph) -> OrderedGraph:
-    """Two graphs as one, the nodes and darts of the second counted on from those of the first."""
+    """Return two graphs as one; nodes and darts of the second are counted on from those of the first."""
     nodes, darts = len(a.types), len(a.tails)
     return OrderedGraph(
         np.concatenate([a.types, b.types]),
@@ -57,12 +53,12 @@ def side_by_side(a: OrderedGraph, b: OrderedGraph) -> OrderedGraph:
 
 @numba.njit(cache=True)
 def overlay(nodes, darts):
-    """Room for the partial symmetries of two graphs of so many nodes and darts, none laid out."""
+    """Return room for the partial symmetries of two graphs with `nodes` nodes and `darts` darts."""
     return Overlay(
         np.full(nodes, -1, dtype=np.int64),
         np.full(darts, -1, dtype=np.int64),
         np.empty(nodes, dtype=np.int64),
-        np.empty((MOST_DEFECTS, 2), dtype=np.int64),
+        np.empty((MAX_DEFECTS, 2), dtype=np.int64),
         np.zeros(5, dtype=np.int64),
         np.empty((darts, 2), dtype=np.int64),
         np.full(darts, -1, dtype=np.int64),
@@ -73,22 +69,22 @@ def overlay(nodes, darts):
 
 @numba.njit(cache=True)
 def pair_hash(x, y):
-    """A hash of a pair of darts, or of one and -1."""
+    """Return a hash of a pair of darts, or of one and -1."""
     return mix(np.uint64(x + 1) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(y + 2))
 
 
 @numba.njit(cache=True)
 def agree(graph, d, e, by_docking):
-    """Whether the edges of two darts are of one kind, as far as dockings tell."""
+    """Return whether the edges of two darts are of one kind, as far as dockings tell."""
     labels, twins = graph.labels, graph.twins
     return not by_docking or (labels[d] == labels[e] and labels[twins[d]] == labels[twins[e]])
 
 
 @numba.njit(cache=True)
 def _match(graph, d, e, side, place, over):
-    """Lay the tail of dart e upon that of d, dart upon dart in their order; whether that could be done.
+    """Lay the tail of dart e on that of d, dart on dart in order; return whether that was possible.
 
-    Of `side` 0 of the first, of 1 of the second, which has one dart more, the one at `place` from there is passed over.
+    side: 0 or 1 if the first or second has one more dart: the one at `place` is passed over; otherwise -1
     """
     v, w = graph.tails[d], graph.tails[e]
     if graph.types[v] != graph.types[w]:
@@ -99,7 +95,7 @@ def _match(graph, d, e, side, place, over):
     start, end, start_there, end_there = graph.starts[v], graph.starts[v + 1], graph.starts[w], graph.starts[w + 1]
     first, second = end - start, end_there - start_there
     if first != second and side < 0:
-        if abs(first - second) == 1 and over.counts[DEFECTS] < MOST_DEFECTS:
+        if abs(first - second) == 1 and over.counts[DEFECTS] < MAX_DEFECTS:
             over.defects[over.counts[DEFECTS], 0] = d
             over.defects[over.counts[DEFECTS], 1] = e
             over.counts[DEFECTS] += 1
@@ -123,17 +119,18 @@ def _match(graph, d, e, side, place, over):
 
 
 @numba.njit(cache=True)
-def lay_over(graph, d, e, by_docking, dummies, over):
-    """The greatest partial symmetry of two graphs side by side that lays dart e of the second upon dart d of the first,
-    gone on with over each of `dummies` int64 (q, 4) in turn, as `go_on` takes them; a sum of hashes that tells it, 0
-    where it has no part at all, or a dummy edge leads nowhere.
+def lay_over(graph, d, e, by_docking, passed, over):
+    """Lay dart e of the second graph on dart d of the first, and all that follows; return the hash of the symmetry, or
+    0.
 
-    `over` is as `lift` leaves it. Breadth-first, so that where a way round leads elsewhere the nearer match stands.
+    It goes on over each of `passed` int64 (q, 4) in turn, as `go_on` takes them. `over` is as `lift` leaves it. The
+    order is
+    breadth first, so that where a way round leads elsewhere the nearer match stays.
     """
     over.counts[CONFLICTS] = over.counts[DEFECTS] = over.counts[MATCHED] = 0
     total = _extend(graph, d, e, -1, 0, by_docking, over)
-    for k in range(len(dummies)):
-        more = go_on(graph, dummies[k], by_docking, over)
+    for k in range(len(passed)):
+        more = go_on(graph, passed[k], by_docking, over)
         if more == 0:
             return np.uint64(0)
         total += more
@@ -142,11 +139,10 @@ def lay_over(graph, d, e, by_docking, dummies, over):
 
 @numba.njit(cache=True)
 def go_on(graph, dummy, by_docking, over):
-    """Go on with the symmetry in hand over one dummy edge of the dual (§4.4), which passes over what does not agree;
-    what its sum of hashes grows by, or 0 where that cannot be done.
+    """Continue the current symmetry over one dummy edge of the dual (§4.4); return by how much its hash grows, or 0.
 
-    dummy int64 (4,): either (d, e, 0 or 1, place), where the order of docking sites has one more in the first or in the
-    second, or (x, y, -1, 0), darts beyond an unmatched region, from which the symmetry goes on.
+    dummy: int64 (4,), either (d, e, 0 or 1, place), where the first or the second graph has one more docking site, or
+    (x, y, -1, 0), darts beyond an unmatched region, from which the symmetry goes on
     """
     more = _extend(graph, dummy[0], dummy[1], dummy[2], dummy[3], by_docking, over)
     return more + pair_hash(dummy[0], dummy[3]) if more != 0 and dummy[2] >= 0 else more
@@ -154,7 +150,7 @@ def go_on(graph, dummy, by_docking, over):
 
 @numba.njit(cache=True)
 def _extend(graph, d, e, side, place, by_docking, over):
-    """Match the tails of two darts, and all that they lead to; a sum of hashes of the pairs, 0 of none."""
+    """Match the tails of two darts and all that they lead to; return a sum of hashes of the pairs, 0 if none match."""
     begin, total = over.counts[MATCHED], np.uint64(0)
     if not _match(graph, d, e, side, place, over):
         return total
@@ -176,7 +172,7 @@ def _extend(graph, d, e, side, place, by_docking, over):
 
 @numba.njit(cache=True)
 def lift(graph, over, left):
-    """Take up what was laid out but the first `left` pairs of parts, so that the next symmetry can be."""
+    """Remove all matched pairs of parts but the first `left`."""
     for k in range(left, over.counts[MATCHED]):
         v = over.queue[k]
         for node in (v, over.image[v]):

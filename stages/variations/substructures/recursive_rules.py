@@ -1,5 +1,5 @@
-"""Recursive rules: where one of two pieces is part of the other, an operation can be carried out upon what it has made,
-again and again (substructures §4.2). It grows what it is carried out on, or, the other way round, shrinks it.
+"""Recursive rules: where one of two pieces is part of the other, an operation can be applied to its own result
+(substructures §4.2). It grows the shape or, the other way round, shrinks it.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from stages.variations.substructures.replacement import Replacement, piece_of
 
 
 def growth_of(graph: OrderedGraph, boundary: np.ndarray) -> int:
-    """How many parts more there are each time that a recursive rule is carried out, fewer where it is negative; 0 where
-    the operation is no such rule.
+    """Return by how many parts a recursive rule grows a shape each time, negative where it shrinks it, 0 for other
+    operations.
 
-    boundary: int64 (b, 2), darts of one graph, as `Operations` says it.
+    boundary: int64 (b, 2), darts of one graph, as in `Operations`
     """
     taken, piece = piece_of(graph, boundary[:, 0]), piece_of(graph, boundary[:, 1])
     smaller, larger = (taken, piece) if taken.sum() < piece.sum() else (piece, taken)
@@ -24,11 +24,11 @@ def growth_of(graph: OrderedGraph, boundary: np.ndarray) -> int:
 
 
 def cut_again(made: Replacement, graph: OrderedGraph, boundary: np.ndarray) -> np.ndarray | None:
-    """The boundary along which a rule that grows can be carried out again upon what it made, int64 (b, 2): around the
-    piece that it takes out, in the copy of the one that it has put in. None where that is not whole there.
+    """Return the boundary along which a growing rule can be applied to its own result, int64 (b, 2), or None.
 
-    boundary: that of the rule between two pieces of `graph`, however often it was carried out before; made: what it
-    made last.
+    It surrounds the piece that the rule takes out, in the copy of the piece that it put in; that must be whole there.
+    boundary: that of the rule between two pieces of `graph`, however often it was applied before
+    made: what it made last
     """
     inner = graph.twins[boundary[:, 0]].tolist()
     if any(dart not in made.darts_of_giver for dart in inner):
@@ -38,11 +38,12 @@ def cut_again(made: Replacement, graph: OrderedGraph, boundary: np.ndarray) -> n
 
 
 def cut_farther(graph: OrderedGraph, boundary: np.ndarray, cut: np.ndarray) -> np.ndarray | None:
-    """The cut, int64 (b,), inside which a rule that shrinks finds what it takes out once more, so that what it would
-    make upon what it has made is made at once. None where what it takes out is not there again.
+    """Return the cut, int64 (b,), inside which a shrinking rule finds what it takes out another time, or None.
 
-    boundary: int64 (b, 2), that of the rule between two pieces of `graph`; cut: its first column at first, later what
-    this found before. What lies between the two pieces, seen from the inner one, is laid upon what lies outside `cut`.
+    So several applications become one. The parts between the two pieces, seen from the inner one, are laid on what is
+    outside `cut`.
+    boundary: int64 (b, 2), that of the rule between two pieces of `graph`
+    cut: its first column at first, later what this function returned before
     """
     outer, inner = piece_of(graph, boundary[:, 0]), piece_of(graph, boundary[:, 1])
     between, inside = outer & ~inner, piece_of(graph, cut)
@@ -51,36 +52,36 @@ def cut_farther(graph: OrderedGraph, boundary: np.ndarray, cut: np.ndarray) -> n
     waiting = list(zip(boundary[:, 1].tolist(), cut.tolist(), strict=True))
     while waiting:
         dart, other = waiting.pop()
-        node, place = int(graph.tails[dart]), int(graph.tails[other])
+        node, target = int(graph.tails[dart]), int(graph.tails[other])
         if not between[node] or partner.get(dart, -1) == other:
             continue
-        if node in image or place in image.values() or inside[place] or not _are_alike(graph, node, place):
+        if node in image or target in image.values() or inside[target] or not _are_alike(graph, node, target):
             return None
-        image[node] = place
+        image[node] = target
         partner.update(zip(graph.around(dart), graph.around(other), strict=True))
         waiting += [
             (int(graph.twins[own]), int(graph.twins[partner[own]]))
             for own in graph.around(dart)
             if between[graph.tails[graph.twins[own]]]
         ]
-    found = []
+    next_cut = []
     for dart, within in boundary.tolist():
         if dart == within:
-            found.append(dart)
+            next_cut.append(dart)
             continue
         back = partner.get(int(graph.twins[dart]), -1)
         farther = int(graph.twins[back])
         if back < 0 or not _are_alike(graph, int(graph.tails[dart]), int(graph.tails[farther])):
             return None
-        found.append(farther)
+        next_cut.append(farther)
     taken = inside.copy()
     taken[list(image.values())] = True
-    farthest = np.array(found, dtype=np.int64)
+    farthest = np.array(next_cut, dtype=np.int64)
     is_whole = not taken[graph.tails[farthest]].any() and (piece_of(graph, farthest) == taken).all()
     return farthest if is_whole else None
 
 
 def _are_alike(graph: OrderedGraph, node: int, other: int) -> bool:
-    """Whether two nodes have one type and as many docking sites."""
+    """Return whether two nodes have one type and equal numbers of docking sites."""
     sizes = graph.starts[[node + 1, other + 1]] - graph.starts[[node, other]]
     return bool(graph.types[node] == graph.types[other] and sizes[0] == sizes[1])

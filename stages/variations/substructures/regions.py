@@ -15,7 +15,7 @@ FROM, AFTER, REACHED = range(3)
 
 @numba.njit(cache=True)
 def region_of(lines, row):
-    """The first row of a row's region."""
+    """Return the first row of a row's region."""
     while lines[row, LEADER] != row:
         lines[row, LEADER] = lines[lines[row, LEADER], LEADER]
         row = lines[row, LEADER]
@@ -24,12 +24,14 @@ def region_of(lines, row):
 
 @numba.njit(cache=True)
 def find_regions(graph, by_docking, over):
-    """Find the boundary of the symmetry in hand, `rows`, and which of its rows are of one unmatched region.
+    """Find the boundary of the current symmetry, `rows`, and which rows are of one unmatched region.
 
-    A row is (x, y), darts that are matched and whose edges are not, or a dart of either graph that a dummy edge passed
-    over, (x, -1) or (-1, y). What hangs together in either graph without its matched nodes is one region. It is looked
-    at from all rows in turn, a node at a time, and no farther than until all but one region have come to an end: a
-    symmetry of few parts costs little, however large the rest.
+    A row is (x, y), darts that are matched and whose edges are not, or a dart that a dummy edge passed over, (x, -1) or
+    (-1, y). What is connected in either graph without its matched nodes is one region. It is explored from all rows in
+    turn,
+    a node at a time, until all but one region have come to an end: a symmetry of few parts costs little, however large
+    the
+    rest.
     """
     _find_rows(graph, by_docking, over)
     rows, row_of, lines, marks = over.rows[: over.counts[ROWS]], over.row_of, over.lines, over.marks
@@ -40,12 +42,12 @@ def find_regions(graph, by_docking, over):
             lines[live, LIVE] = row
             live += 1
     while live > 1:
-        left = 0
+        still_live = 0
         for k in range(live):
             row = lines[k, LIVE]
             if lines[row, LEADER] == row and lines[row, FIRST] >= 0:
-                lines[left, LIVE] = row
-                left += 1
+                lines[still_live, LIVE] = row
+                still_live += 1
                 node = lines[row, FIRST]
                 lines[row, FIRST] = marks[node, AFTER]
                 over.counts[WORK] += graph.starts[node + 1] - graph.starts[node]
@@ -53,7 +55,7 @@ def find_regions(graph, by_docking, over):
                     head = graph.tails[graph.twins[x]]
                     if over.image[head] < 0:
                         reached = _reach(head, row, reached, lines, marks)
-        live = left
+        live = still_live
     for k in range(reached):
         marks[marks[k, REACHED], FROM] = -1
     for row in range(len(rows)):
@@ -90,7 +92,7 @@ def _find_rows(graph, by_docking, over):
 
 @numba.njit(cache=True)
 def _begin(graph, over):
-    """Reach what the rows lead to; how many nodes were reached."""
+    """Reach what the rows lead to; return how many nodes were reached."""
     reached, rows, row_of, lines = 0, over.rows, over.row_of, over.lines
     for row in range(over.counts[ROWS]):
         lines[row, LEADER] = row
@@ -110,7 +112,7 @@ def _begin(graph, over):
 
 @numba.njit(cache=True)
 def _reach(node, row, reached, lines, marks):
-    """Reach a node from a row's region: it waits there, or makes one of two; how many were reached."""
+    """Reach a node from a row's region: it waits there, or joins two regions; return how many were reached."""
     if marks[node, FROM] >= 0:
         _join(marks[node, FROM], row, lines, marks)
         return reached
@@ -145,7 +147,9 @@ def _join(i, j, lines, marks):
 
 @numba.njit(cache=True)
 def cut_off(graph, cut):
-    """What the darts `cut` int64 (b,) point to and what hangs together with it without crossing them, bool (n,)."""
+    """Return what the darts `cut` int64 (b,) point to and what is connected with it without crossing them, bool
+    (n,).
+    """
     inside, is_wall = np.zeros(len(graph.types), dtype=np.bool_), np.zeros(len(graph.tails), dtype=np.bool_)
     waiting = np.empty(len(cut) + len(graph.tails), dtype=np.int64)
     count = 0

@@ -1,5 +1,4 @@
-"""Carrying out a graph operation: a piece is taken out and a copy of another is set into the hole (substructures
-§4.2)."""
+"""Graph operations: a piece is taken out and a copy of another is set into the hole (substructures §4.2)."""
 
 from __future__ import annotations
 
@@ -13,30 +12,32 @@ from stages.variations.substructures.regions import cut_off
 
 @dataclass(frozen=True)
 class Replacement:
-    """What an operation makes.
-
-    graph: the result; from_base int64 (a.n,), from_giver int64 (b.n,): the places of their nodes in it, or -1;
-    darts_of_giver: the place in the result of each dart of the giver that was copied.
-    """
+    """The result of an operation."""
 
     graph: OrderedGraph
     from_base: np.ndarray
+    """int64 (a.n,), node of the result for each node of the base, or -1."""
     from_giver: np.ndarray
+    """int64 (b.n,), the same for the giver."""
     darts_of_giver: dict[int, int]
+    """Dart of the result for each dart of the giver that was copied."""
 
 
 def piece_of(graph: OrderedGraph, cut: np.ndarray) -> np.ndarray:
-    """The nodes that the darts `cut` int64 (b,) cut off, bool (n,): what they point to, and all that hangs together
-    with it without crossing the cut. Darts of -1 are none."""
+    """Return the nodes that the darts `cut` int64 (b,) cut off, bool (n,); darts of -1 do not count.
+
+    These are what the darts point to and all that is connected with it without crossing the cut.
+    """
     inside: np.ndarray = cut_off(graph, np.ascontiguousarray(cut))
     return inside
 
 
 def replace_piece(base: OrderedGraph, giver: OrderedGraph, boundary: np.ndarray) -> Replacement | None:
-    """Put the giver's piece in the place of the base's; None where two parts would touch twice, or one itself.
+    """Put the giver's piece in place of the base's; return None where two parts would touch twice, or one itself.
 
-    boundary: int64 (b, 2), as `Operations` says it; what stays of the base meets the piece of the giver as what stayed
-    of the giver met it. Where a piece is empty the parts at both sides of its boundary meet.
+    boundary: int64 (b, 2), as in `Operations`; what stays of the base meets the giver's piece as what stayed of the
+        giver
+    met it. Where a piece is empty the parts at both sides of its boundary meet.
     """
     taken, piece = piece_of(base, boundary[:, 0]), piece_of(giver, boundary[:, 1])
     from_base, from_giver = np.full(len(taken), -1), np.full(len(piece), -1)
@@ -48,7 +49,7 @@ def replace_piece(base: OrderedGraph, giver: OrderedGraph, boundary: np.ndarray)
     walls = set(boundary[:, 0].tolist())
 
     def beyond(e: int) -> int:
-        """The place of the node that the giver's dart e leads to, or -1."""
+        """Return the node of the result that the giver's dart e leads to, or -1."""
         ahead = int(giver.twins[e])
         if from_giver[giver.tails[ahead]] >= 0:
             return int(from_giver[giver.tails[ahead]])
@@ -83,7 +84,7 @@ def replace_piece(base: OrderedGraph, giver: OrderedGraph, boundary: np.ndarray)
         orders.append(ends)
         labels.append(kinds)
     types = np.concatenate([base.types[~taken], giver.types[piece]])
-    if any(len(set(each)) < len(each) or node in each for node, each in enumerate(orders)) or len(types) == 0:
+    if any(len(set(order)) < len(order) or node in order for node, order in enumerate(orders)) or len(types) == 0:
         return None
     graph = ordered_graph(types, orders, labels)
     darts = dict(zip(copied, range(int(graph.starts[stays]), len(graph.tails)), strict=True))

@@ -1,8 +1,7 @@
 """A sheet of replacements: source, cut, replacement and result of each, in the colours of the two pieces.
 
-The source is the shape of which more is in the result: a whole shape that is put to four parts of another is easier to
-read as four parts that are put to it. Shapes are drawn without their backdrops, and results as they lie upon their
-sources, not as they face in the dataset.
+The source is the shape that gave more parts: a shape with four new parts is easier to read than four parts with a new
+shape. Shapes are drawn without hubs; results lie as their sources do, not as in the dataset.
 """
 
 from __future__ import annotations
@@ -24,56 +23,64 @@ from stages.shape.views.scene import Scene, scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.variations.selection.orientation import vertical_turn
 
-SHOWN = 12
-CELL = 300
+MAX_ROWS_SHOWN = 12
+CELL_PIXELS = 300
 CAMERAS = tuple(Camera(azimuth=azimuth, elevation=25.0) for azimuth in (-40.0, 50.0, 140.0, 230.0))
-GLANCE = 96
-"""Sides of the pictures by which a camera is chosen; unit: pixels."""
-PLAIN, TAKEN, COME = (np.array(each, dtype=np.uint8) for each in ((205, 205, 200), (200, 70, 60), (60, 110, 190)))
+CAMERA_TEST_PIXELS = 96
+"""Sides of the pictures by which a camera is chosen."""
+PLAIN, TAKEN, COME = (np.array(rgb, dtype=np.uint8) for rgb in ((205, 205, 200), (200, 70, 60), (60, 110, 190)))
 
 Named = tuple[str, Assembly]
 
 
 @dataclass(frozen=True)
 class DrawnReplacement:
-    """base and giver: what they are called, and their parts; taken bool (n,) and piece bool (m,): which parts of them
-    leave and come; result: what was made, where the base stands; came bool (k,): which parts of it are the giver's."""
+    """A replacement that is drawn."""
 
     base: Named
     giver: Named
     taken: BoolArray
+    """bool (n,), parts of the base that leave."""
     piece: BoolArray
+    """bool (m,), parts of the giver that come."""
     result: Assembly
+    """In the pose of the base."""
     came: BoolArray
+    """bool (k,), parts of the result that are the giver's."""
 
 
 def replacements_sheet(kit: Kit, samples: Sequence[Sample]) -> bytes | None:
-    """The first replacements among the samples of a kit as PNG, a row each: the source with what is taken out of it,
-    what stays of it, the giver with what is copied, and the result; None where there are none."""
+    """Return the first replacements among the samples of a kit as PNG, a row each; or None.
+
+    A row shows the source with what is taken out, what stays, the giver with what is copied, and the result.
+    """
     known, rows = known_shapes(kit, samples), []
     for sample in samples:
-        found = replacement_of(kit, sample, known)
-        if found is None:
+        replacement = replacement_of(kit, sample, known)
+        if replacement is None:
             continue
-        rows.append(_row(kit, sample.key, found))
-        if len(rows) == SHOWN:
+        rows.append(_row(kit, sample.key, replacement))
+        if len(rows) == MAX_ROWS_SHOWN:
             break
     if not rows:
         return None
     title = f"{kit.name}: what took the place of what"
-    return picture_png(contact_sheet([Section("Source, cut, replacement, result", rows, "")], title, CELL))
+    return picture_png(contact_sheet([Section("Source, cut, replacement, result", rows, "")], title, CELL_PIXELS))
 
 
 def known_shapes(kit: Kit, samples: Sequence[Sample]) -> dict[str, Named]:
-    """By the name that lineages have for them, exemplars and samples, with what they are called here: samples by their
-    keys, as the search made them."""
-    known = {each.name: (each.name, each.assembly) for each in kit.exemplars}
-    return known | {each.lineage["name"]: (each.key, _as_made(kit, each)) for each in samples}
+    """Return exemplars and samples by their names in lineages, with their names here: samples by their keys, as
+    made.
+    """
+    known = {exemplar.name: (exemplar.name, exemplar.assembly) for exemplar in kit.exemplars}
+    return known | {sample.lineage["name"]: (sample.key, _as_made(kit, sample)) for sample in samples}
 
 
 def replacement_of(kit: Kit, sample: Sample, known: Mapping[str, Named]) -> DrawnReplacement | None:
-    """What took the place of what in a sample that was made of `known` shapes, once and rigidly, the base being the one
-    of which more is in it; None of others, and where what stayed of the base moved to make room."""
+    """Return the replacement that made a sample of `known` shapes, once and rigidly; None for others.
+
+    The base is the shape that gave more parts. None also where what stayed of the base moved to make room.
+    """
     lineage = sample.lineage
     if lineage["method"] != "substructures" or lineage["repeats"] > 1 or lineage["deformed"]:
         return None
@@ -95,46 +102,50 @@ def replacement_of(kit: Kit, sample: Sample, known: Mapping[str, Named]) -> Draw
 
 
 def _as_made(kit: Kit, sample: Sample) -> Assembly:
-    """The parts that the search put together, as it placed them: before the shape was turned, without its backdrop."""
+    """Return the parts that the search put together, as it placed them: before the shape was turned, without hubs."""
     turn = vertical_turn({"y": 1, "z": 2}[kit.up], sample.lineage["turned_degrees"])
     bare = sample.assembly.select(np.arange(len(sample.assembly) - sample.lineage["restored_hubs"]))
     return replace(bare, poses=turn.T @ bare.poses)
 
 
-def _found(kit: Kit, assembly: Assembly, poses: FloatArray, there: Assembly) -> BoolArray:
-    """Which parts of an assembly, moved to `poses`, stand among those `there`, bool (n,)."""
-    gaps = np.abs(poses[:, None] - there.poses).max(axis=(2, 3))
-    found: BoolArray = ((gaps < kit.pose_tolerance) & (assembly.types[:, None] == there.types)).any(axis=1)
-    return found
+def _found(kit: Kit, assembly: Assembly, poses: FloatArray, others: Assembly) -> BoolArray:
+    """Return which parts of an assembly, moved to `poses`, are among those `there`, bool (n,)."""
+    gaps = np.abs(poses[:, None] - others.poses).max(axis=(2, 3))
+    is_there: BoolArray = ((gaps < kit.pose_tolerance) & (assembly.types[:, None] == others.types)).any(axis=1)
+    return is_there
 
 
-def _row(kit: Kit, key: str, found: DrawnReplacement) -> list[Cell]:
-    """The four pictures of a replacement; all but the giver's from where most is seen of what leaves and comes."""
-    (base_name, base), (giver_name, giver), result = found.base, found.giver, found.result
-    leave, come = int(found.taken.sum()), int(found.piece.sum())
-    stays = base.select(np.flatnonzero(~found.taken))
-    scenes = [scene_of(upright(kit_shape(kit, each))) for each in (base, stays, giver, result)]
-    marks = [found.taken, np.zeros(len(stays), dtype=bool), found.piece, found.came]
+def _row(kit: Kit, key: str, drawn: DrawnReplacement) -> list[Cell]:
+    """Return the four pictures of a replacement; all but the giver's show most of what leaves and comes."""
+    (base_name, base), (giver_name, giver), result = drawn.base, drawn.giver, drawn.result
+    leave, come = int(drawn.taken.sum()), int(drawn.piece.sum())
+    stays = base.select(np.flatnonzero(~drawn.taken))
+    scenes = [scene_of(upright(kit_shape(kit, shape))) for shape in (base, stays, giver, result)]
+    marks = [drawn.taken, np.zeros(len(stays), dtype=bool), drawn.piece, drawn.came]
     names = [
         f"{base_name}: {leave} of {len(base)} leave",
         f"{len(stays)} stay",
         f"{giver_name}: {come} of {len(giver)} come",
         f"{key}: {len(result)} parts",
     ]
-    there, giving = _camera([(scenes[place], marks[place]) for place in (0, 3)]), _camera([(scenes[2], marks[2])])
+    base_camera = _camera([(scenes[picture], marks[picture]) for picture in (0, 3)])
+    giver_camera = _camera([(scenes[2], marks[2])])
     cells = []
     for scene, chosen, color, name in zip(scenes, marks, (TAKEN, PLAIN, COME, COME), names, strict=True):
-        camera = giving if scene is scenes[2] else there
+        camera = giver_camera if scene is scenes[2] else base_camera
         paint = np.where(chosen[:, None], color, PLAIN)
-        cells.append(Cell(portrait(scene, camera, (CELL, CELL), paint), name))
+        cells.append(Cell(portrait(scene, camera, (CELL_PIXELS, CELL_PIXELS), paint), name))
     return cells
 
 
 def _camera(marked: Sequence[tuple[Scene, BoolArray]]) -> Camera:
-    """The first camera that sees half as much of the marked parts as the one that sees most of them."""
+    """Return the first camera that sees at least half as much of the marked parts as the best one."""
     seen = []
     for camera in CAMERAS:
-        pictures = [visible_triangles(scene, camera, (GLANCE, GLANCE), "raster").triangles for scene, _ in marked]
-        parts = [scene.triangle_part[each[each >= 0]] for (scene, _), each in zip(marked, pictures, strict=True)]
-        seen.append(sum(int(own[each].sum()) for (_, own), each in zip(marked, parts, strict=True)))
-    return CAMERAS[next(place for place, count in enumerate(seen) if 2 * count >= max(seen))]
+        pictures = [
+            visible_triangles(scene, camera, (CAMERA_TEST_PIXELS, CAMERA_TEST_PIXELS), "raster").triangles
+            for scene, _ in marked
+        ]
+        parts = [scene.triangle_part[shown[shown >= 0]] for (scene, _), shown in zip(marked, pictures, strict=True)]
+        seen.append(sum(int(own[visible].sum()) for (_, own), visible in zip(marked, parts, strict=True)))
+    return CAMERAS[next(number for number, count in enumerate(seen) if 2 * count >= max(seen))]

@@ -1,23 +1,24 @@
-"""The key of what an operation makes, from the graphs alone: what is known need not be put together (substructures
-§4.3.1)."""
+"""The key of an operation's result, from the graphs alone: known results need not be built (substructures §4.3.1)."""
 
 from __future__ import annotations
 
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import mix
+from stages.shape.geometry.hash_tables import mix
 
-GOLDEN, ODD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0x7F4A7C15)
-ODD_TYPE = np.uint64(0x51ED270B)
+GOLDEN_MULTIPLIER, ODD_OFFSET = np.uint64(0x9E3779B97F4A7C15), np.uint64(0x7F4A7C15)
+TYPE_OFFSET = np.uint64(0x51ED270B)
 
 
 @numba.njit(cache=True)
 def result_key(base, giver, taken, piece, boundary):
-    """The key of the result by colour refinement of its graph with its docking labels, uint64: that which
-    `graph_key` gives the shape, where it has no contacts beside those that are brought along.
+    """Return the key of the result by colour refinement of its graph with docking labels, uint64.
 
-    taken bool (a.n,) leaves the base, piece bool (b.n,) of the giver comes, along `boundary` int64 (b, 2).
+    `graph_key` gives the shape the same key if it has no contacts beyond those that are brought along.
+    taken: bool (a.n,), leaves the base
+    piece: bool (b.n,), comes from the giver
+    boundary: int64 (b, 2)
     """
     stays = len(base.types)
     place, outer = np.full(stays + len(giver.types), -1, dtype=np.int64), np.full(len(base.tails), -1, dtype=np.int64)
@@ -42,7 +43,7 @@ def result_key(base, giver, taken, piece, boundary):
         if place[node] < 0:
             continue
         graph, own = (base, node) if node < stays else (giver, node - stays)
-        colours[place[node]] = mix(np.uint64(graph.types[own]) + ODD_TYPE)
+        colours[place[node]] = mix(np.uint64(graph.types[own]) + TYPE_OFFSET)
         for dart in range(graph.starts[own], graph.starts[own + 1]):
             end, label = np.int64(-1), graph.labels[dart]
             if node >= stays:
@@ -59,7 +60,7 @@ def result_key(base, giver, taken, piece, boundary):
 
 @numba.njit(cache=True)
 def _beyond(base, giver, dart, place, source):
-    """The place of the node that the giver's dart leads to, or -1."""
+    """Return the node of the result that the giver's dart leads to, or -1."""
     ahead = giver.twins[dart]
     own = place[len(base.types) + giver.tails[ahead]]
     if own >= 0:
@@ -68,22 +69,25 @@ def _beyond(base, giver, dart, place, source):
 
 
 @numba.njit(cache=True)
-def moved_key(base, giver, taken, piece, image):
-    """The same of what a move makes: parts of the giver that coincide with one of the base, as `image` int16 (m,) says,
-    bring their edges to the piece along."""
+def swap_key(base, giver, taken, piece, image):
+    """Return the same key for a region swap.
+
+    Parts of the giver that coincide with one of the base, as `image` int16 (m,) says, bring their edges to the piece
+    along.
+    """
     n = len(base.types)
     place, count = np.full(n + len(giver.types), -1, dtype=np.int64), 0
     for node in range(len(place)):
         if not taken[node] if node < n else piece[node - n]:
             place[node] = count
             count += 1
-    most = len(base.tails) + 2 * len(giver.tails)
-    edges, labels = np.empty((most, 2), dtype=np.int64), np.empty(most, dtype=np.uint64)
+    max_edges = len(base.tails) + 2 * len(giver.tails)
+    edges, labels = np.empty((max_edges, 2), dtype=np.int64), np.empty(max_edges, dtype=np.uint64)
     colours, filled = np.empty(count, dtype=np.uint64), 0
     for node in range(len(place)):
         if place[node] >= 0:
             kind = base.types[node] if node < n else giver.types[node - n]
-            colours[place[node]] = mix(np.uint64(kind) + ODD_TYPE)
+            colours[place[node]] = mix(np.uint64(kind) + TYPE_OFFSET)
     for d in range(len(base.tails)):
         i, j = place[base.tails[d]], place[base.tails[base.twins[d]]]
         if i >= 0 and j >= 0:
@@ -101,23 +105,25 @@ def moved_key(base, giver, taken, piece, image):
 
 @numba.njit(cache=True)
 def refined(colours, edges, labels):
-    """The hash of a graph by colour refinement, as `graph_key` reckons it, from its edges in both directions."""
+    """Return the hash of a graph by colour refinement, as `graph_key` computes it, from its edges in both
+    directions.
+    """
     classes = 0
     for _ in range(len(colours)):
         fresh = np.empty_like(colours)
         for i in range(len(colours)):
             fresh[i] = mix(colours[i])
         for k in range(len(edges)):
-            fresh[edges[k, 0]] += mix(colours[edges[k, 1]] + labels[k] * GOLDEN + ODD)
+            fresh[edges[k, 0]] += mix(colours[edges[k, 1]] + labels[k] * GOLDEN_MULTIPLIER + ODD_OFFSET)
         colours = fresh
         ranked = np.sort(colours)
-        found = 1
+        classes_now = 1
         for i in range(1, len(ranked)):
             if ranked[i] != ranked[i - 1]:
-                found += 1
-        if found == classes:
+                classes_now += 1
+        if classes_now == classes:
             break
-        classes = found
+        classes = classes_now
     total = np.uint64(len(colours))
     for i in range(len(colours)):
         total += mix(colours[i])

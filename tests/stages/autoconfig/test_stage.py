@@ -86,7 +86,7 @@ def test_near_copies_are_rejected_if_auto_finds_enough_other_variants(tmp_path: 
     ]
     assert samples
     assert max(sample.lineage["copied"]["share"] for sample in samples) <= 0.9
-    assert record(tmp_path, "variations", "open-r000-lane00")["rejects"]["too much copied whole"] > 0
+    assert record(tmp_path, "variations", "open-r000-lane00")["rejects"]["largest verbatim piece too large"] > 0
 
 
 def test_exemplars_are_resized_if_there_are_too_few_layouts_as_inspect_predicts(

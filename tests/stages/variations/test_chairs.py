@@ -23,7 +23,8 @@ from stages.shape.shape import kit_shape
 from stages.strings.alphabet import make_alphabet
 from stages.strings.encoder import canonical_string
 from stages.strings.grammar_check import check_string
-from stages.variations.search.search import Search, Variant
+from stages.variations.search.search import Search
+from stages.variations.search.variant import Variant
 from stages.variations.settings import SearchConfig
 from tests.toy_kits.program_chairs import write_chairs
 
@@ -42,34 +43,34 @@ def found(kit: Kit) -> list[Variant]:
     return line.run(np.random.default_rng(0), 4000, 60, "test", lambda count: None)[0]
 
 
-def test_legs_backs_and_arms_are_exchanged_within_their_meanings(kit: Kit, found: list[Variant]) -> None:
+def test_legs_backs_and_arms_are_exchanged_within_their_labels(kit: Kit, found: list[Variant]) -> None:
     assert {"seat", "leg", "back_post", "arm"} <= set(kit.labels) < set(kit.type_names())
     assert len(found) == 60
-    assert {each.lineage["method"] for each in found} == {"exchange", "substitution"}
+    assert {variant.lineage["method"] for variant in found} == {"exchange", "substitution"}
     legs = {
-        tuple(sorted(kit.types[part].name for part in each.assembly.types if kit.types[part].label == "leg"))
-        for each in found
+        tuple(sorted(kit.types[part].name for part in variant.assembly.types if kit.types[part].label == "leg"))
+        for variant in found
     }
     assert len(legs) > 6
 
 
-def test_chairs_put_together_stand_as_their_parents_do(kit: Kit, found: list[Variant]) -> None:
-    shapes = [*(each.assembly for each in kit.exemplars), *(each.assembly for each in found[::4])]
+def test_assembled_chairs_stand_like_their_parents(kit: Kit, found: list[Variant]) -> None:
+    shapes = [*(exemplar.assembly for exemplar in kit.exemplars), *(variant.assembly for variant in found[::4])]
     for assembly in shapes:
         validity = judge_shape(kit_shape(kit, assembly), PhysicsConfig())
         assert validity.rooted
         assert validity.stable
 
 
-def test_an_independent_look_finds_no_fault_and_strings_are_in_the_grammar(kit: Kit, found: list[Variant]) -> None:
+def test_independent_verification_finds_no_fault(kit: Kit, found: list[Variant]) -> None:
     alphabet = make_alphabet(kit.labels)
-    for each in found[::6]:
-        shape, contacts = kit_shape(kit, each.assembly), pair_bytes(each.assembly.edges)
-        sample = Sample("chair-0", "train", "variations", "chairs", "0" * 64, {}, each.assembly)
+    for variant in found[::6]:
+        shape, contacts = kit_shape(kit, variant.assembly), pair_bytes(variant.assembly.edges)
+        sample = Sample("chair-0", "train", "variations", "chairs", "0" * 64, {}, variant.assembly)
         record = describe_sample(sample, "kit", shape, {CONTACTS: contacts, "txt": b"A\n"}, {})
         members = {"json": json.dumps(record).encode(), CONTACTS: contacts, "glb": glb_bytes(shape)}
         assert geometry_faults(kit, members) == []
-        labelled = kit.labelled(each.assembly)
+        labelled = kit.labelled(variant.assembly)
         encoded = canonical_string(labelled.types, labelled.edges, alphabet)
         decoded = check_string(encoded.string, alphabet, kit.grammar)
         assert graph_digest(decoded.types, decoded.edges) == graph_digest(labelled.types, labelled.edges)

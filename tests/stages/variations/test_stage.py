@@ -1,4 +1,4 @@
-"""The stage in the real mill: rounds, splits by family or graph, and an end where there is nothing more to find."""
+"""The stage in the real pipeline: rounds, splits by family or graph, and the end of a search."""
 
 from __future__ import annotations
 
@@ -56,12 +56,12 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return folder, make(folder, "one", 1, samples_per_kit=2000, search=search)
 
 
-def test_a_kit_with_a_finite_language_ends_and_says_so(made: tuple[Path, str]) -> None:
+def test_search_of_a_finite_language_ends_with_a_reason(made: tuple[Path, str]) -> None:
     _, printed = made
     assert "chain: 8 of 2,000: no new variant in the last" in printed
 
 
-def test_a_search_that_has_become_slow_ends_and_says_so(made: tuple[Path, str]) -> None:
+def test_slow_search_ends_with_a_reason(made: tuple[Path, str]) -> None:
     _, printed = made
     (said,) = re.findall(
         r"road: \d+ of 2,000: at the pace of the last 800 tries the rest .* all ([\d,]+) so far", printed
@@ -69,7 +69,7 @@ def test_a_search_that_has_become_slow_ends_and_says_so(made: tuple[Path, str]) 
     assert int(said.replace(",", "")) >= 2500
 
 
-def test_every_sample_is_whole_and_equal_graphs_stand_in_one_split(made: tuple[Path, str]) -> None:
+def test_equal_graphs_are_in_one_split(made: tuple[Path, str]) -> None:
     folder, _ = made
     split_of: dict[tuple[str, str], str] = {}
     keys = set()
@@ -86,7 +86,7 @@ def test_every_sample_is_whole_and_equal_graphs_stand_in_one_split(made: tuple[P
     assert set(split_of.values()) == {"train", "val", "test"}
 
 
-def test_parents_are_samples_of_the_same_split_or_exemplars_and_no_two_splits_share_much(
+def test_parents_are_in_the_same_split_and_splits_share_little(
     made: tuple[Path, str],
 ) -> None:
     folder, _ = made
@@ -103,7 +103,7 @@ def test_parents_are_samples_of_the_same_split_or_exemplars_and_no_two_splits_sh
             resolved += made_of not in exemplars and made_of not in key_of
             if made_of in key_of:
                 assert key_of[made_of] in sample.lineage["parents"]
-    assert resolved, "no parent was let go of, so nothing was tried here"
+    assert resolved, "no parent was discarded, so nothing was tested here"
     work = folder / "one" / ".work" / "toy"
     for name in ("chain", "road"):
         kit = load_kit(work / "exemplars" / f"{name}.json", work / "exemplars" / f"{name}.tar")
@@ -114,7 +114,7 @@ def test_parents_are_samples_of_the_same_split_or_exemplars_and_no_two_splits_sh
             assert not shapes.shares(place, others, 0.8).any()
 
 
-def test_by_graph_everything_found_is_shared_out_by_equal_graphs_alone(tmp_path: Path) -> None:
+def test_split_by_graph_assigns_everything_found(tmp_path: Path) -> None:
     search = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 1.0}
     make(tmp_path, "one", 1, samples_per_kit=2000, search=search, splits={"by": "graph", "val": 0.2, "test": 0.3})
     root = tmp_path / "one" / ".work" / "toy" / "variations"
@@ -129,20 +129,23 @@ def test_by_graph_everything_found_is_shared_out_by_equal_graphs_alone(tmp_path:
     )
     assert sorted(by_key) == sorted(keys)
     assert [by_key[key].split for key in keys] == [SPLITS[split] for split in expected]
-    assert {kit: found["let_go"] for kit, found in kits.items()} == {"chain": 0, "road": 0}
+    assert {kit: found["discarded"] for kit, found in kits.items()} == {"chain": 0, "road": 0}
 
 
-def test_what_is_copied_beyond_the_limit_is_refused_and_counted(tmp_path: Path) -> None:
+def test_variants_beyond_max_copied_share_are_rejected_and_counted(tmp_path: Path) -> None:
     search = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 1.0}
     make(tmp_path, "one", 1, samples_per_kit=2000, search=search, require={"max_copied_share": 0.6})
     samples = [sample for shard in collection(tmp_path, "one") for sample in read_samples(shard)]
     assert samples
     assert max(sample.lineage["copied"]["share"] for sample in samples) <= 0.6
     records = (tmp_path / "one" / ".work" / "toy" / "variations" / "records").glob("*-lane*.json")
-    assert sum(json.loads(each.read_text())["rejects"].get("too much copied whole", 0) for each in records) > 0
+    assert (
+        sum(json.loads(record.read_text())["rejects"].get("largest verbatim piece too large", 0) for record in records)
+        > 0
+    )
 
 
-def test_a_shard_of_the_collection_notes_both_files_of_each_kit_that_it_was_made_from(
+def test_collection_shard_records_both_files_of_its_kits(
     made: tuple[Path, str],
 ) -> None:
     records = sorted((made[0] / "one/.work/toy/variations/records").glob("toy-t*.json"))
@@ -167,7 +170,7 @@ def test_two_workers_make_the_same_bytes_by_replacement(tmp_path: Path) -> None:
     for out, workers in (("one", 1), ("two", 2)):
         make(tmp_path, out, workers, samples_per_kit=40, search=search)
     assert digests(tmp_path, "one") == digests(tmp_path, "two")
-    methods = {each.lineage["method"] for shard in collection(tmp_path, "one") for each in read_samples(shard)}
+    methods = {sample.lineage["method"] for shard in collection(tmp_path, "one") for sample in read_samples(shard)}
     assert methods == {"substructures"}
 
 
@@ -177,7 +180,7 @@ def digests(folder: Path, out: str) -> dict[str, str]:
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(root.glob("*.*"))}
 
 
-def test_only_towers_that_bear_the_required_push_and_have_their_storey_are_kept(tmp_path: Path) -> None:
+def test_only_stable_towers_with_required_label_are_kept(tmp_path: Path) -> None:
     upright = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
     meshes = {**CHAIN, "storey": trimesh.creation.box((1.0, 0.3, 0.6))}
     towers = [[(name, upright @ at) for name, at in chain(links)] for links in (3, 5)]
@@ -204,14 +207,14 @@ def test_only_towers_that_bear_the_required_push_and_have_their_storey_are_kept(
     samples = [sample for shard in collection(tmp_path, "out") for sample in read_samples(shard)]
     assert max(len(sample.assembly) - 2 for sample in samples) == 6
     kit = load_kit(*(tmp_path / "out" / ".work" / "toy" / "exemplars" / f"tower{end}" for end in (".json", ".tar")))
-    (storey,) = (number for number, each in enumerate(kit.types) if each.name == "storey")
+    (storey,) = (number for number, part_type in enumerate(kit.types) if part_type.name == "storey")
     assert all(storey in sample.assembly.types for sample in samples)
     records = "".join(path.read_text() for path in (tmp_path / "out").rglob("variations/records/*lane*.json"))
     assert "not stable" in records
-    assert "without its carcass" in records
+    assert "required labels missing" in records
 
 
-def test_chains_on_which_the_required_plate_does_not_fit_are_refused(tmp_path: Path) -> None:
+def test_chains_without_required_hub_are_rejected(tmp_path: Path) -> None:
     meshes = {**CHAIN, "plate": trimesh.creation.box((4.5, 0.1, 3.0))}
     plate: Placed = ("plate", pose(1, -0.55, 0))  # under both caps of a chain of three links, and of no other
     paths = [
@@ -233,10 +236,10 @@ def test_chains_on_which_the_required_plate_does_not_fit_are_refused(tmp_path: P
         )
     assert "the search found no variant of any kit" in printed
     records = "".join(path.read_text() for path in (tmp_path / "out").rglob("variations/records/*lane*.json"))
-    assert "no backdrop" in records
+    assert "hubs not restored" in records
 
 
-def test_hubs_that_no_kit_puts_back_cannot_be_required(tmp_path: Path) -> None:
+def test_hubs_that_are_not_restored_cannot_be_required(tmp_path: Path) -> None:
     model = write_model(tmp_path / "three.glb", CHAIN, chain(3))
     config = {
         "name": "toy",
@@ -246,5 +249,5 @@ def test_hubs_that_no_kit_puts_back_cannot_be_required(tmp_path: Path) -> None:
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     code, printed = shapemill("run", "exemplars", "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out")
     assert code == 2
-    assert "kit chain puts none back" in printed
+    assert "kit chain restores none" in printed
     assert not (tmp_path / "out").exists()

@@ -58,7 +58,7 @@ def place_of(kit: Kit, assembly: Assembly, name: str) -> int:
     return int(np.flatnonzero(assembly.types == kit.type_names().index(name))[0])
 
 
-def test_an_exemplar_meets_its_constraints(kit: Kit) -> None:
+def test_exemplar_meets_its_constraints(kit: Kit) -> None:
     unmet = build_test(kit, {"support": {}, "path": LABELS})
     assert unmet(kit.exemplars[0].assembly) is None
 
@@ -76,12 +76,12 @@ def test_a_path_must_reach_an_exit_and_never_rise(kit: Kit) -> None:
     assert build_test(kit, {"path": {"entries": ("top",), "exits": ("end",)}})(assembly) is None
 
 
-def test_labels_that_a_kit_has_not_are_told(kit: Kit) -> None:
+def test_unknown_labels_are_reported(kit: Kit) -> None:
     with pytest.raises(ConfigError, match="no parts called slyde; did you mean slide"):
         build_test(kit, {"path": {**LABELS, "through": ("slyde",)}})
 
 
-def test_what_was_always_borne_must_be(kit: Kit) -> None:
+def test_parts_that_were_always_supported_must_be(kit: Kit) -> None:
     unmet = build_test(kit, {"support": {}})
     assembly = kit.exemplars[0].assembly
     pillar, top = (place_of(kit, assembly, name) for name in ("pillar", "top"))
@@ -90,7 +90,7 @@ def test_what_was_always_borne_must_be(kit: Kit) -> None:
     assert unmet(changed(assembly, top, 0.2)) == "hangs without support"
 
 
-def test_a_pillar_that_always_stood_on_the_ground_is_not_lifted(kit: Kit) -> None:
+def test_grounded_pillar_is_not_lifted(kit: Kit) -> None:
     assembly = kit.exemplars[0].assembly
     pillar = place_of(kit, assembly, "pillar")
     twice = Assembly(
@@ -102,19 +102,19 @@ def test_a_pillar_that_always_stood_on_the_ground_is_not_lifted(kit: Kit) -> Non
 
 
 @pytest.mark.parametrize(
-    ("asked", "told"),
+    ("asked", "fault"),
     [
         ({"suport": {}}, "did you mean 'support'"),
         ({"path": {"entries": ("top",)}}, "path needs 'exits'"),
         ({"support": {"entries": ("top",)}}, "support knows no 'entries'"),
     ],
 )
-def test_what_is_wrong_with_a_constraint_is_told(asked: dict[str, dict[str, tuple[str, ...]]], told: str) -> None:
-    assert told in str(unknown_in(asked))
+def test_faults_of_a_constraint_are_reported(asked: dict[str, dict[str, tuple[str, ...]]], fault: str) -> None:
+    assert fault in str(unknown_in(asked))
     assert unknown_in({"path": LABELS, "support": {}}) is None
 
 
-def test_a_constraint_in_a_file_of_the_users_own_is_found_and_its_code_counts(tmp_path: Path) -> None:
+def test_user_constraint_is_found_and_its_code_counts(tmp_path: Path) -> None:
     folder = tmp_path / "stages/variations/constraints"
     folder.mkdir(parents=True)
     (folder / "small.py").write_text(
@@ -130,7 +130,7 @@ def test_a_constraint_in_a_file_of_the_users_own_is_found_and_its_code_counts(tm
     done = subprocess.run([sys.executable, "-c", asked], cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split()[:3] == ["path", "small", "support"]
-    assert any("small" in each for each in done.stdout.split()[3:])
+    assert any("small" in entry for entry in done.stdout.split()[3:])
 
 
 def dropped(kit: Kit, *, bump: float = 0.0, lift: float = 0.0) -> Assembly:
@@ -143,7 +143,7 @@ def dropped(kit: Kit, *, bump: float = 0.0, lift: float = 0.0) -> Assembly:
     return replace(assembly, poses=poses)
 
 
-def test_a_path_that_rises_is_made_lower_where_it_does_and_what_hangs_on_it_moves_along(kit: Kit) -> None:
+def test_rising_path_is_lowered_with_attached_parts(kit: Kit) -> None:
     asked = {"path": LABELS}
     risen = dropped(kit, bump=0.15)
     assert build_test(kit, asked)(risen) == "a path leads upwards"
@@ -152,7 +152,7 @@ def test_a_path_that_rises_is_made_lower_where_it_does_and_what_hangs_on_it_move
     assert build_test(kit, asked)(mended) is None
     assert mended.stretches is not None
     bent = np.flatnonzero(np.abs(mended.stretches - np.eye(3)).max(axis=(1, 2)) > 1e-6)
-    assert [kit.type_names()[each] for each in mended.types[bent]] == ["slide"]
+    assert [kit.type_names()[part_type] for part_type in mended.types[bent]] == ["slide"]
     heights = heights_of(kit, mended)
     others = [place for place in range(len(mended)) if place not in bent]
     kept = [place for place in others if kit.type_names()[mended.types[place]] != "end"]
@@ -161,7 +161,7 @@ def test_a_path_that_rises_is_made_lower_where_it_does_and_what_hangs_on_it_move
     assert build_repair(kit, asked, 3.0, ("slide",))(risen) is None
 
 
-def test_an_exit_over_the_ground_is_lowered_along_its_path(kit: Kit) -> None:
+def test_exit_above_the_ground_is_lowered_along_its_path(kit: Kit) -> None:
     """The end always stood on the ground here; one that hangs over it is reached by its slides, which grow taller."""
     low = kit_of(CHUTE, [[("top", pose(0, 0, 0)), ("slide", pose(1, -0.1, 0)), ("end", pose(2, -0.2, 0))]])
     assembly = low.exemplars[0].assembly
@@ -177,7 +177,7 @@ def test_an_exit_over_the_ground_is_lowered_along_its_path(kit: Kit) -> None:
     assert spans_of(low, hung)[end, 0] == pytest.approx(spans[:, 0].min() + 0.3)
 
 
-def test_a_leg_is_made_longer_until_it_reaches_the_ground(kit: Kit) -> None:
+def test_leg_is_extended_to_the_ground(kit: Kit) -> None:
     legs = {"plate": box(4, 0.2, 1), "leg": box(0.2, 1.0, 0.2), "step": box(1, 0.5, 1)}
     standing = [("plate", pose(0, 1.1, 0)), ("leg", pose(-1.5, 0.5, 0)), ("leg", pose(1.5, 0.5, 0))]
     table = kit_of(legs, [standing])
@@ -200,7 +200,7 @@ def test_a_leg_is_made_longer_until_it_reaches_the_ground(kit: Kit) -> None:
 
 
 def moved_leg(assembly: Assembly, part: int, factor: float) -> Assembly:
-    """The assembly with one part so many times as high, from its lowest point on."""
+    """Return the assembly with one part scaled in height by a factor, from its lowest point."""
     motions = np.tile(np.eye(4), (len(assembly), 1, 1))
     motions[part, 1, 1] = factor
     return moved_by(assembly, motions)
@@ -228,7 +228,7 @@ def towers(foot: str, *tops: str) -> list[Placed]:
     return parts
 
 
-def test_of_towers_on_feet_of_two_heights_those_that_mix_them_are_refused_or_get_taller_feet() -> None:
+def test_towers_with_mixed_feet_are_rejected_or_resized() -> None:
     kit = kit_of(
         TOWERS, [towers("plinth", "roof", "tank", "roof"), towers("kerb", "tank", "roof")], grammar="count_and_pairs"
     )
@@ -238,7 +238,7 @@ def test_of_towers_on_feet_of_two_heights_those_that_mix_them_are_refused_or_get
         build_repair(kit, SUPPORT, 2.0, ()),
         build_repair(kit, SUPPORT, 1.5, ()),
     )
-    lifted = [each.assembly for each in found if unmet(each.assembly) == "lifted off the ground"]
+    lifted = [variant.assembly for variant in found if unmet(variant.assembly) == "lifted off the ground"]
     assert 0 < len(lifted) < len(found)
     kerb = kit.type_names().index("kerb")
     mended = [made for made in map(mend, lifted) if made is not None]

@@ -13,7 +13,8 @@ from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.graphs.patterns import observed_patterns
 from stages.shape.kit import Exemplar, Kit
-from stages.variations.search.search import Search, Variant
+from stages.variations.search.search import Search
+from stages.variations.search.variant import Variant
 from stages.variations.settings import SearchConfig
 from tests.stages.variations.search.test_search import SHIPPED, shipped_kit
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, chain, kit_of, ring
@@ -25,13 +26,13 @@ def grown(kit: Kit, tries: int = 20_000, wanted: int = 10**9, **settings: object
     return line, found
 
 
-def test_every_chain_within_the_limits_is_grown() -> None:
+def test_growth_finds_every_chain_within_the_limits() -> None:
     kit = kit_of(CHAIN, [chain(3), chain(5)])
     _, found = grown(kit, min_size=0.5, max_size=2.0)
-    assert sorted(len(each.assembly) - 2 for each in found) == [2, 4, *range(6, 13)]
+    assert sorted(len(variant.assembly) - 2 for variant in found) == [2, 4, *range(6, 13)]
 
 
-def test_every_rectangle_of_one_way_road_is_grown_and_nothing_but_closed_rings() -> None:
+def test_growth_finds_every_rectangle_and_only_closed_rings() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     _, found = grown(kit, tries=60_000, min_size=1.0, max_size=1.6)
     sides = Counter()
@@ -44,12 +45,12 @@ def test_every_rectangle_of_one_way_road_is_grown_and_nothing_but_closed_rings()
     expected = {(a, b) for a in range(1, 10) for b in range(a, 10) if 8 <= 4 + 2 * (a + b) <= 22} - {(1, 1), (2, 3)}
     # Long thin rings need fields that are drawn now and then only.
     assert set(sides) <= expected
-    assert set(sides) >= {each for each in expected if sum(each) <= 7}
+    assert set(sides) >= {entry for entry in expected if sum(entry) <= 7}
     assert set(sides.values()) == {1}
 
 
 @pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
-def test_grown_shapes_have_observed_patterns_alone(folder: Path) -> None:
+def test_grown_shapes_have_only_observed_patterns(folder: Path) -> None:
     kit = shipped_kit(folder)
     known = len(observed_patterns(kit, DockingTable.of(kit), upright=True))
     _, found = grown(kit, wanted=12)
@@ -61,11 +62,11 @@ def test_grown_shapes_have_observed_patterns_alone(folder: Path) -> None:
         assert sum(variant.lineage["parts_from"]) == len(variant.assembly)
 
 
-def test_size_and_footprint_are_met_within_a_quarter() -> None:
-    kit = shipped_kit(next(each for each in SHIPPED if each.name == "castle"))
+def test_grown_size_and_footprint_are_met_within_a_quarter() -> None:
+    kit = shipped_kit(next(entry for entry in SHIPPED if entry.name == "castle"))
     _, found = grown(kit, wanted=10, grown={"parts": (40, 60)})
     assert len(found) >= 10
-    assert all(30 <= len(each.assembly) <= 75 for each in found)
+    assert all(30 <= len(variant.assembly) <= 75 for variant in found)
     _, found = grown(kit, wanted=10, min_size=0.1, grown={"footprint": (14.0, 20.0)})
     assert len(found) >= 10
     for variant in found:
@@ -73,19 +74,19 @@ def test_size_and_footprint_are_met_within_a_quarter() -> None:
         assert 14 * 20 * 0.75**2 <= area <= 14 * 20 * 1.25**2
 
 
-def test_growth_is_the_same_every_time_whatever_is_known_of_contacts() -> None:
+def test_growth_is_deterministic_whatever_contacts_are_known() -> None:
     kit = shipped_kit(SHIPPED[0])
     answers = ContactOracle(kit)
     runs = []
     for given in (answers, answers, ContactOracle(kit)):
         line = Search(given, SearchConfig(method="growth"))
         found, tries = line.run(np.random.default_rng(2), 3000, 10**9, "test", lambda count: None)
-        runs.append((tries, [each.assembly.poses.tobytes() for each in found], line.rejects))
+        runs.append((tries, [variant.assembly.poses.tobytes() for variant in found], line.rejects))
     assert runs[0] == runs[1] == runs[2]
 
 
-def test_what_goes_wrong_while_a_kernel_asks_is_raised() -> None:
+def test_errors_of_the_oracle_in_a_kernel_are_raised() -> None:
     line = Search(ContactOracle(kit_of(CHAIN, [chain(3)])), SearchConfig(method="growth"))
-    line.answers.contact.touches = None  # type: ignore[assignment,method-assign]
+    line.oracle.contact.touches = None  # type: ignore[assignment,method-assign]
     with pytest.raises(TypeError):
         line.run(np.random.default_rng(0), 100, 1, "test", lambda count: None)

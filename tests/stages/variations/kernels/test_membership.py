@@ -25,7 +25,7 @@ def toy_kits() -> tuple[Kit, Kit]:
 
 
 def multiset(types: list[int]) -> Multiset:
-    return tuple((each, types.count(each)) for each in sorted(set(types)))
+    return tuple((entry, types.count(entry)) for entry in sorted(set(types)))
 
 
 def asked(kit: Kit, cases: list[tuple[int, list[int]]]) -> list[bool]:
@@ -42,7 +42,7 @@ around = st.lists(st.integers(0, 1), max_size=4)
     st.dictionaries(st.integers(0, 1), st.lists(around.map(multiset), min_size=1, max_size=4), min_size=1),
     st.lists(st.tuples(st.integers(0, 1), around), min_size=1, max_size=30),
 )
-def test_every_level_admits_what_its_rule_says(
+def test_every_strictness_level_follows_its_rule(
     which: int, observed: dict[int, list[Multiset]], cases: list[tuple[int, list[int]]]
 ) -> None:
     kit = toy_kits()[which]
@@ -55,7 +55,7 @@ def test_every_level_admits_what_its_rule_says(
 
 
 @pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
-def test_real_neighbourhoods_and_such_with_a_part_changed_are_judged_as_by_the_grammar(folder: Path) -> None:
+def test_compiled_rule_agrees_with_the_grammar(folder: Path) -> None:
     kit = shipped_kit(folder)
     rng = np.random.default_rng(0)
     cases = []

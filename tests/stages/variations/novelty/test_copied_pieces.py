@@ -65,7 +65,7 @@ def blocks(cells: Sequence[Cell], types: Sequence[int] | int = ANY, turns: Seque
 
 def kit(*exemplars: Assembly) -> Kit:
     dockings = tuple(observe_dockings(TYPES, exemplars, 1e-3))
-    named = tuple(Exemplar(f"e{number}", each, ("",) * len(each)) for number, each in enumerate(exemplars))
+    named = tuple(Exemplar(f"e{number}", exemplar, ("",) * len(exemplar)) for number, exemplar in enumerate(exemplars))
     return Kit("cubes", TYPES, named, Grammar({}, dockings, {}), 1e-3, 1e-3, ("face",), "y")
 
 
@@ -83,44 +83,44 @@ def moved(shape: Assembly, turn: int, x: float, y: float, z: float) -> Assembly:
 SCREW = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1))
 
 
-def test_an_exemplar_is_one_copy_of_itself_wherever_it_stands() -> None:
+def test_moved_exemplar_is_one_copy_of_itself() -> None:
     shape = blocks(SCREW, (ANY, ONE, POST, RING), (3, 7, 11, 19))
     for turn in range(len(TURNS)):
         assert copied(kit(shape), moved(shape, turn, 0.3, -2.0, 5.5)) == CopiedPieces(1.0, 1, 1.0, "e0")
 
 
-def test_two_exemplars_glued_together_are_two_pieces() -> None:
+def test_two_joined_exemplars_are_two_pieces() -> None:
     plate = blocks([(0, 0, 0), (1, 0, 0), (0, 0, 1)], ONE)
     glued = blocks([(0, 0, 0), (1, 0, 0), (0, 0, 1), (0, 1, 0), (0, 1, 1), (1, 1, 0)], ONE)
     assert copied(kit(plate), glued) == CopiedPieces(0.5, 2, 1.0, "e0")
 
 
-def test_a_mirror_image_is_no_copy() -> None:
+def test_mirror_image_is_no_copy() -> None:
     mirrored = [(x, y, -z) for x, y, z in SCREW]
     assert copied(kit(blocks(SCREW)), blocks(mirrored)) == CopiedPieces(0.75, 2, 0.75, "e0")
 
 
-def test_equal_dockings_that_curl_otherwise_are_no_copy() -> None:
+def test_equal_dockings_of_another_curl_are_no_copy() -> None:
     row = blocks([(0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0)])
     assert copied(kit(row), blocks([(0, 0, 0), (1, 0, 0), (1, 0, 1), (2, 0, 1)])) == CopiedPieces(0.5, 2, 0.5, "e0")
 
 
-def test_a_longer_ring_is_one_end_and_both_its_sides_of_a_shorter_one() -> None:
+def test_longer_ring_copies_one_end_and_both_sides_of_a_shorter_one() -> None:
     def ring(length: int) -> Assembly:
         return blocks([(x, 0, z) for x in range(length) for z in range(3) if x in (0, length - 1) or z != 1])
 
     assert copied(kit(ring(3)), ring(4)) == CopiedPieces(0.7, 2, 7 / 8, "e0")
 
 
-def test_a_part_alone_is_a_piece_of_the_smallest_exemplar_that_has_one() -> None:
+def test_single_part_copies_the_smallest_exemplar_with_it() -> None:
     large, small = blocks([(0, 0, 0), (1, 0, 0), (2, 0, 0)]), blocks([(0, 0, 0), (1, 0, 0)])
     assert copied(kit(large, small), blocks([(4, 4, 4)], turns=5)) == CopiedPieces(1.0, 1, 0.5, "e1")
 
 
-def test_what_cannot_all_be_looked_at_is_still_found_by_its_rarest_docking(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_within_a_small_budget_rarest_dockings_come_first(monkeypatch: pytest.MonkeyPatch) -> None:
     cells = [(x, 0, z) for x in range(8) for z in range(8)]
     floor = blocks([*cells, (3, 1, 3)], [*[ANY] * len(cells), ONE])
-    monkeypatch.setattr("stages.variations.novelty.copied_pieces.BUDGET", 2)
+    monkeypatch.setattr("stages.variations.novelty.copied_pieces.CONTACT_BUDGET", 2)
     assert copied(kit(floor), floor) == CopiedPieces(1.0, 1, 1.0, "e0")
 
 
@@ -133,7 +133,7 @@ def random_blocks(seed: int, parts: int) -> Assembly:
         x, y, z = cells[int(rng.integers(len(cells)))]
         step = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1)][int(rng.integers(6))]
         place = (x + step[0], y + step[1], z + step[2])
-        if place not in cells and all(0 <= each < 3 for each in place):
+        if place not in cells and all(0 <= entry < 3 for entry in place):
             cells.append(place)
     # Half of the cubes stand straight, so that shapes have more than a part in common.
     turns = np.where(rng.random(parts) < 0.5, 0, rng.integers(24, size=parts))
@@ -147,7 +147,7 @@ def looks_same(part_type: PartType, pose: FloatArray, other: FloatArray) -> bool
 def every_piece(own: Kit, shape: Assembly) -> set[tuple[frozenset[int], int]]:
     """The connected pieces under every rigid motion that lays some part on one of an exemplar."""
     found = set()
-    for number, exemplar in enumerate(each.assembly for each in own.exemplars):
+    for number, exemplar in enumerate(exemplar.assembly for exemplar in own.exemplars):
         contacts = {frozenset(edge) for edge in exemplar.edges.tolist()}
         for p, q in product(range(len(shape)), range(len(exemplar))):
             if shape.types[p] != exemplar.types[q]:
@@ -187,18 +187,16 @@ def greedy_counts(pieces: set[frozenset[int]], left: frozenset[int]) -> set[int]
 
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10_000), st.integers(1, 7), st.integers(2, 8), st.integers(2, 6), st.integers(0, 23))
-def test_random_cubes_are_judged_as_by_trying_every_motion(
-    seed: int, parts: int, first: int, second: int, turn: int
-) -> None:
+def test_copies_of_random_cubes_equal_brute_force(seed: int, parts: int, first: int, second: int, turn: int) -> None:
     own = kit(random_blocks(seed, first), random_blocks(seed + 1, second))
     shape = moved(random_blocks(seed + 2, parts), turn, 1.0, 2.0, 3.0)
-    present = {int(each) for exemplar in own.exemplars for each in exemplar.assembly.types}
+    present = {int(part_type) for exemplar in own.exemplars for part_type in exemplar.assembly.types}
     if not set(shape.types.tolist()) <= present:
         return
     found, pieces = copied(own, shape), every_piece(own, shape)
     largest = max(len(piece) for piece, _ in pieces)
     assert found.largest == largest / parts
-    sizes = [len(each.assembly) for each in own.exemplars]
+    sizes = [len(exemplar.assembly) for exemplar in own.exemplars]
     shares = {own.exemplars[e].name: len(piece) / sizes[e] for piece, e in pieces if len(piece) == largest}
     assert found.exemplar == shares[found.of] == max(shares.values())
     assert found.pieces in greedy_counts({piece for piece, _ in pieces}, frozenset(range(parts)))

@@ -29,11 +29,11 @@ RING = graph([0, 1, 0, 1], [(0, 1), (1, 2), (2, 3), (0, 3)])
         (graph([0, 1, 0], [(0, 1), (1, 2)]), 3),
     ],
 )
-def test_few_edits_are_counted_exactly(other: Assembly, edits: int) -> None:
+def test_bounds_are_exact_for_few_edits(other: Assembly, edits: int) -> None:
     assert edit_bounds(RING, other) == edit_bounds(other, RING) == (edits, edits)
 
 
-def test_the_order_of_parts_does_not_matter() -> None:
+def test_bounds_do_not_depend_on_the_order_of_parts() -> None:
     turned = graph([1, 0, 1, 0], [(0, 1), (1, 2), (2, 3), (0, 3)])
     low, high = edit_bounds(RING, turned)
     assert low == 0 <= high
@@ -55,7 +55,7 @@ def drawn(assembly: Assembly) -> nx.Graph:
 
 @settings(deadline=None, max_examples=60)
 @given(graphs(), graphs())
-def test_the_distance_lies_between_the_bounds(first: Assembly, second: Assembly) -> None:
+def test_distance_is_between_the_bounds(first: Assembly, second: Assembly) -> None:
     low, high = edit_bounds(first, second)
     truth = nx.graph_edit_distance(drawn(first), drawn(second), node_match=lambda a, b: a["type"] == b["type"])
     assert low <= truth <= high

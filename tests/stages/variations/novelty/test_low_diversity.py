@@ -12,7 +12,7 @@ from stages.shape.kit import Kit, Strictness
 from stages.variations.novelty.low_diversity import low_diversity, mutual_distance
 from tests.toy_kits.chains_and_rings import CHAIN, chain, kit_of
 
-LIVELY = {"variants": 200, "copied": 0.6, "distance": 0.2, "apart": 0.3}
+LIVELY = {"variants": 200, "copied_share": 0.6, "distance": 0.2, "mutual_distance": 0.3}
 
 
 @cache
@@ -20,7 +20,7 @@ def one_chain() -> Kit:
     return kit_of(CHAIN, [chain(3)], kinds=("line", "face"))
 
 
-def test_shapes_are_as_far_apart_as_their_parts_lists() -> None:
+def test_mutual_distance_is_that_of_parts_lists() -> None:
     # One part of nine differs, six of ten, and seven of nine.
     counts = np.array([[4, 1], [4, 0], [1, 4]], dtype=np.int32)
     assert np.isclose(mutual_distance(counts), np.mean([1 / 9, 6 / 10, 7 / 9]))
@@ -31,26 +31,26 @@ def test_shapes_are_as_far_apart_as_their_parts_lists() -> None:
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"copied": 0.93}, "half of the shapes have 93% or more of their parts copied whole"),
+        ({"copied_share": 0.93}, "half of the shapes have 93% or more of their parts in one verbatim piece"),
         ({"distance": 0.01}, "parts lists are almost those of the exemplars (E 0.010)"),
-        ({"apart": 0.04}, "the shapes are alike (E of two 0.040)"),
+        ({"mutual_distance": 0.04}, "the shapes are alike (E of two 0.040)"),
     ],
 )
-def test_each_fault_makes_a_pool_dull_and_is_named(changed: dict[str, float], said: str) -> None:
+def test_every_fault_of_a_pool_is_reported(changed: dict[str, float], said: str) -> None:
     assert low_diversity(one_chain(), LIVELY) == ""
     assert said in low_diversity(one_chain(), {**LIVELY, **changed})
     assert low_diversity(one_chain(), {**LIVELY, **changed, "variants": 1}) == ""
 
 
-def test_what_would_help_is_what_the_kit_has_not_done_already() -> None:
-    dull = {**LIVELY, "copied": 1.0}
-    said = low_diversity(one_chain(), dull)
+def test_remedies_are_new_to_the_kit() -> None:
+    poor = {**LIVELY, "copied_share": 1.0}
+    said = low_diversity(one_chain(), poor)
     for remedy in ("a second model", "grammar: count_and_pairs", "contact.kinds: [face]", "hubs.types: auto"):
         assert remedy in said
     loosest = replace(one_chain().grammar, strictness="count_and_types", hubs=(0,))
     kit = replace(kit_of(CHAIN, [chain(3), chain(5)]), grammar=loosest)
     always = "the same layout in other proportions (proportions.samples_per_kit)"
-    assert low_diversity(kit, dull).endswith(f"what would help: one more model of the same parts, or {always}")
+    assert low_diversity(kit, poor).endswith(f"what would help: another model of the same parts, or {always}")
 
 
 @pytest.mark.parametrize(
@@ -65,9 +65,11 @@ def test_what_would_help_is_what_the_kit_has_not_done_already() -> None:
         ("slots", None),
     ],
 )
-def test_a_looser_grammar_would_help_where_there_is_one_of_its_kind(strictness: Strictness, looser: str | None) -> None:
+def test_looser_grammar_is_a_remedy_where_one_exists(strictness: Strictness, looser: str | None) -> None:
     kit = one_chain()
-    said = low_diversity(replace(kit, grammar=replace(kit.grammar, strictness=strictness)), {**LIVELY, "copied": 1.0})
-    assert said.startswith("dull: ")
+    said = low_diversity(
+        replace(kit, grammar=replace(kit.grammar, strictness=strictness)), {**LIVELY, "copied_share": 1.0}
+    )
+    assert said.startswith("low diversity: ")
     assert ("a looser grammar" in said) == (looser is not None)
     assert looser is None or f"(grammar: {looser})" in said

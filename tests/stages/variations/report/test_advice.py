@@ -26,31 +26,29 @@ def row(types: str) -> Kit:
 
 
 @pytest.mark.parametrize("types", ["congruence", "labels"])
-def test_where_every_part_is_its_own_type_the_key_that_is_advised_changes_that(types: str) -> None:
+def test_advised_types_key_merges_part_types(types: str) -> None:
     said = what_keeps(row(types), {}, 100)
     assert said.startswith("every part is its own type; ")
     (advised,) = re.findall(r"`types: (\w+)`", said)
     assert "own type" not in what_keeps(row(advised), {}, 100)
 
 
-def test_of_small_shapes_more_are_asked_for_and_parts_that_mean_the_same() -> None:
+def test_small_shapes_need_more_models_or_types_by_meaning() -> None:
     said = what_keeps(kit_of(CHAIN, [chain(3), chain(5)]), {}, 100)
     assert said.startswith("of 7 parts hardly any can be exchanged; bring more models of the same parts")
     assert "`types: meaning`" in said
 
 
 @pytest.mark.parametrize(
-    ("shapes", "asked"), [([chain(14)], "bring a second"), ([chain(14), chain(15)], "bring one more")]
+    ("shapes", "asked"), [([chain(14)], "bring a second"), ([chain(14), chain(15)], "bring another")]
 )
-def test_models_that_are_there_already_are_not_asked_for(shapes: list[list[Placed]], asked: str) -> None:
+def test_advice_asks_for_another_model(shapes: list[list[Placed]], asked: str) -> None:
     assert asked in what_keeps(kit_of(CHAIN, shapes), {}, 100)
 
 
-def test_what_stands_without_the_hubs_that_were_left_out_is_said_to() -> None:
+def test_advice_names_hubs_that_were_not_restored() -> None:
     plate: Placed = ("plate", pose(1, -0.55, 0))
     meshes = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}
     kit = kit_of(meshes, [[*chain(3), plate]], hubs=HubConfig(types=("plate",), restore=True))
     said = what_keeps(kit, {HUBS_NOT_RESTORED: 3}, 100)
-    assert (
-        said == "what was found stands without plate, left out by `hubs.types`; bring a second model of the same parts"
-    )
+    assert said == "everything found lacks plate, which `hubs.types` left out; bring a second model of the same parts"

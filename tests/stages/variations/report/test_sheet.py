@@ -13,9 +13,9 @@ from tests.stages.variations.search.test_search import search
 from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 
-def test_a_sheet_has_rows_for_the_exemplars_the_first_chosen_and_some_of_the_rest() -> None:
+def test_sheet_shows_exemplars_first_selected_and_random_variants() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
-    _, found = search(kit, tries=300, largest=3.0)
+    _, found = search(kit, tries=300, max_size=3.0)
     samples = [
         Sample(f"toy-{place:06d}", "train", "variations", kit.name, "", {}, found[place % len(found)].assembly)
         for place in range(30)
@@ -27,20 +27,22 @@ def test_a_sheet_has_rows_for_the_exemplars_the_first_chosen_and_some_of_the_res
     assert whole.width == first.width > few.width
 
 
-def test_of_a_dull_pool_each_of_the_first_stands_beside_the_exemplar_that_it_has_copied_most_of() -> None:
+def test_sheet_of_low_diversity_shows_copied_exemplars() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
-    copied = {"largest": 1.0, "pieces": 1, "exemplar": 1.0, "of": kit.exemplars[1].name}
+    copied = {"share": 1.0, "pieces": 1, "exemplar_share": 1.0, "exemplar": kit.exemplars[1].name}
     samples = [
         Sample("toy-0", "train", "variations", kit.name, "", {"copied": copied}, exemplar.assembly)
         for exemplar in kit.exemplars
     ]
 
-    def pictures(dull: str) -> np.ndarray:
-        return np.array(Image.open(io.BytesIO(kit_variants_sheet(kit, samples, dull, np.random.default_rng(0)))))
+    def pictures(low_diversity: str) -> np.ndarray:
+        return np.array(
+            Image.open(io.BytesIO(kit_variants_sheet(kit, samples, low_diversity, np.random.default_rng(0))))
+        )
 
-    plain, dull = pictures(""), pictures("dull: alike")
+    plain, low_diversity = pictures(""), pictures("low diversity: alike")
     cell = plain.shape[1] // 2
     # Two samples become two pairs, and the second sample is its exemplar.
-    assert dull.shape[1] > plain.shape[1] + cell
-    ink = (dull != dull[0, 0]).any(axis=2).sum()
+    assert low_diversity.shape[1] > plain.shape[1] + cell
+    ink = (low_diversity != low_diversity[0, 0]).any(axis=2).sum()
     assert ink > (plain != plain[0, 0]).any(axis=2).sum()

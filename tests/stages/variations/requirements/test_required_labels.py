@@ -1,4 +1,4 @@
-"""The carcass of a kit: the parts that are as large as its exemplars."""
+"""Required labels of a kit: those of parts that are as large as its exemplars."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ def stand(*legs: tuple[float, float]) -> list[Placed]:
 FOUR = stand((-1.5, -0.5), (1.5, -0.5), (-1.5, 0.5), (1.5, 0.5))
 
 
-def test_what_spans_an_exemplar_is_its_carcass_and_what_is_small_is_not() -> None:
+def test_labels_of_spanning_parts_are_required() -> None:
     assert spanning_labels(kit_of(MESHES, [FOUR])) == ("top",)
     assert spanning_labels(kit_of(CHAIN, [chain(5)])) == ()
 
 
-def test_of_a_part_of_the_carcass_every_exemplar_has_one_that_spans_it() -> None:
+def test_spanning_label_spans_every_exemplar() -> None:
     shelf = ("shelf", pose(0, -1.1, 0))  # on the ground below the legs: 3.54 of 5.07 across
     both = kit_of(MESHES, [[*FOUR, shelf], FOUR])
     assert spanning_labels(kit_of(MESHES, [[*FOUR, shelf]])) == ("top", "shelf")
     assert spanning_labels(both) == ("top",)
 
 
-def test_hubs_are_put_back_and_are_none_of_it() -> None:
+def test_hubs_are_no_required_labels() -> None:
     table = [*FOUR, ("shelf", pose(0, -1.1, 0))]
     kit = kit_of(MESHES, [table])
     hub = kit_of(MESHES, [table], hubs=HubConfig(types=("top",)))
@@ -42,7 +42,7 @@ def test_hubs_are_put_back_and_are_none_of_it() -> None:
     assert spanning_hubs(kit) == {}
 
 
-def test_of_large_hubs_as_many_are_awaited_as_the_exemplar_with_fewest_has() -> None:
+def test_spanning_hubs_are_counted_by_the_smallest_exemplar() -> None:
     sides: list[Placed] = [("side", pose(x, 0, 0)) for x in (-1.05, 1.05)]
     shelves: list[Placed] = [("board", pose(0, y, 0)) for y in (-0.1, 0.0, 0.1)]
     lining: Placed = ("side", pose(-1.15, 0, 0))
@@ -51,7 +51,7 @@ def test_of_large_hubs_as_many_are_awaited_as_the_exemplar_with_fewest_has() -> 
     assert spanning_hubs(kit) == {kit.type_names().index("side"): 2}
 
 
-def test_an_assembly_has_it_or_not_and_a_wrong_name_is_named() -> None:
+def test_required_labels_are_tested_and_wrong_names_reported() -> None:
     kit = kit_of(MESHES, [FOUR])
     whole = kit.exemplars[0].assembly
     legs = whole.select([part for part in range(len(whole)) if kit.types[whole.types[part]].name == "leg"])

@@ -16,7 +16,8 @@ from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.canonical import docking_digest, graph_digest
 from stages.shape.kit import Kit
-from stages.variations.search.search import Search, Variant
+from stages.variations.search.search import Search
+from stages.variations.search.variant import Variant
 from stages.variations.settings import SearchConfig
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, box, chain, kit_of, ring, with_arrow
 
@@ -34,7 +35,7 @@ def search(kit: Kit, seed: int = 0, tries: int = 3000, **settings: object) -> tu
 
 def histogram(kit: Kit, variant: Variant) -> tuple[int, ...]:
     counts = Counter(kit.types[index].name for index in variant.assembly.types.tolist())
-    return tuple(counts[name] for name in sorted(each.name for each in kit.types))
+    return tuple(counts[name] for name in sorted(part_type.name for part_type in kit.types))
 
 
 @cache
@@ -50,8 +51,8 @@ def shipped_kit(folder: Path) -> Kit:
 def test_search_finds_every_chain_within_the_size_limits(matching: str) -> None:
     kit = kit_of(CHAIN, [chain(3), chain(5)])
     line, found = search(kit, min_size=0.5, max_size=2.0, matching=matching)
-    assert (line.min_parts, line.max_parts) == (2, 14)
-    lengths = sorted(len(each.assembly) - 2 for each in found)
+    assert (line.maker.min_parts, line.maker.max_parts) == (2, 14)
+    lengths = sorted(len(variant.assembly) - 2 for variant in found)
     # Two links are the fewest with which both caps keep a link; three and five are the exemplars themselves.
     assert lengths == [2, 4, *range(6, 13)]
 
@@ -81,14 +82,14 @@ def test_variants_of_a_one_way_ring_are_closed_rings() -> None:
         assert (degrees == 2).all()
 
 
-def test_nothing_is_found_where_the_exemplar_says_all_there_is() -> None:
+def test_search_finds_nothing_where_the_exemplar_is_all_there_is() -> None:
     kit = kit_of(CHAIN, [chain(1)])
     line, found = search(kit, tries=500, max_size=3.0)
     assert found == []
     assert sum(line.rejects.values()) == 500
 
 
-def test_pieces_are_turned_about_the_vertical_only_unless_the_config_lets_them() -> None:
+def test_pieces_turn_about_the_vertical_unless_configured() -> None:
     kit = kit_of(ROAD, [ring(1, 2), ring(2, 2)])
     _, found = search(kit, tries=3000, max_size=1.5, upright=True)
     assert found
@@ -97,16 +98,16 @@ def test_pieces_are_turned_about_the_vertical_only_unless_the_config_lets_them()
         assert (variant.assembly.poses[:, 1, 1] > 0.999).all()
 
 
-def test_the_histogram_rule_keeps_one_shape_for_each_histogram() -> None:
+def test_histogram_rule_keeps_one_shape_per_histogram() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     _, found = search(kit, tries=6000, min_size=1.0, max_size=1.6, duplicates="histogram")
-    histograms = [histogram(kit, each) for each in found]
+    histograms = [histogram(kit, variant) for variant in found]
     assert len(set(histograms)) == len(histograms)
     # Rings of one perimeter share a histogram: 4 corners and 4, 6, ... straights, without the exemplars' own.
-    assert {each[1] for each in histograms} == {6, 8, 12, 14, 16, 18}
+    assert {entry[1] for entry in histograms} == {6, 8, 12, 14, 16, 18}
 
 
-def test_the_same_seed_finds_the_same_variants_and_what_is_known_of_contacts_changes_nothing() -> None:
+def test_same_seed_gives_same_variants_whatever_contacts_are_known() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     _, first = search(kit, seed=3, tries=800)
     warm = ContactOracle(kit)
@@ -114,7 +115,7 @@ def test_the_same_seed_finds_the_same_variants_and_what_is_known_of_contacts_cha
     other.run(np.random.default_rng(99), 800, 10**9, "other", lambda count: None)
     line = Search(warm, SearchConfig(method="exchange"))
     again, _ = line.run(np.random.default_rng(3), 800, 10**9, "test", lambda count: None)
-    assert [each.docked for each in first] == [each.docked for each in again]
+    assert [entry.docked for entry in first] == [entry.docked for entry in again]
     for one, two in zip(first, again, strict=True):
         assert one.assembly.poses.tobytes() == two.assembly.poses.tobytes()
         assert one.assembly.edges.tobytes() == two.assembly.edges.tobytes()
@@ -122,20 +123,20 @@ def test_the_same_seed_finds_the_same_variants_and_what_is_known_of_contacts_cha
 
 
 @pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
-def test_neither_variants_nor_reasons_depend_on_which_contacts_are_known(folder: Path) -> None:
+def test_variants_and_reasons_do_not_depend_on_known_contacts(folder: Path) -> None:
     kit = shipped_kit(folder)
     cold, first = search(kit, seed=3, tries=700, method="both")
     warm = ContactOracle(kit)
     for seed in (99, 3):
         line = Search(warm, SearchConfig(method="both"))
         again, _ = line.run(np.random.default_rng(seed), 700, 10**9, "test", lambda count: None)
-    assert [each.docked for each in again] == [each.docked for each in first]
+    assert [entry.docked for entry in again] == [entry.docked for entry in first]
     assert line.rejects == cold.rejects
 
 
 @pytest.mark.parametrize("method", ["exchange", "growth"])
 @pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
-def test_every_variant_of_a_shipped_kit_stands_up_to_a_fresh_look(folder: Path, method: str) -> None:
+def test_variants_of_shipped_kits_pass_independent_verification(folder: Path, method: str) -> None:
     kit = shipped_kit(folder)
     line, found = search(kit, tries=1500 if method == "exchange" else 30_000, method=method)
     assert len(found) >= 50
@@ -143,9 +144,9 @@ def test_every_variant_of_a_shipped_kit_stands_up_to_a_fresh_look(folder: Path, 
     digests = set()
     for variant in found[::7]:
         assembly = variant.assembly
-        assert line.min_parts <= len(assembly) <= line.max_parts
+        assert line.maker.min_parts <= len(assembly) <= line.maker.max_parts
         assert np.array_equal(contact.contacts(assembly.types, assembly.poses), assembly.edges)
-        labels = line.answers.dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
+        labels = line.oracle.dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
         assert np.array_equal(labels, variant.labels)
         assert (labels >= 0).all()
         for part, neighbours in enumerate(assembly.neighbours()):
@@ -155,7 +156,7 @@ def test_every_variant_of_a_shipped_kit_stands_up_to_a_fresh_look(folder: Path, 
 
 
 @pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
-def test_graph_keys_tell_apart_what_canonical_graphs_tell_apart(folder: Path) -> None:
+def test_graph_keys_agree_with_canonical_graphs(folder: Path) -> None:
     kit = shipped_kit(folder)
     _, found = search(kit, tries=800)
     by_key: dict[int, set[str]] = {}
@@ -163,11 +164,11 @@ def test_graph_keys_tell_apart_what_canonical_graphs_tell_apart(folder: Path) ->
         digest = graph_digest(variant.assembly.types, variant.assembly.edges)
         by_key.setdefault(variant.graph, set()).add(digest)
     assert all(len(digests) == 1 for digests in by_key.values())
-    digests = [next(iter(each)) for each in by_key.values()]
+    digests = [next(iter(entry)) for entry in by_key.values()]
     assert len(set(digests)) == len(digests)
 
 
-def test_a_variant_says_where_its_parts_came_from() -> None:
+def test_lineage_says_where_parts_came_from() -> None:
     kit = kit_of(CHAIN, [chain(3), chain(5)])
     _, found = search(kit, tries=300)
     for number, variant in enumerate(found):
@@ -180,10 +181,10 @@ def test_a_variant_says_where_its_parts_came_from() -> None:
 
 
 @pytest.mark.parametrize("method", ["exchange", "growth"])
-def test_an_exemplar_of_its_own_types_is_not_run_on_to_the_size_of_a_larger_one(method: str) -> None:
+def test_size_limit_is_that_of_exemplars_with_the_same_types(method: str) -> None:
     meshes = {**CHAIN, "rung": with_arrow(box(1.0, 0.2, 0.3))}
-    ladder = [(name.replace("link", "rung"), at) for name, at in chain(9)]
-    kit = kit_of(meshes, [chain(3), ladder])
+    step_chain = [(name.replace("link", "rung"), at) for name, at in chain(9)]
+    kit = kit_of(meshes, [chain(3), step_chain])
     _, found = search(kit, method=method)
     lengths = {name: [0] for name in meshes}
     for variant in found:

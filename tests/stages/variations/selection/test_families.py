@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from stages.variations.report.split_report import shortage, splits_table
 from stages.variations.selection.ancestry import Ancestry
-from stages.variations.selection.families import DISCARDED, Cut, Near, cut_families
+from stages.variations.selection.families import DISCARDED_SPLIT, Cut, Near, cut_families
 
 
 def near_by(matrix: np.ndarray) -> Near:
@@ -22,10 +22,10 @@ def crossings(matrix: np.ndarray, cut: Cut) -> int:
     """How many near pairs stand in two splits."""
     i, j = np.nonzero(matrix)
     a, b = cut.split_of[i], cut.split_of[j]
-    return int(((a != b) & (a != DISCARDED) & (b != DISCARDED)).sum())
+    return int(((a != b) & (a != DISCARDED_SPLIT) & (b != DISCARDED_SPLIT)).sum())
 
 
-def test_clusters_are_not_divided_and_every_split_has_its_size() -> None:
+def test_clusters_are_not_divided_by_splits() -> None:
     cluster = np.arange(120) // 6
     matrix = cluster[:, None] == cluster[None]
     wanted = {"train": 40, "val": 10, "test": 14}
@@ -33,10 +33,10 @@ def test_clusters_are_not_divided_and_every_split_has_its_size() -> None:
     assert cut.sizes(wanted) == wanted
     assert crossings(matrix, cut) == 0
     for number in range(20):
-        assert len(set(cut.split_of[cluster == number].tolist()) - {DISCARDED}) <= 1
+        assert len(set(cut.split_of[cluster == number].tolist()) - {DISCARDED_SPLIT}) <= 1
 
 
-def test_a_chain_of_cousins_is_cut_with_a_gap_between_splits() -> None:
+def test_chain_of_relatives_is_cut_with_a_gap() -> None:
     places = np.arange(300)
     matrix = np.abs(places[:, None] - places[None]) <= 4
     wanted = {"train": 100, "val": 15, "test": 15}
@@ -44,12 +44,15 @@ def test_a_chain_of_cousins_is_cut_with_a_gap_between_splits() -> None:
     assert cut.sizes(wanted) == wanted
     assert cut.regions > 1
     for split in (1, 2):
-        own, others = np.flatnonzero(cut.split_of == split), np.flatnonzero(~np.isin(cut.split_of, (split, DISCARDED)))
+        own, others = (
+            np.flatnonzero(cut.split_of == split),
+            np.flatnonzero(~np.isin(cut.split_of, (split, DISCARDED_SPLIT))),
+        )
         assert np.abs(own[:, None] - others[None]).min() > 4
-    assert (cut.split_of == DISCARDED).any()
+    assert (cut.split_of == DISCARDED_SPLIT).any()
 
 
-def test_of_a_large_pool_no_pair_is_asked_about_twice_and_a_few_tell_what_it_allows() -> None:
+def test_large_pool_is_tried_on_a_sample_and_no_pair_compared_twice() -> None:
     count, asked = 1500, 0
     places = np.random.default_rng(1).permutation(count)
     matrix = np.abs(places[:, None] - places[None]) <= 60
@@ -66,19 +69,19 @@ def test_of_a_large_pool_no_pair_is_asked_about_twice_and_a_few_tell_what_it_all
     assert asked < count**2 / 2
 
 
-def test_where_all_are_twins_there_is_only_train_and_that_is_said() -> None:
+def test_pool_of_near_duplicates_has_only_train() -> None:
     wanted = {"train": 8, "val": 1, "test": 1}
     cut = cut_families(near_by(np.ones((10, 10), dtype=bool)), 10, wanted, np.random.default_rng(0))
     assert cut.sizes(wanted) == {"train": 8, "val": 0, "test": 0}
     splits = {split: {"wanted": wanted[split], "samples": size} for split, size in cut.sizes(wanted).items()}
-    measures = {"splits": splits, "split_by": "family", "split_near": 0.8, "let_go": 0, "pool": 10}
+    measures = {"splits": splits, "split_by": "family", "min_shared_surface": 0.8, "discarded": 0, "pool": 10}
     assert shortage(measures) == "val 0 of 1, test 0 of 1"
-    assert "toys: 0 of 10 variants found stood too near to another split; fewer than asked for: val 0" in splits_table(
+    assert "toys: 0 of 10 variants were too near to another split; fewer than asked for: val 0" in splits_table(
         {"toys": measures}
     )
 
 
-def test_where_hardly_two_stand_apart_train_has_its_samples_and_val_and_test_go_without() -> None:
+def test_dense_pool_gives_train_its_samples_first() -> None:
     matrix = np.ones((200, 200), dtype=bool)
     matrix[0, 1:15] = matrix[1:15, 0] = matrix[1, 2:15] = matrix[2:15, 1] = False  # 13 are apart from these two
     wanted = {"train": 80, "val": 10, "test": 10}
@@ -87,7 +90,7 @@ def test_where_hardly_two_stand_apart_train_has_its_samples_and_val_and_test_go_
     assert crossings(matrix, cut) == 0
 
 
-def test_a_pool_too_dense_for_its_sizes_gives_each_split_a_part() -> None:
+def test_too_dense_pool_gives_every_split_a_share() -> None:
     cluster = np.arange(40) // 20
     matrix = cluster[:, None] == cluster[None]
     wanted = {"train": 30, "val": 5, "test": 5}
@@ -99,7 +102,7 @@ def test_a_pool_too_dense_for_its_sizes_gives_each_split_a_part() -> None:
 
 
 @given(st.integers(1, 60), st.floats(0, 0.5), st.integers(0, 10_000))
-def test_no_two_splits_share_a_near_pair(count: int, density: float, seed: int) -> None:
+def test_no_near_pair_is_in_two_splits(count: int, density: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     matrix = rng.random((count, count)) < density
     matrix |= matrix.T
@@ -113,10 +116,10 @@ def test_no_two_splits_share_a_near_pair(count: int, density: float, seed: int) 
 
 def test_kin_are_parents_children_and_siblings_of_one_cut() -> None:
     ancestry = Ancestry([("keep",), (0, "ward"), (0, "ward"), (1, 2)], ["", "same", "same", ""])
-    assert [each.tolist() for each in ancestry.kin()] == [[1, 2], [0, 2, 3], [0, 1, 3], [1, 2]]
+    assert [entry.tolist() for entry in ancestry.kin()] == [[1, 2], [0, 2, 3], [0, 1, 3], [1, 2]]
 
 
-def test_parents_that_are_no_samples_of_the_split_give_way_to_theirs() -> None:
+def test_parents_outside_the_split_are_replaced_by_their_parents() -> None:
     ancestry = Ancestry([("keep",), (0, "ward"), (1,), (1, 0), (2, 3)], [""] * 5)
     keys = {0: "k-0", 2: "k-2", 3: "k-3", 4: "k-4"}
     splits = {0: 0, 2: 2, 3: 0, 4: 0}

@@ -23,11 +23,11 @@ def test_farthest_first_takes_no_point_twice_where_points_are_equal() -> None:
     assert sorted(farthest_first(points, np.zeros((1, 2)), 6).tolist()) == list(range(6))
 
 
-def test_the_selection_spreads_wider_than_first_come_and_is_the_same_every_time() -> None:
+def test_selection_is_deterministic_and_more_diverse_than_first_come() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
-    _, found = search(kit, tries=3000, largest=3.0)
-    counts = np.array([np.bincount(each.assembly.types, minlength=len(kit.types)) for each in found])
-    features = np.array([each.features for each in found])
+    _, found = search(kit, tries=3000, max_size=3.0)
+    counts = np.array([np.bincount(variant.assembly.types, minlength=len(kit.types)) for variant in found])
+    features = np.array([variant.features for variant in found])
     taken = select_diverse(kit, counts, features, 12, SelectionConfig(), np.random.default_rng(0))
     again = select_diverse(kit, counts, features, 12, SelectionConfig(), np.random.default_rng(0))
     assert taken.tolist() == again.tolist()
@@ -45,7 +45,7 @@ def test_the_selection_spreads_wider_than_first_come_and_is_the_same_every_time(
     assert farthest_left(taken) < farthest_left(first_come)
 
 
-def test_what_is_wanted_beyond_the_spread_is_drawn_without_doubles() -> None:
+def test_samples_beyond_max_farthest_first_are_drawn_without_repetition() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     test = FeatureExtractor(kit)
     shape = kit.exemplars[0].assembly
@@ -60,7 +60,7 @@ def test_what_is_wanted_beyond_the_spread_is_drawn_without_doubles() -> None:
     assert sorted(everything.tolist()) == list(range(20))
 
 
-def test_measures_of_a_set_that_can_be_counted_by_hand() -> None:
+def test_measures_of_a_set_counted_by_hand() -> None:
     counts = np.array([[1, 2], [1, 2], [3, 0]], dtype=np.int32)
     features = np.zeros((3, len(AXES)), dtype=np.float32)
     features[:, AXES.index("parts")] = 3
@@ -76,7 +76,7 @@ def test_measures_of_a_set_that_can_be_counted_by_hand() -> None:
     assert (measures["distance"], measures["distances"]) == (0.25, [0.0, 0.0, 0.25, 0.25, 0.5])
     assert measures["parts"] == [3.0] * 5
     # Of three pairs one is equal, and two differ by four of six parts.
-    assert (measures["copied"], measures["apart"]) == (0.5, 0.4444)
+    assert (measures["copied_share"], measures["mutual_distance"]) == (0.5, 0.4444)
     nothing = pool_measures(counts[:0], features[:0], digests[:0], NoveltyConfig())
     assert (nothing["graphs"], nothing["mixed"], nothing["parts"]) == (0, 0.0, [])
 

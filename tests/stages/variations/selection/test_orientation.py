@@ -32,17 +32,17 @@ def moved(assembly: Assembly, motion: np.ndarray) -> Assembly:
 
 
 @pytest.mark.parametrize("angle", [np.pi / 2, np.pi, 3 * np.pi / 2, 0.3])
-def test_a_chair_of_boxes_is_turned_back_to_face_as_the_exemplar(angle: float) -> None:
+def test_chair_is_turned_to_face_as_the_exemplar(angle: float) -> None:
     chair = chair_kit().exemplars[0].assembly
     away = moved(chair, translation_matrix([3, 0, 1]) @ rotation_matrix(angle, [0, 1, 0]))
     back = facing_of(chair_kit(), away)
     turn = back.poses[:, :3, :3] @ np.swapaxes(chair.poses[:, :3, :3], 1, 2)
     np.testing.assert_allclose(turn, np.tile(np.eye(3), (len(chair), 1, 1)), atol=1e-9)
     np.testing.assert_allclose(back.poses[:, 1, 3], chair.poses[:, 1, 3], atol=1e-12)
-    assert {tuple(each) for each in back.edges.tolist()} == {tuple(each) for each in chair.edges.tolist()}
+    assert {tuple(edge) for edge in back.edges.tolist()} == {tuple(edge) for edge in chair.edges.tolist()}
 
 
-def test_most_parts_decide_and_what_is_as_good_stays_to_the_byte() -> None:
+def test_most_contacts_decide_and_ties_change_nothing() -> None:
     chair = chair_kit().exemplars[0].assembly
     assert facing_of(chair_kit(), chair) is chair
     table = kit_of(MESHES, [CHAIR[:-2]])
@@ -50,7 +50,7 @@ def test_most_parts_decide_and_what_is_as_good_stays_to_the_byte() -> None:
     assert facing_of(table, quarter) is quarter, "a table on four legs looks the same from four sides"
 
 
-def test_what_was_never_seen_says_nothing() -> None:
+def test_unseen_contacts_do_not_count() -> None:
     chair = chair_kit().exemplars[0].assembly
     lying = moved(chair, rotation_matrix(np.pi / 2, [1, 0, 0]))
     assert facing_of(chair_kit(), lying) is lying

@@ -9,7 +9,7 @@ import pytest
 
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
-from stages.variations.selection.shared_surface import TOLERANCE, PackedShapes
+from stages.variations.selection.shared_surface import CENTROID_TOLERANCES, PackedShapes
 from tests.stages.variations.search.test_search import search
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, chain, kit_of, pose, ring
 
@@ -27,7 +27,7 @@ def moved(assembly: Assembly, motion: np.ndarray) -> Assembly:
 def by_every_motion(kit: Kit, first: Assembly, second: Assembly) -> float:
     """The share by laying each part upon each of its type, in each of its symmetries."""
     area = np.array([surface(kit, name) for name in kit.type_names()])
-    centroid = np.array([each.centroid for each in kit.types])
+    centroid = np.array([part_type.centroid for part_type in kit.types])
 
     def centres(assembly: Assembly) -> np.ndarray:
         turned = np.einsum("nij,nj->ni", assembly.poses[:, :3, :3], centroid[assembly.types])
@@ -39,23 +39,23 @@ def by_every_motion(kit: Kit, first: Assembly, second: Assembly) -> float:
             motion = second.poses[j] @ symmetry @ invert(first.poses[i])
             if motion[1, 1] > 0.999:
                 gaps = (centres(first) @ motion[:3, :3].T + motion[:3, 3])[:, None] - centres(second)[None]
-                meets = (np.abs(gaps).max(axis=2) <= TOLERANCE * kit.pose_tolerance) & (
+                meets = (np.abs(gaps).max(axis=2) <= CENTROID_TOLERANCES * kit.pose_tolerance) & (
                     first.types[:, None] == second.types[None]
                 )
                 most = max(most, float(area[first.types[meets.any(axis=1)]].sum()))
     return most / max(area[first.types].sum(), area[second.types].sum())
 
 
-def test_a_copy_shares_everything_wherever_it_stands() -> None:
+def test_moved_copy_shares_everything() -> None:
     kit = kit_of(CHAIN, [chain(3), chain(5)])
     one = kit.exemplars[1].assembly
     shapes = PackedShapes(kit, [one, moved(one, pose(7, 2, -3, 1))], upright=True)
     assert shapes.shares(0, np.array([1]), 0.9).tolist() == [pytest.approx(1.0)]
 
 
-def test_of_two_chains_the_shorter_lies_in_the_longer_but_for_a_cap() -> None:
+def test_shorter_chain_shares_all_but_a_cap() -> None:
     kit = kit_of(CHAIN, [chain(3), chain(5)])
-    shapes = PackedShapes(kit, [each.assembly for each in kit.exemplars], upright=True)
+    shapes = PackedShapes(kit, [exemplar.assembly for exemplar in kit.exemplars], upright=True)
     cap, link = surface(kit, "cap"), surface(kit, "link")
     expected = (cap + 3 * link) / (2 * cap + 5 * link)
     assert shapes.shares(0, np.array([1]), 0.3).tolist() == [pytest.approx(expected)]
@@ -64,7 +64,7 @@ def test_of_two_chains_the_shorter_lies_in_the_longer_but_for_a_cap() -> None:
     assert shapes.most_shared(0, np.array([0, 1])) == pytest.approx(1.0)
 
 
-def test_what_lies_on_its_side_is_no_copy_unless_things_may_turn_over() -> None:
+def test_tipped_shape_is_no_copy_if_upright() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     one = kit.exemplars[1].assembly
     over = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
@@ -73,10 +73,10 @@ def test_what_lies_on_its_side_is_no_copy_unless_things_may_turn_over() -> None:
     assert PackedShapes(kit, shapes, upright=False).shares(0, np.array([1]), 0.5)[0] == pytest.approx(1.0)
 
 
-def test_shares_are_those_of_the_best_of_all_motions() -> None:
+def test_shared_surface_equals_brute_force() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
-    _, found = search(kit, tries=1500, largest=3.0)
-    assemblies = [each.assembly for each in found[:12]]
+    _, found = search(kit, tries=1500, max_size=3.0)
+    assemblies = [variant.assembly for variant in found[:12]]
     shapes = PackedShapes(kit, assemblies, upright=True)
     exact = [by_every_motion(kit, a, b) for a, b in pairwise(assemblies)]
     assert len(set(np.round(exact, 3))) > 3

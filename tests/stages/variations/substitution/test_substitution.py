@@ -11,8 +11,9 @@ from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import admits
 from stages.shape.kit import Assembly, Kit
-from stages.variations.kernels.structs import MEANINGS
-from stages.variations.search.search import Search, Variant
+from stages.variations.kernels.operators import SUBSTITUTION
+from stages.variations.search.search import Search
+from stages.variations.search.variant import Variant
 from stages.variations.settings import SearchConfig
 from stages.variations.substitution.pieces import draw_pieces
 from tests.toy_kits.tables import ROUND, SHORT, SQUARE, THICK, THIN, table, table_kit
@@ -34,74 +35,76 @@ def found(kit: Kit) -> list[Variant]:
     return search(kit)[1]
 
 
-def test_every_top_stands_on_every_mixture_of_legs_once(found: list[Variant]) -> None:
+def test_substitution_finds_every_combination_of_top_and_legs_once(found: list[Variant]) -> None:
     tables = Counter(
-        (int(each.assembly.types[each.assembly.types % 2 == 0][0]), int((each.assembly.types == 3).sum()))
-        for each in found
+        (int(variant.assembly.types[variant.assembly.types % 2 == 0][0]), int((variant.assembly.types == 3).sum()))
+        for variant in found
     )
     every = {(top, legs) for top in (0, 2) for legs in range(5)} - {(0, 0), (2, 4)}
     assert tables == Counter(every)
-    assert any(each.lineage["method"] == "substitution" for each in found)
+    assert any(variant.lineage["method"] == "substitution" for variant in found)
 
 
-def test_without_meanings_nothing_can_be_exchanged() -> None:
+def test_without_labels_nothing_can_be_exchanged() -> None:
     line, found = search(table_kit(table(THIN, SQUARE), table(THIN, ROUND), types="labels"), tries=1000)
     assert not found
-    assert not any(way == MEANINGS for _, way, _ in line.operators.choices)
+    assert not any(way == SUBSTITUTION for _, way, _ in line.operators.choices)
 
 
-def test_what_is_found_touches_as_it_says_and_is_admitted_by_label(kit: Kit, found: list[Variant]) -> None:
+def test_contacts_of_variants_are_recomputed_and_admitted_by_label(kit: Kit, found: list[Variant]) -> None:
     contact = ContactTest(kit.types, kit.contact_tolerance)
-    for each in found:
-        assembly = each.assembly
+    for variant in found:
+        assembly = variant.assembly
         assert np.array_equal(contact.contacts(assembly.types, assembly.poses), assembly.edges)
         labelled = kit.labelled(assembly)
         for part, neighbours in enumerate(labelled.neighbours()):
             assert admits(kit.grammar, int(labelled.types[part]), labelled.multiset(neighbours))
 
 
-def test_feet_stand_on_one_level_where_the_legs_are_as_long(found: list[Variant]) -> None:
-    for each in found:
-        heights = each.assembly.poses[each.assembly.types % 2 == 1, 1, 3]
+def test_equal_legs_end_at_one_level(found: list[Variant]) -> None:
+    for variant in found:
+        heights = variant.assembly.poses[variant.assembly.types % 2 == 1, 1, 3]
         assert np.ptp(heights) < 1e-6
 
 
-def test_legs_of_another_length_hang_from_the_top_and_never_beside_longer_ones() -> None:
+def test_legs_of_different_lengths_are_never_mixed() -> None:
     kit = table_kit(table(THIN, SQUARE), table(THICK, SHORT))
     line, found = search(kit)
-    assert sorted(sorted(each.assembly.types.tolist()) for each in found) == [[0, 3, 3, 3, 3], [1, 1, 1, 1, 2]]
+    assert sorted(sorted(variant.assembly.types.tolist()) for variant in found) == [[0, 3, 3, 3, 3], [1, 1, 1, 1, 2]]
     assert line.rejects["lifted off the ground"] > 0
-    for each in found:
-        top = each.assembly.types % 2 == 0
-        thickness = kit.types[int(each.assembly.types[top][0])].bounds[1, 1]
-        for part_type, height in zip(each.assembly.types[~top].tolist(), each.assembly.poses[~top, 1, 3], strict=True):
-            drop = each.assembly.poses[top, 1, 3][0] - height
+    for variant in found:
+        top = variant.assembly.types % 2 == 0
+        thickness = kit.types[int(variant.assembly.types[top][0])].bounds[1, 1]
+        for part_type, height in zip(
+            variant.assembly.types[~top].tolist(), variant.assembly.poses[~top, 1, 3], strict=True
+        ):
+            drop = variant.assembly.poses[top, 1, 3][0] - height
             assert drop == pytest.approx(thickness + (0.5 if part_type == 1 else 0.25), abs=1e-6)
 
 
-def test_every_leg_stands_where_legs_of_its_top_stood() -> None:
+def test_legs_are_placed_where_legs_of_that_top_were() -> None:
     _, found = search(table_kit(table(THIN, SQUARE), table(THICK, ROUND, reach=0.6)), tries=10_000)
     assert len(found) == 8
-    for each in found:
-        tops = each.assembly.types % 2 == 0
-        places = each.assembly.poses[~tops, :3, 3] - each.assembly.poses[tops, :3, 3]
-        reach = 0.8 if each.assembly.types[tops][0] == 0 else 0.6
+    for variant in found:
+        tops = variant.assembly.types % 2 == 0
+        places = variant.assembly.poses[~tops, :3, 3] - variant.assembly.poses[tops, :3, 3]
+        reach = 0.8 if variant.assembly.types[tops][0] == 0 else 0.6
         assert np.abs(places[:, [0, 2]]) == pytest.approx(np.full((4, 2), reach), abs=1e-6)
 
 
-def test_the_same_seed_finds_the_same(kit: Kit, found: list[Variant]) -> None:
+def test_same_seed_gives_same_variants(kit: Kit, found: list[Variant]) -> None:
     _, again = search(kit)
-    assert [each.lineage for each in again] == [each.lineage for each in found]
+    assert [entry.lineage for entry in again] == [variant.lineage for variant in found]
     for one, other in zip(found, again, strict=True):
         assert one.assembly.poses.tobytes() == other.assembly.poses.tobytes()
 
 
-def test_a_lineage_says_what_came_from_where(kit: Kit, found: list[Variant]) -> None:
-    for each in found:
-        lineage = each.lineage
-        assert sum(lineage["parts_from"]) >= len(each.assembly)
+def test_lineage_counts_parts_by_parent(kit: Kit, found: list[Variant]) -> None:
+    for variant in found:
+        lineage = variant.lineage
+        assert sum(lineage["parts_from"]) >= len(variant.assembly)
         if lineage["method"] == "substitution":
-            assert sum(lineage["parts_from"]) == len(each.assembly)
+            assert sum(lineage["parts_from"]) == len(variant.assembly)
             assert len(lineage["boundary"]) == len(lineage["images"]) > 0
 
 
@@ -110,7 +113,7 @@ def row(types: list[int]) -> Assembly:
     return Assembly(np.array(types, dtype=np.int16), np.tile(np.eye(4), (len(types), 1, 1)), edges)
 
 
-def test_pieces_are_all_parts_of_their_labels_or_one_connected_group() -> None:
+def test_drawn_pieces_are_all_parts_of_labels_or_one_group() -> None:
     base, giver = row([0, 1, 0, 2, 1]), row([1, 2, 0, 1])
     sizes = set()
     for seed in range(300):
@@ -129,5 +132,5 @@ def test_pieces_are_all_parts_of_their_labels_or_one_connected_group() -> None:
     assert {(2, 1), (1, 1), (2, 2)} <= sizes
 
 
-def test_nothing_is_drawn_where_nothing_would_stay() -> None:
+def test_no_piece_is_drawn_where_nothing_would_stay() -> None:
     assert draw_pieces(np.random.default_rng(0), row([0, 0]), row([0])) is None

@@ -4,7 +4,7 @@ A piece is a connected set of nodes whose cut edges follow each other in one cyc
 take each other's place if, walking round both outsides at once, from cut edge to cut edge, the same is met: nodes of
 the same types with as many docking sites. Less is asked where only the nodes at the cut must be the same.
 
-Then both outsides may lie upon each other in two ways at once: a closed ring of parts all alike takes one more,
+Then both outsides can match in two ways at once: a closed ring of parts all alike takes one more,
 turned by none at one end of it and by one at the other. No partial symmetry, which lays each part upon one, has such
 a boundary; `lies_one_way` tells it.
 """
@@ -191,18 +191,18 @@ def replaced(graph: OrderedGraph, giver: OrderedGraph, piece: Piece, other: Piec
     types = [int(graph.types[node]) for node in place_of] + [int(giver.types[node]) for node in place_there]
     orders = [
         [
-            place_there[there[each, node][0]] if each in piece.inside else place_of[each]
-            for each in graph.neighbours(node)
+            place_there[there[neighbour, node][0]] if neighbour in piece.inside else place_of[neighbour]
+            for neighbour in graph.neighbours(node)
         ]
         for node in place_of
     ]
     orders += [
         [
-            place_there[each] if each in other.inside else place_of[here[node, each][1]]
-            for each in giver.neighbours(node)
+            place_there[neighbour] if neighbour in other.inside else place_of[here[node, neighbour][1]]
+            for neighbour in giver.neighbours(node)
         ]
         for node in place_there
     ]
-    if any(len(set(each)) < len(each) for each in orders):
+    if any(len(set(order)) < len(order) for order in orders):
         return None
     return ordered_graph(types, orders)

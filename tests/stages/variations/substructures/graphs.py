@@ -49,7 +49,7 @@ def random_graph(rng: np.random.Generator, most: int) -> OrderedGraph:
         if j not in near[i]:
             near[i].append(j)
             near[j].append(i)
-    return ordered_graph(rng.integers(types, size=n), [rng.permutation(each).tolist() for each in near])
+    return ordered_graph(rng.integers(types, size=n), [rng.permutation(neighbour).tolist() for neighbour in near])
 
 
 def patterned_graph(rng: np.random.Generator, most: int) -> OrderedGraph:
@@ -58,11 +58,11 @@ def patterned_graph(rng: np.random.Generator, most: int) -> OrderedGraph:
     graph = random_graph(rng, most)
     node = int(rng.integers(len(graph.types)))
     distances, waiting = {node: 0}, [node]
-    for each in waiting:
-        fresh = [other for other in graph.neighbours(each) if other not in distances]
-        distances |= dict.fromkeys(fresh, distances[each] + 1)
+    for entry in waiting:
+        fresh = [other for other in graph.neighbours(entry) if other not in distances]
+        distances |= dict.fromkeys(fresh, distances[entry] + 1)
         waiting += fresh
-    by_distance = np.array([distances[each] for each in range(len(graph.types))])
+    by_distance = np.array([distances[part_type] for part_type in range(len(graph.types))])
     types = (np.diff(graph.starts), by_distance % 2, by_distance % 3)[int(rng.integers(3))]
     return graph._replace(types=types.astype(np.int64))
 
@@ -102,14 +102,14 @@ def code(graph: OrderedGraph) -> tuple[tuple[int, ...], ...]:
 
 
 def _code_from(graph: OrderedGraph, dart: int) -> tuple[tuple[int, ...], ...]:
-    types, starts, tails, twins = (each.tolist() for each in graph[:4])
+    types, starts, tails, twins = (entry.tolist() for entry in graph[:4])
     first, place = {tails[dart]: dart}, {tails[dart]: 0}
     order, rows = [tails[dart]], []
     for node in order:
         begin = first[node]
         row = [types[node]]
-        for each in (*range(begin, starts[node + 1]), *range(starts[node], begin)):
-            back = twins[each]
+        for number in (*range(begin, starts[node + 1]), *range(starts[node], begin)):
+            back = twins[number]
             head = tails[back]
             if head not in first:
                 first[head], place[head] = back, len(order)

@@ -3,7 +3,7 @@
 python -m tests.stages.variations.substructures.oracle [--pairs 500] [--most 9]
 
 Pairs of random graphs, of such whose types follow a pattern, and of crops of the shipped kits and, where they lie
-beside the project, of real models. Pairs that fail are printed as they stand in tests/data/replacements.json, a corpus
+next to the project, of real models. Pairs that fail are printed as they stand in tests/data/replacements.json, a corpus
 that is tried in every run.
 """
 
@@ -44,8 +44,7 @@ REAL_MODELS = (
     "a25_dome",
     "a26_crossvault",
 )
-STEPS = 3
-"""Operations in a row of which a replacement may be composed."""
+MAX_STEPS = 3
 
 Code = tuple[tuple[int, ...], ...]
 
@@ -62,7 +61,7 @@ class Figures:
 
     listed: int
     held: int
-    beside: int
+    missed: int
     made_in: tuple[int, ...]
     per_k_n2: float
 
@@ -91,7 +90,7 @@ def composed(
         later: dict[Code, OrderedGraph] = {}
         for graph in fresh:
             for other in {id(giver): giver, id(base): base}.values():
-                later |= {key: each for key, each in made(graph, other, violations).items() if key not in known}
+                later |= {key: entry for key, entry in made(graph, other, violations).items() if key not in known}
         known |= later
         fresh = list(later.values())
         left.append(left[-1] - set(later))
@@ -105,15 +104,15 @@ def judge(base: OrderedGraph, giver: OrderedGraph) -> Figures:
     outside of a piece may meet its cut edges in other orders: boundaries agree that do so in one of the two.
     """
     operations = find_operations(base, giver)
-    degree = max(int(np.diff(each.starts).max()) for each in (base, giver))
+    degree = max(int(np.diff(entry.starts).max()) for entry in (base, giver))
     per_k_n2 = len(operations) / (degree * len(base.types) * len(giver.types))
     if per_k_n2 > 1:
         raise Unlike(f"{len(operations)} operations are more than k n²")
     seen = _edge_types(base) | _edge_types(giver)
-    here, there = ({frozenset(each.cuts): each for each in brute_force.pieces(graph)} for graph in (base, giver))
-    held = beside = 0
+    here, there = ({frozenset(entry.cuts): entry for entry in brute_force.pieces(graph)} for graph in (base, giver))
+    held = missed = 0
     ways = [operations.boundary(number) for number in range(len(operations))]
-    ways += [each[:, ::-1] for each in ways] if base is giver else []
+    ways += [entry[:, ::-1] for entry in ways] if base is giver else []
     for boundary in ways:
         result = replace_piece(base, giver, boundary)
         if result is None or not is_connected(result.graph):
@@ -122,24 +121,24 @@ def judge(base: OrderedGraph, giver: OrderedGraph) -> Figures:
             raise Unlike(f"{boundary.tolist()} makes an edge that neither graph has")
         piece, other = here.get(_cuts(base, boundary[:, 0])), there.get(_cuts(giver, boundary[:, 1]))
         if piece is None or other is None:
-            beside += 1
+            missed += 1
             continue
         outer, outer_there = brute_force.round_outside(piece), brute_force.round_outside(other)
         key = code(result.graph)
         if key in _replacements(base, giver, piece, other):
             held += 1
         elif outer is None or outer_there is None:
-            beside += 1
+            missed += 1
         elif key in _replacements(base, giver, outer, outer_there):
             held += 1
         else:
             raise Unlike(f"{boundary.tolist()} makes what brute force does not")
     wanted = brute_force.results(base, giver, same_outside=True) - {code(base)}
-    left = composed(base, giver, wanted, STEPS)
+    left = composed(base, giver, wanted, MAX_STEPS)
     if left[-1]:
         raise Unlike(f"{len(left[-1])} of {len(wanted)} results of brute force are no composition of operations")
-    counts = [len(each) for each in left] + [0] * (STEPS + 1 - len(left))
-    return Figures(len(ways), held, beside, tuple((-np.diff(counts)).tolist()), per_k_n2)
+    counts = [len(entry) for entry in left] + [0] * (MAX_STEPS + 1 - len(left))
+    return Figures(len(ways), held, missed, tuple((-np.diff(counts)).tolist()), per_k_n2)
 
 
 def _cuts(graph: OrderedGraph, darts: np.ndarray) -> frozenset[brute_force.Cut]:
@@ -184,7 +183,7 @@ def shipped_graphs() -> list[OrderedGraph]:
 
 @cache
 def real_graphs() -> list[OrderedGraph]:
-    """Those of real models, none where they do not lie beside the project."""
+    """Return those of real models, none where they are not next to the project."""
     return _shape_graphs([REAL / name / "model.glb" for name in REAL_MODELS] if REAL.is_dir() else [])
 
 
@@ -212,7 +211,7 @@ def described(base: OrderedGraph, giver: OrderedGraph) -> str:
     """A pair as it stands in the corpus."""
     graphs = [base] if base is giver else [base, giver]
     return json.dumps(
-        [[each.types.tolist(), [each.neighbours(node) for node in range(len(each.types))]] for each in graphs]
+        [[graph.types.tolist(), [graph.neighbours(node) for node in range(len(graph.types))]] for graph in graphs]
     )
 
 
@@ -235,7 +234,7 @@ def main() -> None:
             print(f"{seed}: {unlike}: {described(base, giver)}")
             continue
         greatest = max(greatest, figures.per_k_n2)
-        total.update({"pairs": 1, "operations": figures.listed, "held": figures.held, "beside": figures.beside})
+        total.update({"pairs": 1, "operations": figures.listed, "held": figures.held, "missed": figures.missed})
         total.update({f"made in {steps}": count for steps, count in enumerate(figures.made_in, 1)})
     for name, total in totals.items():
         print(f"{name}: {dict(total)}")

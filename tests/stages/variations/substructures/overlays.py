@@ -17,8 +17,8 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import Assembly, Kit
 
-CLOSE = 1e-4
-UPRIGHT = 0.999
+MAX_GAP = 1e-4
+MIN_UPRIGHT_COSINE = 0.999
 
 Pairs = frozenset[tuple[int, int]]
 Replaced = tuple[frozenset[int], frozenset[int], Pairs]
@@ -29,9 +29,9 @@ def replacements(kit: Kit, base: Assembly, giver: Assembly, *, upright: bool) ->
     """All replacements of a piece of the base by one of the giver, which may be the same; how often each is met."""
     found = Counter[Replaced]()
     for motion in _motions(kit, base, giver):
-        if upright and motion[1, 1] < UPRIGHT:
+        if upright and motion[1, 1] < MIN_UPRIGHT_COSINE:
             continue
-        if base is giver and np.abs(motion - np.eye(4)).max() < CLOSE:
+        if base is giver and np.abs(motion - np.eye(4)).max() < MAX_GAP:
             continue
         found.update(_left_over(kit, base, giver, motion))
     return found
@@ -81,7 +81,7 @@ def _left_over(kit: Kit, base: Assembly, giver: Assembly, motion: FloatArray) ->
 def _coincide(kit: Kit, kind: int, pose: FloatArray, other: FloatArray) -> bool:
     """Whether two parts of one type take the same points."""
     between = np.linalg.inv(other) @ pose
-    return bool((np.abs(kit.types[kind].symmetries - between).max(axis=(1, 2)) < CLOSE).any())
+    return bool((np.abs(kit.types[kind].symmetries - between).max(axis=(1, 2)) < MAX_GAP).any())
 
 
 def _in_one_place(kit: Kit, kind: int, pose: FloatArray, other_kind: int, other: FloatArray) -> bool:

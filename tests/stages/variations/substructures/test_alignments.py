@@ -16,7 +16,7 @@ from stages.variations.substructures.consistency import make_consistent
 from stages.variations.substructures.docking_sites import contact_graph, docking_graph
 from stages.variations.substructures.ordered_graph import OrderedGraph
 from stages.variations.substructures.region_swaps import RegionSwap, RegionSwaps
-from stages.variations.substructures.result_key import moved_key
+from stages.variations.substructures.result_key import swap_key
 from tests.stages.variations.substructures.overlays import Replaced, replacements
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, box, chain, kit_of, pose, ring, with_arrow
 
@@ -25,9 +25,10 @@ TILES = {"plain": box(1.0, 0.2, 1.0), "arrow": with_arrow(box(1.0, 0.2, 1.0)), "
 
 def placed(kit: Kit) -> list[tuple[Assembly, OrderedGraph]]:
     dockings = ContactOracle(kit).dockings
-    wholes = [each.assembly for each in kit.exemplars]
+    wholes = [exemplar.assembly for exemplar in kit.exemplars]
     return [
-        (each, docking_graph(kit, each, dockings.label_edges(each.types, each.poses, each.edges))) for each in wholes
+        (entry, docking_graph(kit, entry, dockings.label_edges(entry.types, entry.poses, entry.edges)))
+        for entry in wholes
     ]
 
 
@@ -36,7 +37,7 @@ def sizes(moves: RegionSwaps) -> list[int]:
     return sorted({int(move.piece.sum() + (~move.taken).sum()) for move in (moves[at] for at in range(len(moves)))})
 
 
-def test_a_chain_laid_upon_itself_grows_and_shrinks_by_any_number_of_links() -> None:
+def test_chain_aligned_with_itself_changes_by_any_number_of_links() -> None:
     kit = kit_of(CHAIN, [chain(4)])
     (own,) = placed(kit)
     moves = find_region_swaps(kit, 1, own, own)
@@ -44,7 +45,7 @@ def test_a_chain_laid_upon_itself_grows_and_shrinks_by_any_number_of_links() -> 
     assert {3, 4, 5, 7, 8, 9} <= set(sizes(moves))
 
 
-def test_what_stays_and_what_comes_do_not_overlap_and_every_move_keeps_a_part_that_coincides() -> None:
+def test_swapped_regions_do_not_overlap_and_keep_a_matched_part() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     for base in placed(kit):
         for giver in placed(kit):
@@ -60,16 +61,16 @@ def test_what_stays_and_what_comes_do_not_overlap_and_every_move_keeps_a_part_th
                 assert gaps < kit.pose_tolerance * 2
 
 
-def test_the_key_of_a_move_that_brings_nothing_new_is_that_of_the_base() -> None:
-    """A chain of which one end is replaced by its like has the key that it had, a longer one another."""
+def test_key_of_an_empty_swap_is_that_of_the_base() -> None:
+    """A chain with one end replaced by its like keeps its key; a longer one has another."""
     kit = kit_of(CHAIN, [chain(4)])
     (own,) = placed(kit)
     moves = find_region_swaps(kit, 1, own, own)
     none = np.zeros(len(own[0]), dtype=bool)
-    whole = int(moved_key(own[1], own[1], none, none, np.full(len(own[0]), -1, dtype=np.int16)))
+    whole = int(swap_key(own[1], own[1], none, none, np.full(len(own[0]), -1, dtype=np.int16)))
     for number in range(len(moves)):
         taken, piece, image, _ = moves[number]
-        key = int(moved_key(own[1], own[1], taken, piece, image))
+        key = int(swap_key(own[1], own[1], taken, piece, image))
         assert (key == whole) == (piece.sum() == taken.sum())
 
 
@@ -89,7 +90,7 @@ def tiling(rng: np.random.Generator, tiles: int) -> list[Placed]:
     return parts
 
 
-def test_a_list_that_is_cut_short_has_the_motions_by_which_most_coincides() -> None:
+def test_cut_short_list_has_the_best_alignments() -> None:
     kit = kit_of(CHAIN, [chain(12)])
     (own,) = placed(kit)
     whole, short = find_region_swaps(kit, 1, own, own), find_region_swaps(kit, 1, own, own, 12 * len(own[0]))
@@ -100,14 +101,14 @@ def test_a_list_that_is_cut_short_has_the_motions_by_which_most_coincides() -> N
     assert matched[0] > matched[1]
 
 
-def test_several_regions_along_one_motion_change_places_at_once() -> None:
+def test_several_regions_along_one_alignment_are_swapped_at_once() -> None:
     """What a composition makes is what its regions make one after the other."""
     rng, several = np.random.default_rng(0), 0
     kit = kit_of(TILES, [tiling(rng, tiles) for tiles in (9, 12)])
     for base in placed(kit):
         for giver in placed(kit):
             moves = find_region_swaps(kit, 1, base, giver)
-            numbers = [each for each in moves.order(rng) if each >= len(moves)]
+            numbers = [swap for swap in moves.order(rng) if swap >= len(moves)]
             for number in numbers:
                 motion, chosen = moves.draw(rng, number)
                 move, regions = moves.along(motion, chosen), moves.regions[motion]
@@ -116,13 +117,13 @@ def test_several_regions_along_one_motion_change_places_at_once() -> None:
                     for region in np.unique(regions[regions >= 0])
                     if chosen[region]
                 ]
-                assert (move.taken == np.any([each.taken for each in alone], axis=0)).all()
-                assert (move.piece == np.any([each.piece for each in alone], axis=0)).all()
+                assert (move.taken == np.any([entry.taken for entry in alone], axis=0)).all()
+                assert (move.piece == np.any([entry.piece for entry in alone], axis=0)).all()
                 several += len(alone) > 1
     assert several > 20
 
 
-def test_where_nothing_comes_the_parts_are_told_upon_which_the_other_shape_ends() -> None:
+def test_swap_without_piece_names_where_the_other_shape_ends() -> None:
     kit = kit_of(CHAIN, [chain(3), chain(4)[1:]])
     base, giver = placed(kit)
     moves = find_region_swaps(kit, 1, base, giver)
@@ -137,13 +138,13 @@ def test_where_nothing_comes_the_parts_are_told_upon_which_the_other_shape_ends(
         if move.piece.any():
             assert [hold for _, hold, _ in move.docked(giver[1], giver[0].poses)] == [beside]
         else:
-            [(part, hold, _)] = move.left(base[1], giver[0].poses)
+            [(part, hold, _)] = move.ends(base[1], giver[0].poses)
             assert (hold, move.image[part]) == (beside, beside)
             assert move.docked(giver[1], giver[0].poses) == []
     assert came == {True, False}
 
 
-def test_a_choice_of_regions_is_changed_until_the_grammar_admits_what_stands_around_every_part() -> None:
+def test_chosen_regions_are_changed_until_the_grammar_admits_them() -> None:
     rng, changed = np.random.default_rng(0), 0
     kit = kit_of(TILES, [tiling(rng, tiles) for tiles in (9, 12)])
     tables = kit_tables(kit, True)
@@ -166,14 +167,14 @@ def test_a_choice_of_regions_is_changed_until_the_grammar_admits_what_stands_aro
 def around(
     kit: Kit, base: tuple[Assembly, OrderedGraph], giver: tuple[Assembly, OrderedGraph], move: RegionSwap, part: int
 ) -> Multiset:
-    """The labels beside a part of the base that coincides with one of the giver, once the move is made."""
+    """The labels next to a part of the base that coincides with one of the giver, once the move is made."""
     own = int(np.flatnonzero(move.image == part)[0])
-    types = [base[0].types[each] for each in base[0].neighbours()[part] if not move.taken[each]]
-    types += [giver[0].types[each] for each in giver[0].neighbours()[own] if move.piece[each]]
+    types = [base[0].types[neighbour] for neighbour in base[0].neighbours()[part] if not move.taken[neighbour]]
+    types += [giver[0].types[neighbour] for neighbour in giver[0].neighbours()[own] if move.piece[neighbour]]
     return tuple(sorted(Counter(kit.label_of[types].tolist()).items()))
 
 
-def test_a_graph_without_an_order_of_sites_is_that_with_one_but_for_the_order() -> None:
+def test_contact_graph_equals_docking_graph_but_for_the_order() -> None:
     kit = kit_of(ROAD, [ring(2, 3)])
     dockings, whole = ContactOracle(kit).dockings, kit.exemplars[0].assembly
     labels = dockings.label_edges(whole.types, whole.poses, whole.edges)
@@ -188,7 +189,7 @@ def listed(moves: RegionSwaps) -> list[Replaced]:
     """The moves in the oracle's words; pairs at the border alone."""
     found = []
     for number in range(len(moves)):
-        taken, piece = (frozenset(np.flatnonzero(each).tolist()) for each in moves[number][:2])
+        taken, piece = (frozenset(np.flatnonzero(swap).tolist()) for swap in moves[number][:2])
         images = moves[number].image
         found.append(
             (taken, piece, frozenset((int(images[part]), part) for part in np.flatnonzero(images >= 0).tolist()))
@@ -217,12 +218,12 @@ def check_against_all_motions(kit: Kit) -> int:
     return count
 
 
-def test_moves_of_chains_and_rings_are_those_of_all_motions() -> None:
+def test_swaps_of_chains_and_rings_equal_brute_force() -> None:
     assert check_against_all_motions(kit_of(CHAIN, [chain(1), chain(2), chain(4)])) > 50
     assert check_against_all_motions(kit_of(ROAD, [ring(1, 1), ring(2, 3)])) > 40
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_moves_of_tilings_are_those_of_all_motions(seed: int) -> None:
+def test_swaps_of_tilings_equal_brute_force(seed: int) -> None:
     rng = np.random.default_rng(seed)
     assert check_against_all_motions(kit_of(TILES, [tiling(rng, 3 + place) for place in range(4)])) > 20

@@ -9,9 +9,10 @@ from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
-from stages.variations.search.search import Search, Variant
+from stages.variations.search.search import Search
+from stages.variations.search.variant import Variant
 from stages.variations.settings import SearchConfig
-from stages.variations.substructures.deformation import blend, is_oriented_alike
+from stages.variations.substructures.deformation import deform, is_oriented_alike
 from stages.variations.substructures.docking_sites import docking_graph
 from stages.variations.substructures.embedding import Side
 from stages.variations.substructures.ordered_graph import ordered_graph
@@ -43,7 +44,7 @@ def side(kit: Kit, assembly: Assembly) -> Side:
 
 
 def named(kit: Kit, assembly: Assembly, name: str) -> np.ndarray:
-    found: np.ndarray = assembly.types == [each.name for each in kit.types].index(name)
+    found: np.ndarray = assembly.types == [part_type.name for part_type in kit.types].index(name)
     return found
 
 
@@ -54,20 +55,20 @@ def cut(of: Side, inside: np.ndarray) -> np.ndarray:
     return darts[np.argsort(of.assembly.poses[tails[darts], 0, 3])]
 
 
-def test_parts_at_the_boundary_go_where_it_goes(kit: Kit) -> None:
-    base, giver = (side(kit, each.assembly) for each in kit.exemplars)
+def test_boundary_parts_follow_the_boundary(kit: Kit) -> None:
+    base, giver = (side(kit, exemplar.assembly) for exemplar in kit.exemplars)
     piece = named(kit, giver.assembly, "knob")
     rows = np.stack([cut(base, named(kit, base.assembly, "bar")), cut(giver, piece)], axis=1)
-    moved = blend(kit, base, giver, rows, piece) @ giver.assembly.poses[piece]
-    before, after = (each.assembly.poses[named(kit, each.assembly, "post")] for each in (giver, base))
+    moved = deform(kit, base, giver, rows, piece) @ giver.assembly.poses[piece]
+    before, after = (entry.assembly.poses[named(kit, entry.assembly, "post")] for entry in (giver, base))
     knobs = giver.assembly.poses[piece]
     np.testing.assert_allclose(invert(after) @ moved, invert(before) @ knobs, atol=1e-9)
 
 
-def test_parts_between_go_with_the_boundary_that_is_nearest(kit: Kit) -> None:
-    """A row of five between two ends, one of which stays while the other moves away."""
+def test_inner_parts_follow_the_nearest_boundary(kit: Kit) -> None:
+    """A row of five between two ends: one stays while the other moves away."""
     names = ["post", *["knob"] * 5, "post"]
-    types = np.array([[each.name for each in kit.types].index(name) for name in names], dtype=np.int16)
+    types = np.array([[part_type.name for part_type in kit.types].index(name) for name in names], dtype=np.int16)
     poses = np.stack([pose(2.0 * place, 0, 0) for place in range(7)])
     edges = np.array([[place, place + 1] for place in range(6)], dtype=np.int32)
     graph = ordered_graph(types, [[near for near in (at - 1, at + 1) if 0 <= near < 7] for at in range(7)])
@@ -75,7 +76,7 @@ def test_parts_between_go_with_the_boundary_that_is_nearest(kit: Kit) -> None:
     away[6, 0, 3] += 3.0
     base, piece = Side(Assembly(types, away, edges), graph), np.arange(7) % 6 > 0
     rows = np.stack([cut(giver, piece)] * 2, axis=1)
-    shifts = blend(kit, base, giver, rows, piece)[:, 0, 3]
+    shifts = deform(kit, base, giver, rows, piece)[:, 0, 3]
     assert shifts[0] == pytest.approx(0.0, abs=1e-9)
     assert shifts[2] == pytest.approx(1.5, abs=0.1)
     assert shifts[4] == pytest.approx(3.0, abs=1e-9)
@@ -83,17 +84,17 @@ def test_parts_between_go_with_the_boundary_that_is_nearest(kit: Kit) -> None:
 
 
 @pytest.mark.parametrize("turns", [0, 1, 2, 3])
-def test_a_boundary_that_is_moved_as_a_whole_moves_all_parts_alike(kit: Kit, turns: int) -> None:
+def test_rigidly_moved_boundary_moves_all_parts_alike(kit: Kit, turns: int) -> None:
     assembly = kit.exemplars[1].assembly
     motion = pose(3.0, 0.5, -1.0, turns)
     giver, base = side(kit, assembly), side(kit, Assembly(assembly.types, motion @ assembly.poses, assembly.edges))
     piece = named(kit, assembly, "knob")
-    motions = blend(kit, base, giver, np.stack([cut(giver, piece)] * 2, axis=1), piece)
+    motions = deform(kit, base, giver, np.stack([cut(giver, piece)] * 2, axis=1), piece)
     np.testing.assert_allclose(motions, np.tile(motion, (2, 1, 1)), atol=1e-9)
 
 
-def test_a_cut_whose_edges_stand_at_other_angles_is_refused(kit: Kit) -> None:
-    """What lies on posts is no place for what lies beside them, nor what parts two for what turns a corner."""
+def test_cut_with_other_angles_is_rejected(kit: Kit) -> None:
+    """Posts are no place for what goes next to them, nor is a straight piece one for a corner."""
     assembly = kit.exemplars[1].assembly
     giver, piece = side(kit, assembly), named(kit, assembly, "knob")
     rows = np.stack([cut(giver, piece), cut(giver, piece)], axis=1)
@@ -109,16 +110,18 @@ def found_in(kit: Kit, *, bends: bool) -> tuple[Search, list[Variant]]:
     return line, line.run(np.random.default_rng(0), 400, 10**9, "test", lambda count: None)[0]
 
 
-def test_knobs_come_to_stand_on_posts_at_another_distance_only_where_pieces_may_be_bent(kit: Kit) -> None:
+def test_only_deformed_pieces_fit_posts_at_another_distance(kit: Kit) -> None:
     line, rigid = found_in(kit, bends=False)
     _, bent = found_in(kit, bends=True)
     assert not rigid
     assert line.rejects["replaced: no embedding"]
-    near = [each for each in bent if named(kit, each.assembly, "knob").sum() == 2]
+    near = [entry for entry in bent if named(kit, entry.assembly, "knob").sum() == 2]
     assert near
-    assert all(each.lineage["deformed"] for each in near)
+    assert all(neighbour.lineage["deformed"] for neighbour in near)
     contact = ContactTest(kit.types, kit.contact_tolerance)
-    for each in near:
-        posts = each.assembly.poses[named(kit, each.assembly, "post"), 0, 3]
+    for neighbour in near:
+        posts = neighbour.assembly.poses[named(kit, neighbour.assembly, "post"), 0, 3]
         assert np.ptp(posts) == pytest.approx(4.0)
-        np.testing.assert_array_equal(contact.contacts(each.assembly.types, each.assembly.poses), each.assembly.edges)
+        np.testing.assert_array_equal(
+            contact.contacts(neighbour.assembly.types, neighbour.assembly.poses), neighbour.assembly.edges
+        )

@@ -25,18 +25,18 @@ def test_sites_around_the_vertical_go_counter_clockwise() -> None:
 
 
 @given(seed=st.integers(0, 10_000), turn=st.floats(0, 6.28), count=st.integers(3, 8))
-def test_the_order_turns_with_the_shape(seed: int, turn: float, count: int) -> None:
+def test_cyclic_order_turns_with_the_shape(seed: int, turn: float, count: int) -> None:
     sites = np.random.default_rng(seed).normal(size=(count, 3))
     turned = Rotation.from_rotvec([0, turn, 0]).as_matrix()
     assert cyclic(cyclic_order(sites, AXES)) == cyclic(cyclic_order(sites @ turned.T, AXES @ turned.T))
 
 
 @given(seed=st.integers(0, 10_000), count=st.integers(3, 8))
-def test_the_order_does_not_know_the_numbers_of_the_sites(seed: int, count: int) -> None:
+def test_cyclic_order_does_not_depend_on_numbering(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     sites, names = rng.normal(size=(count, 3)), rng.permutation(count)
     order = cyclic_order(sites, AXES)
-    assert cyclic([int(names[each]) for each in cyclic_order(sites[names], AXES)]) == cyclic(order)
+    assert cyclic([int(names[name]) for name in cyclic_order(sites[names], AXES)]) == cyclic(order)
 
 
 @pytest.mark.parametrize(
@@ -51,9 +51,9 @@ def test_the_order_does_not_know_the_numbers_of_the_sites(seed: int, count: int)
         np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]),  # no plane fits best
     ],
 )
-def test_degenerate_neighbourhoods_have_an_order_that_does_not_know_numbers(sites: np.ndarray) -> None:
+def test_order_of_degenerate_neighbourhoods_does_not_depend_on_numbering(sites: np.ndarray) -> None:
     order = cyclic_order(sites, AXES)
     assert sorted(order) == list(range(len(sites)))
     back = cyclic_order(sites[::-1], AXES)
     if len(np.unique(sites, axis=0)) == len(sites) and len(sites) > 2:
-        assert cyclic([len(sites) - 1 - each for each in back]) == cyclic(order)
+        assert cyclic([len(sites) - 1 - entry for entry in back]) == cyclic(order)

@@ -26,7 +26,7 @@ def samples_of(kit: Kit, turned: float = 0.0) -> list[Sample]:
     """What a short search finds, as a dataset has it."""
     _, found = replaced(kit, 600, max_repeats=1, max_size=3.0)
     turn = vertical_turn(1, turned)
-    told = {"turned_degrees": turned, "restored_hubs": 0}
+    lineage_fields = {"turned_degrees": turned, "restored_hubs": 0}
     return [
         Sample(
             f"toy-{place}",
@@ -34,27 +34,27 @@ def samples_of(kit: Kit, turned: float = 0.0) -> list[Sample]:
             "variations",
             kit.name,
             "",
-            {**each.lineage, "made_of": each.lineage["parents"], "name": f"test-{place}", **told},
-            replace(each.assembly, poses=turn @ each.assembly.poses),
+            {**variant.lineage, "made_of": variant.lineage["parents"], "name": f"test-{place}", **lineage_fields},
+            replace(variant.assembly, poses=turn @ variant.assembly.poses),
         )
-        for place, each in enumerate(found)
+        for place, variant in enumerate(found)
     ]
 
 
 def shown(kit: Kit, samples: list[Sample]) -> list[tuple[Sample, DrawnReplacement]]:
     known = known_shapes(kit, samples)
-    told = [(each, replacement_of(kit, each, known)) for each in samples]
-    return [(sample, found) for sample, found in told if found is not None]
+    lineage_fields = [(sample, replacement_of(kit, sample, known)) for sample in samples]
+    return [(sample, found) for sample, found in lineage_fields if found is not None]
 
 
 @pytest.mark.parametrize("turned", [0.0, 90.0])
 @pytest.mark.parametrize("rings", [False, True])
-def test_the_parts_that_left_and_came_are_told_from_the_lineage(turned: float, rings: bool) -> None:
+def test_lineage_tells_which_parts_left_and_came(turned: float, rings: bool) -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)]) if rings else kit_of(CHAIN, [chain(3), chain(5)])
     samples = samples_of(kit, turned)
-    told = shown(kit, samples)
-    assert len(told) == len(samples)
-    for sample, found in told:
+    lineage_fields = shown(kit, samples)
+    assert len(lineage_fields) == len(samples)
+    for sample, found in lineage_fields:
         assert len(found.base[1]) - found.taken.sum() + found.piece.sum() == len(sample.assembly)
         assert found.piece.sum() == found.came.sum() == min(sample.lineage["parts_from"])
         assert found.taken.sum() == len(found.base[1]) - max(sample.lineage["parts_from"])
@@ -63,18 +63,18 @@ def test_the_parts_that_left_and_came_are_told_from_the_lineage(turned: float, r
         assert gaps.max() < kit.pose_tolerance
 
 
-def test_what_was_made_of_another_sample_is_told_and_of_what_is_not_kept_is_not() -> None:
+def test_replacement_is_known_only_if_its_parents_are_samples() -> None:
     kit = kit_of(CHAIN, [chain(3), chain(5)])
     samples = samples_of(kit)
-    names = {each.name for each in kit.exemplars}
-    later = [each for each in samples if not set(each.lineage["made_of"]) <= names]
+    names = {exemplar.name for exemplar in kit.exemplars}
+    later = [sample for sample in samples if not set(sample.lineage["made_of"]) <= names]
     assert later
     assert len(shown(kit, later)) < len(later)
-    keys = {each.key for each in samples}
+    keys = {sample.key for sample in samples}
     assert any(found.base[0] in keys for _, found in shown(kit, samples))
 
 
-def test_a_sheet_has_a_row_for_each_replacement_and_is_not_made_of_none() -> None:
+def test_sheet_has_a_row_per_replacement() -> None:
     kit = kit_of(CHAIN, [chain(3), chain(5)])
     samples = [sample for sample, _ in shown(kit, samples_of(kit))]
     assert replacements_sheet(kit, []) is None

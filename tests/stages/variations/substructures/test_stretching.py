@@ -16,7 +16,8 @@ from stages.shape.kit import Kit
 from stages.shape.shape import kit_shape
 from stages.shape.stretch import moved_by
 from stages.variations.requirements.stretched_contacts import broken_contact
-from stages.variations.search.search import Search, Variant
+from stages.variations.search.search import Search
+from stages.variations.search.variant import Variant
 from stages.variations.settings import SearchConfig
 from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose, with_arrow
 
@@ -48,41 +49,45 @@ def found_in(kit: Kit, **stretch: Any) -> tuple[Search, list[Variant]]:
 
 
 def named(kit: Kit, variant: Variant) -> list[str]:
-    return sorted(kit.type_names()[each] for each in variant.assembly.types)
+    return sorted(kit.type_names()[part_type] for part_type in variant.assembly.types)
 
 
-def test_a_piece_takes_the_place_of_a_longer_one_only_where_it_may_be_stretched(kit: Kit) -> None:
+def test_piece_replaces_a_longer_one_only_if_stretched(kit: Kit) -> None:
     rigid, none = found_in(kit)
     assert not none
     assert rigid.rejects["replaced: no embedding"]
     _, bent = found_in(kit, most=1.6)
-    assert sorted(map(tuple, (named(kit, each) for each in bent))) == [
+    assert sorted(map(tuple, (named(kit, entry) for entry in bent))) == [
         ("bar", "floor", "post", "post"),
         ("floor", "knot", "post", "post", "rail", "rail"),
     ]
     contact = []
-    for each in bent:
-        assert each.lineage["deformed"]
-        shape = kit_shape(kit, each.assembly)
+    for entry in bent:
+        assert entry.lineage["deformed"]
+        shape = kit_shape(kit, entry.assembly)
         contact.append(ContactTest(shape.meshes, kit.contact_tolerance))
         touching = contact[-1].contacts(shape.assembly.types, shape.assembly.poses)
-        np.testing.assert_array_equal(touching, each.assembly.edges)
+        np.testing.assert_array_equal(touching, entry.assembly.edges)
     _, less = found_in(kit, most=1.2)
     assert not less
 
 
-def test_what_is_stretched_is_verified_as_what_is_not(kit: Kit) -> None:
+def test_stretched_variants_pass_verification(kit: Kit) -> None:
     """By the other contact test, from the mesh as it stands in the file; one that is moved or too long is found out."""
     _, bent = found_in(kit, most=1.6)
     for variant in bent:
         assert verified(kit, variant, np.eye(4)) == []
         longer = verified(kit, variant, np.diag([1.3, 1.0, 1.0, 1.0]))
-        assert any("into each other" in each or "do not touch" in each for each in longer)
+        assert any("into each other" in entry or "do not touch" in entry for entry in longer)
 
 
 def verified(kit: Kit, variant: Variant, motion: np.ndarray) -> list[str]:
     """What is wrong with a packaged variant whose bar or knot was moved by an affine map."""
-    at = next(place for place, each in enumerate(variant.assembly.types) if kit.type_names()[each] in ("bar", "knot"))
+    at = next(
+        place
+        for place, part_type in enumerate(variant.assembly.types)
+        if kit.type_names()[part_type] in ("bar", "knot")
+    )
     motions = np.tile(np.eye(4), (len(variant.assembly), 1, 1))
     motions[at] = motion
     assembly = moved_by(variant.assembly, motions)
@@ -96,7 +101,7 @@ def verified(kit: Kit, variant: Variant, motion: np.ndarray) -> list[str]:
     return geometry_faults(kit, {"json": record, CONTACTS: pair_bytes(assembly.edges), "glb": glb_bytes(shape)})
 
 
-def test_parts_that_are_to_stay_rigid_do(kit: Kit) -> None:
+def test_rigid_parts_keep_their_size(kit: Kit) -> None:
     """Rails are squeezed and a knot between them is not: it comes to stand in them, which is seen; a bar alone stays
     out."""
     line, found = found_in(kit, most=1.6, rigid=("knot", "bar"))
