@@ -35,7 +35,7 @@ Poses in a GLB are 32-bit numbers.
 
 
 def geometry_faults(kit: Kit, members: Mapping[str, bytes]) -> list[str]:
-    """Return the faults of the sample with these members; empty if there are none.
+    """Return the faults of the sample with these members.
 
     Contacts equal the record's. Every neighbourhood is in the grammar. Every pair in contact was observed. No pair of
     parts reaches deeper into each other than pairs of its types in the exemplars; a stretched part may reach
@@ -51,7 +51,7 @@ def geometry_faults(kit: Kit, members: Mapping[str, bytes]) -> list[str]:
 
 
 def assembly_faults(kit: Kit, assembly: Assembly, upright: bool = True) -> list[str]:
-    """Return the faults of an assembly that is in no file yet; empty if there are none.
+    """Return the faults of an assembly that is in no file yet.
 
     Checks what `geometry_faults` checks. In addition, the assembly is connected, each contact is a docking of the kit,
     and, if it must be `upright`, each part stands as one of its type stood in an exemplar.

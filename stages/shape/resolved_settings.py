@@ -20,4 +20,4 @@ FALLBACK_STABLE_KEY = "proportions.require.stable"
 def resolved_settings(plan: Plan, kit: str) -> Mapping[str, Any]:
     """Return the settings resolved for a kit, by key; empty for a stated kit and before the kit is built."""
     summary = plan.summary("exemplars", kit)
-    return {} if summary is None else dict(summary["resolved"])
+    return dict(summary["resolved"]) if summary else {}

@@ -90,10 +90,11 @@ class DockingTable:
         self._fit_poses.setdefault((docking.a, docking.b), []).append(docking.pose)
 
     def fit(self, a: int, b: int, pose: FloatArray) -> tuple[int, int] | None:
-        """Return the directed labels of an unobserved docking that holds for a part of type `b` at `pose` (4, 4).
+        """Return the directed labels of an unobserved docking that holds for a part of type `b` at `pose` (4, 4), or
+        None.
 
-        The labels are as seen from the part of type `a` and from the other. The docking nearest by its slack is taken;
-        None if there is none. Both sides give the same answer.
+        The labels are as seen from the part of type `a` and from the other. The docking nearest by its slack is taken.
+        Both sides give the same answer.
         """
         forward = [(gap, index, 0) for gap, index in self._nearest_fit(a, b, pose)]
         backward = [(gap, index, 1) for gap, index in self._nearest_fit(b, a, invert(pose))]

@@ -105,7 +105,7 @@ def _arc_classes(m: int, labels: IntArray | None) -> tuple[Indices, Indices, int
 def _settle(order: Indices, start: Indices, pairs: Indices, forward: Indices, backward: Indices) -> Indices:
     """Return `order` with the nodes inside each cell in canonical order too.
 
-    If a cell is connected to all of another cell alike, or to none of it, that relation does not tell nodes apart. So
+    If a cell is connected to another cell completely, or not, that relation does not tell nodes apart. So
     BLISS sees only the other relations, and only their nodes.
     """
     n = len(order)

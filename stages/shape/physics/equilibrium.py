@@ -36,8 +36,8 @@ BORNE_TOLERANCE = 1e-5
 class LoadLimits:
     """How far loads can grow.
 
-    factors: greatest factor up to the cap with equilibrium, float64 (loads,); all -1 if there is none even at 0, or no
-        solver finds one
+    factors: greatest factor up to the cap with equilibrium, float64 (loads,); all -1 without equilibrium even at 0, or
+        if no solver finds one
     motions: how each body begins to move when the load grows beyond that, displacement of its centre and turn, float64
         (loads, n, 6); 0 if the cap was reached
     """

@@ -183,7 +183,7 @@ def _azimuth(placed: PlacedParts) -> float:
 
 
 def _pushes(weights: FloatArray, azimuth: float, glued: bool) -> FloatArray:
-    """Return the loads of which a stable shape bears a share, float64 (loads, n, 6), lengths in diagonals.
+    """Return the loads that a stable shape bears in part, float64 (loads, n, 6), lengths in diagonals.
 
     Each part is pushed by its weight in eight level directions and twisted both ways about the vertical. If joints bear
     limited pull, each is also pushed up and down; without glue that only changes gravity.

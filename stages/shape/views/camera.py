@@ -48,7 +48,7 @@ class Camera:
     fov: full angle of the shorter image side, degrees
     distance: from the eye to the middle of the shape in radii of its bounding sphere, at least 1.05; None moves the eye
         and centres the shape so that it fills the frame
-    margin: share of the frame left free on each side if `distance` is None
+    margin: share of the frame left free on each side if `distance` is not set
     """
 
     azimuth: float

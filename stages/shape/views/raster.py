@@ -50,7 +50,7 @@ def raster(screen: FloatArray, width: int, height: int) -> IntArray:
 
     screen: corners of triangles in pixels and clip depth (see `stages/shape/views/screen.py`), float64 (t, 3, 3)
 
-    A triangle is seen from both sides, and not at all if it has no area on the grid. Raises ValueError for corners that
+    A triangle is seen from both sides, unless it has no area on the grid. Raises ValueError for corners that
     are not finite, or too far outside of the picture.
     """
     farthest = float(np.abs(screen[:, :, :2]).max(initial=1.0))

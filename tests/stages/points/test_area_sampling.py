@@ -74,7 +74,7 @@ def test_faces_of_zero_area_are_never_hit(order: list[int]) -> None:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]], dtype=float)
     faces = np.array([[0, 1, 2], [0, 1, 3], [1, 3, 2], [2, 2, 2]], dtype=np.int32)[order]
     _, normals, hit = sample_surface(vertices, faces, 5_000, np.random.default_rng(3))
-    assert {order[each] for each in np.unique(hit)} == {0, 2}
+    assert {order[face] for face in np.unique(hit)} == {0, 2}
     assert np.allclose(np.linalg.norm(normals, axis=1), 1.0)
 
 
@@ -97,7 +97,7 @@ def test_every_point_lies_on_the_part_that_its_labels_name(seed: int, parts: int
     types = [part_type(f"soup{count}", *soup(rng, count)) for count in (1, 4, 7)]
     poses = np.stack([rotation(rng) for _ in range(parts)])
     assembly = Assembly(rng.integers(0, 3, parts).astype(np.int16), poses, np.empty((0, 2), dtype=np.int32))
-    cloud = sample_shape(Shape(tuple(types), assembly, "y", tuple(each.name for each in types)), 200, rng)
+    cloud = sample_shape(Shape(tuple(types), assembly, "y", tuple(kind.name for kind in types)), 200, rng)
     assert cloud.labels.dtype == cloud.instances.dtype == np.int16
     assert (cloud.labels == assembly.types[cloud.instances]).all()
     for instance in np.unique(cloud.instances):
@@ -125,7 +125,7 @@ def test_parts_of_an_assembly_are_hit_in_the_ratio_of_their_areas() -> None:
         assert binomtest(int((cloud.instances == part).sum()), 45_000, share).pvalue > 1e-4
 
 
-def test_a_table_of_several_meshes_knows_the_area_of_each() -> None:
+def test_table_of_several_meshes_holds_their_areas() -> None:
     two = surface_table([(TRIANGLE, np.array([[0, 0, 1], [0, 1, 2]])), (TRIANGLE * 2, np.array([[2, 1, 0]]))])
     assert two.area.tolist() == [4.0, 16.0]
     assert two.reach.tolist() == [0.0, 4.0, 16.0]

@@ -59,7 +59,7 @@ def test_points_that_cannot_be_seen_are_found() -> None:
     (fault,) = AUDIT.faults(replace(every, record=claimed))
     count, _, rest = fault.partition(" ")
     assert rest == "of its 80 points cannot be seen from outside"
-    # What stands nearly edge-on to all who see it is left out of clouds, and no fault.
+    # Surfaces seen only nearly edge-on are left out of clouds, which is not a fault.
     assert (in_box | in_drum).sum() <= int(count) <= hidden.sum()
 
 
@@ -77,13 +77,13 @@ def at_first(value: Any) -> Callable[[np.ndarray], np.ndarray]:
     [
         ("points.npy", lambda points: points + np.float32(5), "80 of its 80 points are not on the surface"),
         ("points.npy", at_first(50.0), "1 of its 80 points are not on the surface"),
-        ("points.npy", lambda points: points[1:], "other lengths"),
+        ("points.npy", lambda points: points[1:], "lengths of its point arrays differ"),
         ("normals.npy", lambda normals: -normals, "80 of its 80 normals are not those of their part"),
         ("normals.npy", lambda normals: np.concatenate([-normals[:1], normals[1:]]), "1 of its 80 normals"),
         ("normals.npy", lambda normals: normals * np.float32(1.01), "unit length"),
         ("labels.npy", lambda labels: labels - np.int16(1), "not the classes of their parts"),
-        ("instances.npy", at_first(3), "not there"),
-        ("instances.npy", at_first(-1), "not there"),
+        ("instances.npy", at_first(3), "do not exist"),
+        ("instances.npy", at_first(-1), "do not exist"),
     ],
 )
 def test_damaged_points_are_found(member: str, change: Callable[[np.ndarray], np.ndarray], found: str) -> None:

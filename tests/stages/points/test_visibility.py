@@ -1,4 +1,4 @@
-"""What a scanner sees of a shape, beside brute force, and clouds of nothing else."""
+"""Visible points against brute force, and clouds of visible points only."""
 
 from __future__ import annotations
 

@@ -10,8 +10,8 @@ from tests.stages.proportions.stools import lattice
 
 
 def wide(factor: float) -> Warp:
-    """The stool, so many times as wide."""
-    x, y, z = (np.ones(len(each)) for each in lattice().lengths)
+    """Return the warp that widens the stool by a factor."""
+    x, y, z = (np.ones(len(lengths)) for lengths in lattice().lengths)
     return factor * x, y, z
 
 
@@ -31,7 +31,7 @@ def test_what_is_nearly_the_exemplar_or_another_is_not_new() -> None:
     assert not drawn.is_new(wide(1.52))
     assert drawn.is_new(wide(2.5))
     assert not DistinctWarps(lattice(), 0.05).is_new(
-        tuple(2 * each for each in wide(1.0))
+        tuple(2 * factors for factors in wide(1.0))
     )  # at equal size it is the same
 
 

@@ -1,4 +1,4 @@
-"""Exemplars in other proportions through the real mill, with any number of workers, to a verified dataset."""
+"""Exemplars in other proportions through the whole pipeline, with any number of workers, to a verified dataset."""
 
 from __future__ import annotations
 
@@ -43,6 +43,10 @@ def run(config: Path, out: Path, *stages: str, workers: int = 1) -> str:
     return printed
 
 
+def texts(made: list[Sample]) -> list[tuple[str, str]]:
+    return [(sample.key, sample.text) for sample in made]
+
+
 def samples(out: Path) -> list[Sample]:
     shards = sorted((out / ".work" / "stools" / "proportions").glob("stools-*-0*.tar"))
     return [sample for shard in shards for sample in read_samples(shard)]
@@ -54,11 +58,11 @@ def test_a_dataset_of_stools_goes_the_whole_way_and_is_the_same_with_two_workers
     said = run(config, tmp_path / "one", *STAGES)
     assert "stool: 9 of 9 shapes; rejected: none" in said
     found = samples(tmp_path / "one")
-    assert len({each.key for each in found}) == len({each.text for each in found}) == 9
-    assert {each.split for each in found} == {"train", "val", "test"}
-    assert {json.loads(each.text)["exemplar"] for each in found} == {"stool0", "stool1"}, "exemplars take turns"
+    assert len({sample.key for sample in found}) == len({sample.text for sample in found}) == 9
+    assert {sample.split for sample in found} == {"train", "val", "test"}
+    assert {json.loads(sample.text)["exemplar"] for sample in found} == {"stool0", "stool1"}, "exemplars take turns"
     run(config, tmp_path / "two", *STAGES, workers=2)
-    assert [(each.key, each.text) for each in samples(tmp_path / "two")] == [(each.key, each.text) for each in found]
+    assert texts(samples(tmp_path / "two")) == texts(found)
     run(config, tmp_path / "one", "validity", "abstraction", "strings", "points", "sketches", "package")
     code, said = shapemill("verify", "--config", config, "--out", tmp_path / "one")
     assert code == 0, said

@@ -30,10 +30,10 @@ def test_knots_are_the_ends_of_parts() -> None:
 
 
 def test_factors_of_one_leave_the_exemplar_as_it_is() -> None:
-    same = warped(kit(), whole(), lattice(), [np.ones(len(each)) for each in lattice().lengths])
+    same = warped(kit(), whole(), lattice(), [np.ones(len(lengths)) for lengths in lattice().lengths])
     np.testing.assert_allclose(boxes(same), world_boxes(kit().types, whole().types, whole().poses), atol=1e-9)
     assert same.labels == kit().labels
-    assert [mesh.label for mesh in same.meshes] == [kit().types[each].label for each in whole().types]
+    assert [mesh.label for mesh in same.meshes] == [kit().types[kind].label for kind in whole().types]
     assert len(set(same.part_names)) == len(whole())
 
 
@@ -68,7 +68,7 @@ def post_widths(shape: Shape, part: int) -> tuple[float, float]:
 
 def test_the_bar_of_a_frame_stays_beside_the_board_that_lies_on_it() -> None:
     """A part is moved a vertex at a time: as a whole the frame would take its bar elsewhere."""
-    factors = [np.ones(len(each)) for each in lattice().lengths]
+    factors = [np.ones(len(lengths)) for lengths in lattice().lengths]
     factors[1][0] = 2.0
     shape = warped(kit(), whole(), lattice(), factors)
     frame, board = (int(np.flatnonzero(whole().types == kit().labels.index(name))[0]) for name in ("frame", "board"))
@@ -80,19 +80,19 @@ def test_factors_stay_within_their_bounds_and_signatures_know_no_size() -> None:
     for seed in range(20):
         for factors in lattice().draw(np.random.default_rng(seed), 1.0, 1.5):
             assert ((factors >= np.round(1 / 1.5, 3)) & (factors <= 1.5)).all()
-    twice = [np.full(len(each), 2.0) for each in lattice().lengths]
-    once = [np.ones(len(each)) for each in lattice().lengths]
+    twice = [np.full(len(lengths), 2.0) for lengths in lattice().lengths]
+    once = [np.ones(len(lengths)) for lengths in lattice().lengths]
     np.testing.assert_allclose(lattice().signature(twice), lattice().signature(once), atol=1e-9)
 
 
 @pytest.mark.parametrize("wrong", [[1.0], [1.0, -1.0, 1.0], [1.0, np.nan, 1.0]])
 def test_factors_of_another_lattice_are_refused(wrong: list[float]) -> None:
-    factors = [np.array(wrong), *(np.ones(len(each)) for each in lattice().lengths[1:])]
+    factors = [np.array(wrong), *(np.ones(len(lengths)) for lengths in lattice().lengths[1:])]
     with pytest.raises(ValueError, match="axis x has 3 intervals and needs one positive factor for each"):
         warped(kit(), whole(), lattice(), factors)
 
 
-def test_a_shape_that_came_apart_is_told() -> None:
+def test_shape_with_lost_contacts_is_rejected() -> None:
     shape = drawn(0)
     top = int(np.flatnonzero(whole().types == kit().labels.index("top"))[0])
     shape.assembly.poses[top, 1, 3] += 0.2

@@ -40,9 +40,9 @@ def test_exemplars_have_no_faults(kit: Kit) -> None:
 def test_a_contact_that_is_not_recorded_is_named(kit: Kit) -> None:
     whole = kit.exemplars[0].assembly
     found = faults(kit, Assembly(whole.types, whole.poses, whole.edges[1:]))
-    first, second = (kit_shape(kit, whole).part_names[each] for each in whole.edges[0])
-    assert any(f"{first} and {second} touch and are not recorded" in each for each in found)
-    assert any("neighbourhood that the grammar does not admit" in each for each in found)
+    first, second = (kit_shape(kit, whole).part_names[part] for part in whole.edges[0])
+    assert any(f"{first} and {second} touch and are not recorded" in fault for fault in found)
+    assert any("neighbourhood that the grammar does not admit" in fault for fault in found)
 
 
 def test_a_contact_that_counts_as_seen_from_one_part_alone_may_be_recorded_or_not() -> None:
@@ -63,7 +63,7 @@ def test_a_contact_that_counts_as_seen_from_one_part_alone_may_be_recorded_or_no
     types, poses = np.array([corner, corner], dtype=np.int16), np.stack([np.eye(4), aslant])
     for placed in (poses, poses[::-1]):
         found = assembly_faults(kit, Assembly(types, placed, np.empty((0, 2), dtype=np.int32)))
-        assert not any("touch and are not recorded" in each for each in found)
+        assert not any("touch and are not recorded" in fault for fault in found)
 
 
 def test_a_recorded_contact_that_is_none_is_named(kit: Kit) -> None:
@@ -71,10 +71,10 @@ def test_a_recorded_contact_that_is_none_is_named(kit: Kit) -> None:
     poses = whole.poses.copy()
     poses[2, 1, 3] += 3.0
     found = faults(kit, Assembly(whole.types, poses, whole.edges))
-    assert sum("are recorded as neighbours and do not touch" in each for each in found) == 2
+    assert sum("are recorded as neighbours and do not touch" in fault for fault in found) == 2
 
 
-def test_parts_that_reach_into_each_other_deeper_than_in_the_exemplars_are_named(kit: Kit) -> None:
+def test_parts_that_penetrate_deeper_than_in_exemplars_are_named(kit: Kit) -> None:
     whole = kit.exemplars[0].assembly
     names = kit_shape(kit, whole).part_names
     i, j = whole.edges[0].tolist()
@@ -83,7 +83,7 @@ def test_parts_that_reach_into_each_other_deeper_than_in_the_exemplars_are_named
     poses[j, :3, 3] += 0.3 * towards / np.linalg.norm(towards)
     found = faults(kit, Assembly(whole.types, poses, whole.edges))
     pair = {names[i], names[j]}
-    assert any("into each other" in each and all(name in each for name in pair) for each in found)
+    assert any("into each other" in fault and all(name in fault for name in pair) for fault in found)
 
 
 def test_a_part_inside_another_is_named(kit: Kit) -> None:
@@ -91,7 +91,7 @@ def test_a_part_inside_another_is_named(kit: Kit) -> None:
     types = np.append(whole.types, whole.types[3]).astype(np.int16)
     poses = np.concatenate([whole.poses, whole.poses[3:4]])
     found = faults(kit, Assembly(types, poses, whole.edges))
-    assert any("touch and are not recorded" in each for each in found)
+    assert any("touch and are not recorded" in fault for fault in found)
 
 
 def test_an_assembly_in_memory_is_looked_at_in_the_same_way(kit: Kit) -> None:
@@ -99,7 +99,7 @@ def test_an_assembly_in_memory_is_looked_at_in_the_same_way(kit: Kit) -> None:
         assert assembly_faults(kit, exemplar.assembly) == []
     whole = kit.exemplars[0].assembly
     fewer = assembly_faults(kit, Assembly(whole.types, whole.poses, whole.edges[1:]))
-    assert any("touch and are not recorded" in each for each in fewer)
+    assert any("touch and are not recorded" in fault for fault in fewer)
 
 
 def test_an_assembly_upside_down_stands_as_no_exemplar_does(kit: Kit) -> None:
@@ -108,7 +108,7 @@ def test_an_assembly_upside_down_stands_as_no_exemplar_does(kit: Kit) -> None:
     turned = Assembly(whole.types, over @ whole.poses, whole.edges)
     found = assembly_faults(kit, turned)
     assert len(found) == len(whole)
-    assert all("stands as no exemplar shows" in each for each in found)
+    assert all("stands as no exemplar shows" in fault for fault in found)
     assert assembly_faults(kit, turned, upright=False) == []
 
 
@@ -128,4 +128,4 @@ def test_a_contact_that_is_no_docking_is_named(kit: Kit) -> None:
     i, j = next((i, j) for i, j in whole.edges.tolist() if whole.types[i] == whole.types[j] == straight)
     pair = whole.select(np.array([i, j]))
     pair.poses[1, :3, 3] += 0.1 * pair.poses[0, :3, 2]
-    assert any("touch as no exemplar shows" in each for each in assembly_faults(kit, pair))
+    assert any("touch as no exemplar shows" in fault for fault in assembly_faults(kit, pair))

@@ -63,7 +63,7 @@ def test_a_kit_comes_back_as_it_was_written(tmp_path: Path) -> None:
 
 
 def test_parts_inside_others_come_back_too(tmp_path: Path) -> None:
-    parts = {**INSIDE, "beside": (CUBE, (1, 0, 0)), "under": (box(4, 4, 4), (0, 0, -2.5))}
+    parts = {**INSIDE, "aside": (CUBE, (1, 0, 0)), "under": (box(4, 4, 4), (0, 0, -2.5))}
     kit = block_kit(model(parts), disconnected="largest")
     assert_same_kit(read_back(kit, tmp_path), kit)
 
@@ -86,11 +86,11 @@ def test_a_kit_that_was_read_is_written_in_the_same_bytes(tmp_path: Path) -> Non
 def test_people_read_names_and_no_indices() -> None:
     described = json.loads(written(make_kit())[0])
     assert described == kit_json(make_kit())
-    assert [each["name"] for each in described["types"]] == ["cube_0", "slab"]
-    assert [each["symmetries"] for each in described["types"]] == [24, 8]
+    assert [kind["name"] for kind in described["types"]] == ["cube_0", "slab"]
+    assert [kind["symmetries"] for kind in described["types"]] == [24, 8]
     assert described["neighbourhoods"]["slab"] == [{"neighbours": {"cube_0": 2}, "seen": 1}]
     assert described["neighbourhoods"]["cube_0"][0] == {"neighbours": {"cube_0": 3}, "seen": 4}
-    assert {(each["a"], each["b"], each["kind"]) for each in described["dockings"]} == {
+    assert {(docking["a"], docking["b"], docking["kind"]) for docking in described["dockings"]} == {
         ("cube_0", "cube_0", "face"),
         ("cube_0", "cube_0", "line"),
         ("cube_0", "slab", "face"),

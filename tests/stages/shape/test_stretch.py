@@ -1,4 +1,4 @@
-"""Stretched parts: carried beside the pose, drawn as meshes of their own, said in one matrix of the record."""
+"""Stretched parts: stored with the pose, drawn as meshes of their own, and one matrix in the record."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ def test_what_is_rigid_stays_as_it_is(kit: Kit) -> None:
 def test_a_stretched_part_has_a_mesh_of_its_own_and_its_label(kit: Kit) -> None:
     assembly = longer(kit)
     shape = kit_shape(kit, assembly)
-    labels = [kit.labels[each] for each in kit.label_of[assembly.types]]
-    assert [shape.labels[each] for each in shape.part_labels] == labels
+    labels = [kit.labels[label] for label in kit.label_of[assembly.types]]
+    assert [shape.labels[label] for label in shape.part_labels] == labels
     assert sorted(shape.part_names) == ["bar.000", "foot.000"]
     assert shape.is_stretched
     assert np.ptp(shape_bounds(shape)[:, 0]) == pytest.approx(1.5 * 5 / np.sqrt(2))
@@ -78,7 +78,7 @@ def test_samples_carry_stretches_where_there_are_any(kit: Kit, tmp_path: Path) -
     with (tmp_path / "shard.tar").open("wb") as stream, ShardWriter(stream) as writer:
         for number, assembly in enumerate(made):
             write_sample(writer, Sample(f"k-{number}", "train", "variations", "toy", "00", {}, assembly))
-    rigid, bent = (each.assembly for each in read_samples(tmp_path / "shard.tar"))
+    rigid, bent = (sample.assembly for sample in read_samples(tmp_path / "shard.tar"))
     assert rigid.stretches is None
     np.testing.assert_array_equal(bent.placements, made[1].placements)
     np.testing.assert_array_equal(bent.select(np.array([1])).placements, made[1].placements[1:])

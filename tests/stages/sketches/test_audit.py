@@ -16,13 +16,13 @@ from stages.sketches.image import png_array, png_bytes
 from stages.sketches.settings import Augmentation
 from tests.stages.sketches.test_cameras import VIEWS, lopsided, sketch
 
-WIDE = 1.8
+LINE_WIDTH_PIXELS = 1.8
 """Width of the widest line that `StrokeOptions` draws when nobody asks for another; pixels."""
 
 
 def sample(view: str = "perspective", chances: Augmentation | None = None) -> PackagedSample:
     drawn = sketch(view, "z", chances)
-    camera = {"view": view, **drawn.camera, "line_width": WIDE + drawn.thicker}
+    camera = {"view": view, **drawn.camera, "line_width": LINE_WIDTH_PIXELS + drawn.thicker}
     record = {"bounds": shape_bounds(lopsided("z")).tolist(), "sketches": [camera]}
     return PackagedSample("a", record, {"sketch0.png": png_bytes(drawn.pixels)}, {}, lopsided("z"), {})
 
@@ -49,13 +49,13 @@ def test_a_good_drawing_has_no_faults(view: str, chances: Augmentation | None) -
         (lambda good: redrawn(good, lambda pixels: np.full_like(pixels, 255)), "blank"),
         (lambda good: redrawn(good, np.zeros_like), "full"),
         (lambda good: redrawn(good, lambda pixels: 255 - pixels), "full|beyond"),
-        (lambda good: redrawn(good, lambda pixels: pixels[1:]), "not those that its record says"),
+        (lambda good: redrawn(good, lambda pixels: pixels[1:]), "not those of its record"),
         (lambda good: redrawn(good, lambda pixels: np.roll(pixels, 6, axis=1)), "beyond"),
         (lambda good: redrawn(good, lambda pixels: np.where(np.eye(len(pixels), dtype=bool), 0, pixels)), "beyond"),
         (lambda good: replace(good, members={"sketch0.png": b"no image"}), "cannot be read"),
         (lambda good: replace(good, members={"sketch0.png": good.members["sketch0.png"][:-40]}), "be read"),
-        (lambda good: recorded(good, world_to_camera=(2 * np.eye(4)).tolist()), "no rigid motion"),
-        (lambda good: recorded(good, flipped=True), "do not say the same"),
+        (lambda good: recorded(good, world_to_camera=(2 * np.eye(4)).tolist()), "not a rigid transform"),
+        (lambda good: recorded(good, flipped=True), "contradict flipped"),
         (lambda good: recorded(good, world_to_camera=np.eye(4).tolist(), projection="orthographic"), "beyond"),
     ],
 )

@@ -23,8 +23,8 @@ from stages.sketches.image import augment
 from stages.sketches.settings import Augmentation, SketchView, StrokeOptions
 from tests.stages.shape.views.solids import box, cylinder, kit_of, part_type
 
-SIZE = 160
-NEAR = 1.5
+IMAGE_PIXELS = 160
+MAX_PIXEL_GAP = 1.5
 """Pixels."""
 VIEWS = {
     "perspective": SketchView(azimuth=-40.0, elevation=25.0),
@@ -69,9 +69,9 @@ class Sketch:
 def sketch(view: str, up: str = "y", chances: Augmentation | None = None) -> Sketch:
     shape, rng = lopsided(up), np.random.default_rng(3)
     camera = jittered_camera(VIEWS[view], rng)
-    drawing, seen = draw_sketch(scene_of(shape), camera, SIZE, 2, StrokeOptions(), "raster")
+    drawing, seen = draw_sketch(scene_of(shape), camera, IMAGE_PIXELS, 2, StrokeOptions(), "raster")
     drawing, flipped, thicker = augment(drawing, chances or Augmentation(), rng)
-    described = json.loads(json.dumps(camera_fields(seen, SIZE, flipped)))
+    described = json.loads(json.dumps(camera_fields(seen, IMAGE_PIXELS, flipped)))
     return Sketch(drawing, described, glb_bytes(shape), thicker)
 
 
@@ -109,15 +109,15 @@ def misses(sketch: Sketch, camera: dict[str, Any]) -> list[str]:
         return ["behind the camera"]
     grown = sketch.thicker / 2
     found = []
-    strayed = cKDTree(edges).query(ink)[0] > NEAR + grown * np.sqrt(2)  # what is dilated is a square
+    strayed = cKDTree(edges).query(ink)[0] > MAX_PIXEL_GAP + grown * np.sqrt(2)  # what is dilated is a square
     if strayed.mean() > 0.002:
         found.append(f"{strayed.mean():.1%} of the ink on no edge")
     hull = edges[ConvexHull(edges).vertices]
-    bare = cKDTree(ink).query(hull)[0] > NEAR
+    bare = cKDTree(ink).query(hull)[0] > MAX_PIXEL_GAP
     if bare.any():
         found.append(f"{bare.mean():.1%} of the outermost corners without ink")
     boxes = np.stack([edges.min(axis=0), edges.max(axis=0)]), np.stack([ink.min(axis=0), ink.max(axis=0)])
-    if np.abs(boxes[0] - boxes[1]).max() > NEAR + grown:
+    if np.abs(boxes[0] - boxes[1]).max() > MAX_PIXEL_GAP + grown:
         found.append("another box")
     if np.abs(boxes[0].mean(axis=0) - boxes[1].mean(axis=0)).max() > 0.5:
         found.append("another middle")
@@ -190,4 +190,4 @@ def test_what_is_behind_a_camera_is_not_seen() -> None:
     pose = np.array(camera["world_to_camera"])
     eye, ahead = -pose[:3, :3].T @ pose[:3, 3], pose[2, :3]
     assert np.isnan(projected(camera, (eye - ahead)[None])).all()
-    np.testing.assert_allclose(projected(camera, (eye + ahead)[None]), [[SIZE / 2, SIZE / 2]])
+    np.testing.assert_allclose(projected(camera, (eye + ahead)[None]), [[IMAGE_PIXELS / 2, IMAGE_PIXELS / 2]])

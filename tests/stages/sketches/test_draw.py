@@ -25,9 +25,9 @@ print(hashlib.sha256(drawing("raster").tobytes()).hexdigest())
 """
 
 
-def drawing(backend):
+def drawing(renderer):
     scene = boxes_scene([(0, 0, 0), (1, 0.2, 0), (0, 1, 0)], edges=[(0, 1), (0, 2)])
-    return draw_sketch(scene, CORNER, 96, 2, StrokeOptions(), backend)[0]
+    return draw_sketch(scene, CORNER, 96, 2, StrokeOptions(), renderer)[0]
 
 
 def test_a_drawing_is_dark_lines_on_white():
@@ -46,12 +46,12 @@ def test_another_process_draws_the_same_bytes():
 
 @pytest.mark.egl
 @pytest.mark.parametrize("shape", ["blocks", "a05_manor_house"])
-def test_both_backends_draw_the_same_picture(shape):
+def test_both_renderers_draw_the_same_picture(shape):
     if shape == "blocks":
         one, two = drawing("egl"), drawing("raster")
     else:
         scene = exemplar_scene(shape)
-        one, two = (draw_sketch(scene, CORNER, 224, 2, StrokeOptions(), backend)[0] for backend in ("egl", "raster"))
+        one, two = (draw_sketch(scene, CORNER, 224, 2, StrokeOptions(), renderer)[0] for renderer in ("egl", "raster"))
     assert (np.abs(one.astype(int) - two) <= 16).mean() > 0.99
 
 

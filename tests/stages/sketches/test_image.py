@@ -56,8 +56,8 @@ def test_augmentations_come_with_their_probabilities():
     drawing[4, 1] = 0
     chances = Augmentation(flip=0.5, dilate=0.25, erode=0.25)
     made = [augment(drawing, chances, np.random.default_rng(seed)).drawing for seed in range(400)]
-    flipped = np.mean([(each[:, 5:] < 255).any() for each in made if each.min() < 255])
-    dark = np.array([(each < 255).sum() for each in made])
+    flipped = np.mean([(drawing[:, 5:] < 255).any() for drawing in made if drawing.min() < 255])
+    dark = np.array([(drawing < 255).sum() for drawing in made])
     assert abs(flipped - 0.5) < 0.1
     assert abs((dark == 9).mean() - 0.25) < 0.08
     assert abs((dark == 0).mean() - 0.25) < 0.08

@@ -1,4 +1,4 @@
-"""The stage on the real mill, behind two small stages that make a kit and a collection."""
+"""The stage in the real pipeline, after two small stages that make a kit and a collection."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[str,
     return made(tmp_path_factory.mktemp("plain"))
 
 
-def test_each_sample_gets_one_drawing_a_view(plain):
+def test_every_sample_gets_one_drawing_per_view(plain):
     assert [key for key, _ in plain["toys-train-000000"]] == ["train-0", "train-1", "train-2"]
     for samples in plain.values():
         for _, members in samples:
@@ -126,7 +126,7 @@ def test_the_same_config_gives_the_same_bytes(tmp_path):
     assert first != second
 
 
-def test_where_the_backend_of_the_config_cannot_draw_nothing_starts(tmp_path, monkeypatch):
+def test_run_does_not_start_if_the_renderer_cannot_draw(tmp_path, monkeypatch):
     (tmp_path / "pyrender.py").write_text("raise ImportError('libXrender.so.1: cannot open shared object file')\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     check_in_subprocess.cache_clear()
@@ -141,7 +141,7 @@ def test_where_the_backend_of_the_config_cannot_draw_nothing_starts(tmp_path, mo
 def test_the_records_and_the_report_say_what_drew(tmp_path):
     turn(tmp_path)
     records = [json.loads(path.read_bytes()) for path in tmp_path.rglob("sketches/records/*.json")]
-    drawn = {(each["summary"]["renderer"], each["summary"]["renderer_version"]) for each in records}
+    drawn = {(record["summary"]["renderer"], record["summary"]["renderer_version"]) for record in records}
     assert len(records) == 2
     assert drawn == {("raster", RasterRenderer.name)}
     status = list(status_lines(toys(), STAGES, DatasetPaths(tmp_path, "toys"), workers=1))

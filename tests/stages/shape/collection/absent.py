@@ -23,14 +23,14 @@ ABSENT_SECTIONS: Mapping[str, StrictModel] = {name: NothingConfig() for name in 
 
 
 def named_inputs(stages: Iterable[Stage]) -> dict[str, Stage]:
-    """The stages by name, with all inputs by name, as the mill finds them; of those that may be, the ones that are."""
+    """Return the stages by name with all their inputs by name, as the pipeline discovers them."""
     known = {stage.name: stage for stage in stages}
     meant = {"*/producer.py": tuple(producers()), "*/members.py": tuple(members())}
     return {
         name: replace(
             stage,
             inputs=tuple(
-                each for asked in stage.inputs for each in meant.get(asked, (asked,)) if asked == each or each in known
+                name for asked in stage.inputs for name in meant.get(asked, (asked,)) if asked == name or name in known
             ),
         )
         for name, stage in known.items()

@@ -109,17 +109,17 @@ def test_the_card_explains_every_parameter(made: tuple[Path, tuple[str, ...]]) -
 
 
 def test_verify_sees_a_surface_that_the_text_does_not_make(made: tuple[Path, tuple[str, ...]]) -> None:
-    samples, anew = samples_of(made[0]), {"program": LANGUAGE.rebuild(DatasetPaths(made[0], "toy"))}
+    samples, rebuild = samples_of(made[0]), {"program": LANGUAGE.rebuild(DatasetPaths(made[0], "toy"))}
     manifest = json.loads((made[0] / "toy" / "manifest.json").read_text())
     key, members = next(iter(samples.items()))
-    other = next(each for each in samples.values() if each["txt"] != members["txt"])
+    other = next(sample for sample in samples.values() if sample["txt"] != members["txt"])
 
     def faults(members: dict[str, bytes]) -> list[str]:
         record = read_record(members["json"])
-        return list(sample_faults(read_packaged(key, record, members, anew, manifest["config"])))
+        return list(sample_faults(read_packaged(key, record, members, rebuild, manifest["config"])))
 
     assert faults(members) == []
-    assert any("another surface in its glb" in each for each in faults({**members, "glb": other["glb"]}))
+    assert any("another surface in its glb" in fault for fault in faults({**members, "glb": other["glb"]}))
     assert faults({**members, "txt": other["txt"]}) == ["its txt and its json hold different texts"]
 
 
@@ -136,7 +136,7 @@ def test_records_index_card_and_table_say_the_same_of_physics(made: tuple[Path, 
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     row = next(line for line in done.stdout.splitlines() if line.startswith("| tests.stages.programs.stool"))
-    columns = [each.strip() for each in row.strip("|").split("|")]
+    columns = [cell.strip() for cell in row.strip("|").split("|")]
     assert float(columns[4]) == pytest.approx(share, abs=0.1)
     assert {path.suffix for path in (made[0] / "toy-eval").iterdir()} == {".html", ".md", ".csv", ".tex"}
 

@@ -24,7 +24,7 @@ from tests.stages.shape.geometry.bodies import (
     sphere,
 )
 
-TOLERANCE = 1e-3
+CONTACT_TOLERANCE = 1e-3
 """Of bodies about one unit large."""
 
 
@@ -33,7 +33,7 @@ def turned(axis: str, degrees: float) -> FloatArray:
     return matrix
 
 
-def kind_of(one: Body, other: Body, pose: FloatArray, tolerance: float = TOLERANCE) -> ContactKind | None:
+def kind_of(one: Body, other: Body, pose: FloatArray, tolerance: float = CONTACT_TOLERANCE) -> ContactKind | None:
     """The kind of contact; the same whichever part asks, and however the meshes stand in their own coordinates."""
     kind = ContactTest([part(one), part(other)], tolerance).kind(0, 1, pose)
     assert ContactTest([part(one), part(other)], tolerance).kind(1, 0, invert(pose)) == kind
@@ -41,7 +41,7 @@ def kind_of(one: Body, other: Body, pose: FloatArray, tolerance: float = TOLERAN
     for _ in range(4):
         first, second = placed(rotation=random_rotation(rng)), placed(rotation=random_rotation(rng))
         meshes = [(v @ m[:3, :3].T, f) for (v, f), m in ((one, first), (other, second))]
-        found = ContactTest([part(each) for each in meshes], tolerance).kind(0, 1, first @ pose @ invert(second))
+        found = ContactTest([part(mesh) for mesh in meshes], tolerance).kind(0, 1, first @ pose @ invert(second))
         assert found == kind, "the kind depends on the axes of the mesh"
     return kind
 
@@ -63,14 +63,14 @@ class TestBoxes:
         assert kind_of(box(), box(), placed(1, 1, 1)) == "point"
         assert kind_of(box(), box(), placed(-1, 1, 1)) == "point"
 
-    def test_they_reach_into_each_other(self) -> None:
+    def test_penetrating_meshes_are_in_contact(self) -> None:
         assert kind_of(box(), box(), placed(0.5, 0, 0)) == "face"
         assert kind_of(box(), box(), placed(0.5, 0.4, -0.3)) == "face"
         assert kind_of(box(), box(), placed(0.5, 0.4, 0.3, turned("xyz", (20, 40, 60)))) == "face"
 
     def test_they_are_apart(self) -> None:
-        assert kind_of(box(), box(), placed(1 + 2 * TOLERANCE, 0, 0)) is None
-        assert kind_of(box(), box(), placed(1 + 0.9 * TOLERANCE, 0, 0)) == "face"
+        assert kind_of(box(), box(), placed(1 + 2 * CONTACT_TOLERANCE, 0, 0)) is None
+        assert kind_of(box(), box(), placed(1 + 0.9 * CONTACT_TOLERANCE, 0, 0)) == "face"
 
     @pytest.mark.parametrize("axis", ["x", "y", "z"])
     def test_an_edge_stands_on_a_face_along_a_line_however_the_pair_is_turned(self, axis: str) -> None:
@@ -101,7 +101,7 @@ class TestBoxes:
         assert kind_of(frame, box(), np.eye(4)) == "face"
 
     def test_two_rows_of_corners_are_no_face(self) -> None:
-        # A comb whose teeth end in edges: two parallel lines are as wide as a face and are none.
+        # A comb whose teeth end in edges: two parallel lines are as wide as a face and not a face.
         tooth = np.array([[0, 0, 0], [0, 1, 0], [-0.2, 0, 1], [-0.2, 1, 1], [0.2, 0, 1], [0.2, 1, 1]], dtype=float)
         faces = np.array([[0, 2, 4], [1, 5, 3], [0, 1, 3], [0, 3, 2], [0, 4, 5], [0, 5, 1], [2, 3, 5], [2, 5, 4]])
         comb = joined((tooth, faces.astype(np.int32)), (tooth + np.array([0.8, 0, 0]), faces.astype(np.int32)))
@@ -109,7 +109,7 @@ class TestBoxes:
 
 
 class TestSheets:
-    def test_they_lie_on_each_other(self) -> None:
+    def test_meshes_that_lie_flat_are_in_face_contact(self) -> None:
         assert kind_of(sheet(), sheet(), placed(0.5, 0.25, 0)) == "face"
         assert kind_of(sheet(), sheet(), np.eye(4)) == "face"
 

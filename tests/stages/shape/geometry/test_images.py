@@ -20,7 +20,7 @@ def test_equal_images_are_written_once_and_near_ones_of_one_docking_share_the_lo
     assert labels[kept].tolist() == [0, 0, 2, 5]  # 0 is near 1, of the same docking; 3 is of another
 
 
-def test_no_two_written_images_are_equal_and_each_image_has_one():
+def test_stored_images_are_distinct_and_cover_all_images():
     rng = np.random.default_rng(0)
     vectors = np.repeat(rng.normal(size=(60, 12)), 5, axis=0) + 1e-4 * rng.normal(size=(300, 12))
     kept = distinct_images(vectors, np.zeros(300, dtype=np.int32), 0.5, 0.05)

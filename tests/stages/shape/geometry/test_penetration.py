@@ -70,9 +70,7 @@ def test_no_depth_of_a_solid_exceeds_the_bound() -> None:
     ("pose", "deep"),
     [(placed(1.5, 0, 0), 0.0), (placed(0.1, 0.2, -0.1), 0.95), (placed(2.6, 0, 0), 0.0)],
 )
-def test_surfaces_that_are_apart_are_as_deep_in_each_other_as_all_their_points_say(
-    pose: np.ndarray, deep: float
-) -> None:
+def test_depth_of_separate_surfaces_equals_that_of_all_points(pose: np.ndarray, deep: float) -> None:
     test = PenetrationTest([part(box(2, 2, 2)), part(box(0.5, 0.5, 0.5))])
     assert test.depth(0, 1, pose, apart=True) == test.depth(0, 1, pose) == pytest.approx(deep, abs=1e-4)
     assert test.depth(1, 0, invert(pose), apart=True) == pytest.approx(deep, abs=1e-4)

@@ -57,7 +57,7 @@ def isomorphic(
     graphs = []
     for index, (types, edges) in enumerate((first, second)):
         graph = nx.DiGraph()
-        graph.add_nodes_from((i, {"type": int(each)}) for i, each in enumerate(types))
+        graph.add_nodes_from((i, {"type": int(kind)}) for i, kind in enumerate(types))
         seen = np.zeros_like(edges) if labels is None else labels[index]
         for (i, j), (a, b) in zip(edges.tolist(), seen.tolist(), strict=True):
             graph.add_edge(i, j, label=a)
@@ -96,16 +96,16 @@ def test_graphs_put_in_canonical_order_are_equal(name: str) -> None:
         order = canonical_order(types, edges)
         assert sorted(order.tolist()) == list(range(len(types)))
         place = np.argsort(order)
-        return types[order].tolist(), {frozenset(each) for each in place[edges].tolist()}
+        return types[order].tolist(), {frozenset(edge) for edge in place[edges].tolist()}
 
     expected = canonical(types, edges)
     assert all(canonical(*renamed(types, edges, rng)) == expected for _ in range(10))
 
 
 def test_every_graph_of_six_nodes_has_its_own_digest() -> None:
-    atlas = [each for each in nx.graph_atlas_g() if len(each) == 6]
+    atlas = [graph for graph in nx.graph_atlas_g() if len(graph) == 6]
     assert len(atlas) == 156  # the number of graphs on six nodes up to isomorphism
-    assert len({graph_digest(*arrays(each)) for each in atlas}) == 156
+    assert len({graph_digest(*arrays(graph)) for graph in atlas}) == 156
 
 
 def test_strongly_regular_graphs_with_equal_parameters_differ() -> None:
@@ -126,7 +126,7 @@ def test_strongly_regular_graphs_with_equal_parameters_differ() -> None:
 
 def test_regular_graphs_have_equal_digests_exactly_when_isomorphic() -> None:
     graphs = [arrays(nx.random_regular_graph(3, 8, seed=seed)) for seed in range(30)]
-    digests = [graph_digest(*each) for each in graphs]
+    digests = [graph_digest(*graph) for graph in graphs]
     assert 1 < len(set(digests)) < 30
     for (a, first), (b, second) in itertools.combinations(zip(digests, graphs, strict=True), 2):
         assert (a == b) == isomorphic(first, second)
@@ -206,7 +206,7 @@ def test_a_ring_that_runs_one_way_differs_from_one_that_turns() -> None:
     turning[::2] = turning[::2, ::-1]
     twice = one_way.copy()
     twice[3:] = twice[3:, ::-1]
-    digests = [docking_digest(types, edges, each) for each in (one_way, turning, twice)]
+    digests = [docking_digest(types, edges, labels) for labels in (one_way, turning, twice)]
     assert len(set(digests)) == 3
     assert docking_digest(types, edges, one_way[:, ::-1]) == digests[0]
 
@@ -225,7 +225,7 @@ def test_canonical_order_draws_no_random_number() -> None:
 
 def test_labels_are_compared_by_value() -> None:
     types, edges = arrays(nx.path_graph(2))
-    same, other = (np.array([[each, each]], dtype=np.int32) for each in (3, 4))
+    same, other = (np.array([[label, label]], dtype=np.int32) for label in (3, 4))
     assert docking_digest(types, edges, same) != docking_digest(types, edges, other)
 
 

@@ -16,7 +16,7 @@ A, B, C, D = range(4)
 
 
 def multiset(*types: int) -> Multiset:
-    return tuple((each, types.count(each)) for each in sorted(set(types)))
+    return tuple((kind, types.count(kind)) for kind in sorted(set(types)))
 
 
 def grammar(*observed: Multiset, strictness: Strictness = "multiset", hubs: tuple[int, ...] = ()) -> Grammar:
@@ -24,19 +24,19 @@ def grammar(*observed: Multiset, strictness: Strictness = "multiset", hubs: tupl
 
 
 def every(most: int, types: int = 4) -> list[Multiset]:
-    """Every neighbourhood of at most `most` parts of so many types."""
-    return [multiset(*each) for size in range(most + 1) for each in combinations_with_replacement(range(types), size)]
+    """Return every neighbourhood of at most `most` parts of `types` types."""
+    return [multiset(*kinds) for size in range(most + 1) for kinds in combinations_with_replacement(range(types), size)]
 
 
 def language(rules: Grammar, most: int = 5) -> set[Multiset]:
-    return {each for each in every(most) if admits(rules, A, each)}
+    return {neighbours for neighbours in every(most) if admits(rules, A, neighbours)}
 
 
 SEEN = (multiset(B, B, C), multiset(C, D))
 
 
 @pytest.mark.parametrize(
-    ("strictness", "beside"),
+    ("strictness", "extra"),
     [
         ("multiset", []),
         ("count_and_set", [multiset(B, C, C)]),
@@ -44,18 +44,18 @@ SEEN = (multiset(B, B, C), multiset(C, D))
             "count_and_pairs",
             [
                 *(multiset(B, C, C), multiset(C, C, D), multiset(C, D, D)),
-                *(multiset(each, each, each) for each in (B, C, D)),
+                *(multiset(kind, kind, kind) for kind in (B, C, D)),
                 *(multiset(B, C), multiset(B, B), multiset(C, C), multiset(D, D)),
             ],
         ),
         (
             "count_and_types",
-            [multiset(*each) for size in (2, 3) for each in combinations_with_replacement((B, C, D), size)],
+            [multiset(*kinds) for size in (2, 3) for kinds in combinations_with_replacement((B, C, D), size)],
         ),
     ],
 )
-def test_each_level_admits_what_was_observed_and_what_it_says(strictness: Strictness, beside: list[Multiset]) -> None:
-    assert language(grammar(*SEEN, strictness=strictness)) == {*SEEN, *beside}
+def test_levels_admit_observed_and_specified_neighbourhoods(strictness: Strictness, extra: list[Multiset]) -> None:
+    assert language(grammar(*SEEN, strictness=strictness)) == {*SEEN, *extra}
 
 
 def test_a_type_never_seen_around_and_a_part_without_neighbours_are_refused_on_every_level() -> None:
@@ -64,11 +64,11 @@ def test_a_type_never_seen_around_and_a_part_without_neighbours_are_refused_on_e
         assert not admits(rules, A, multiset(A, B, C))
         assert not admits(rules, A, ())
         assert not admits(rules, B, multiset(A))
-    assert all(admits(grammar((), strictness=each), A, ()) for each in STRICTNESS)
+    assert all(admits(grammar((), strictness=level), A, ()) for level in STRICTNESS)
 
 
 observations = st.sets(
-    st.lists(st.integers(0, 3), max_size=5).map(lambda each: multiset(*each)), min_size=1, max_size=5
+    st.lists(st.integers(0, 3), max_size=5).map(lambda kinds: multiset(*kinds)), min_size=1, max_size=5
 )
 
 
@@ -94,7 +94,7 @@ def test_fewer_neighbours_are_admitted_exactly_where_some_neighbourhood_has_them
     observed: set[Multiset], strictness: Strictness
 ) -> None:
     rules = grammar(*observed, strictness=strictness)
-    wholes = [dict(each) for each in every(6) if admits(rules, A, each)]
+    wholes = [dict(neighbours) for neighbours in every(6) if admits(rules, A, neighbours)]
     for part in every(4):
         found = any(all(whole.get(other, 0) >= count for other, count in part) for whole in wholes)
         assert admits_superset(rules, A, part) == found

@@ -15,7 +15,9 @@ PLAIN = {"cap": box(0.5, 1.0, 1.0), "link": box(1.0, 0.2, 0.6)}
 def named(kit: Kit, patterns: list[Pattern]) -> list[tuple[str, str, float]]:
     """The part in the middle, what stands around it, and how often that was seen."""
     names = kit.type_names()
-    return sorted((names[each.part_type], " ".join(names[t] for t in each.types), each.seen) for each in patterns)
+    return sorted(
+        (names[pattern.part_type], " ".join(names[t] for t in pattern.types), pattern.seen) for pattern in patterns
+    )
 
 
 def test_patterns_of_arrows_tell_their_two_ends_apart() -> None:
@@ -35,9 +37,9 @@ def test_patterns_are_one_modulo_the_symmetries_of_the_part() -> None:
 def test_a_pattern_belongs_to_the_exemplar_that_showed_it_first() -> None:
     kit = kit_of(CHAIN, [chain(1), chain(5)])
     owners = {
-        (each.owner, *seen)
-        for each in observed_patterns(kit, DockingTable.of(kit), upright=True)
-        for seen in named(kit, [each])
+        (pattern.owner, *seen)
+        for pattern in observed_patterns(kit, DockingTable.of(kit), upright=True)
+        for seen in named(kit, [pattern])
     }
     assert owners == {
         (0, "cap", "link", 2),

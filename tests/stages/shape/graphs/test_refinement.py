@@ -16,8 +16,8 @@ def coarsest(colors: list[int], arcs: list[list[tuple[int, int]]]) -> set[frozen
     current = list(colors)
     while True:
         seen = [(current[v], tuple(sorted((c, current[u]) for u, c in arcs[v]))) for v in range(len(current))]
-        names = {each: index for index, each in enumerate(sorted(set(seen)))}
-        following = [names[each] for each in seen]
+        names = {signature: index for index, signature in enumerate(sorted(set(seen)))}
+        following = [names[signature] for signature in seen]
         if len(set(following)) == len(set(current)):
             return {frozenset(v for v, c in enumerate(following) if c == name) for name in set(following)}
         current = following

@@ -24,8 +24,8 @@ BLOCKS = {"middle": with_arrow(box(1, 1, 1)), "red": box(1, 0.8, 0.8), "blue": b
 
 
 def row(left: str, right: str) -> list[Placed]:
-    beside = [(left, pose(-1, 0, 0)), (right, pose(1, 0, 0))]
-    return [("middle", pose(0, 0, 0)), *((name, at) for name, at in beside if name)]
+    neighbours = [(left, pose(-1, 0, 0)), (right, pose(1, 0, 0))]
+    return [("middle", pose(0, 0, 0)), *((name, at) for name, at in neighbours if name)]
 
 
 def built(kit: Kit, shape: list[Placed]) -> Assembly:
@@ -37,7 +37,7 @@ def built(kit: Kit, shape: list[Placed]) -> Assembly:
 
 def admitted(seen: list[tuple[str, str]], asked: tuple[str, str]) -> list[str]:
     """The levels that let the middle have `asked` to its left and right, where `seen` are all exemplars."""
-    kit = kit_of(BLOCKS, [row(*each) for each in seen])
+    kit = kit_of(BLOCKS, [row(*types) for types in seen])
     shape = built(kit, row(*asked))
     return [
         level for level in SLOT_LEVELS if 0 not in SlotGrammar(kit, DockingTable.of(kit), True, level).misfits(shape)
@@ -58,7 +58,7 @@ def test_pairs_ask_for_states_and_fillings_for_what_is_filled(asked: tuple[str, 
 
 
 @pytest.mark.parametrize(("asked", "levels"), [(("red", "red"), ["slots"]), (("", "red"), list(SLOT_LEVELS))])
-def test_slots_by_themselves_know_nothing_of_each_other(asked: tuple[str, str], levels: list[str]) -> None:
+def test_level_slots_treats_slots_independently(asked: tuple[str, str], levels: list[str]) -> None:
     assert admitted([("red", ""), ("", "red")], asked) == levels
 
 
@@ -79,7 +79,7 @@ def test_round_parts_with_too_many_images_are_seen_from_all_sides_all_the_same()
     quarter = 2 * np.pi / 256 * 37
 
     def around(start: float, angles: list[int]) -> list[Placed]:
-        turns = [trimesh.transformations.rotation_matrix(start + 2 * np.pi * each / 256, [0, 1, 0]) for each in angles]
+        turns = [trimesh.transformations.rotation_matrix(start + 2 * np.pi * step / 256, [0, 1, 0]) for step in angles]
         return [("drum", pose(0, 0, 0)), *(("red", turn @ pose(1.45, 0, 0)) for turn in turns)]
 
     seen = [0, 40, 90, 131, 170, 215]
@@ -91,11 +91,11 @@ def test_round_parts_with_too_many_images_are_seen_from_all_sides_all_the_same()
 
 
 @pytest.mark.parametrize("folder", SHIPPED[:2], ids=lambda folder: folder.name)
-def test_levels_grow_and_growth_keeps_to_each(folder: Path) -> None:
+def test_levels_are_nested_and_growth_respects_them(folder: Path) -> None:
     observed = shipped_kit(folder)
     grammars = [SlotGrammar(observed, DockingTable.of(observed), True, level) for level in SLOT_LEVELS]
     for grammar in grammars:
-        assert all(grammar.misfits(each.assembly) == [] for each in observed.exemplars)
+        assert all(grammar.misfits(exemplar.assembly) == [] for exemplar in observed.exemplars)
         assert grammar.observed_share(observed.exemplars[0].assembly) == 1.0
     for place, level in enumerate(SLOT_LEVELS):
         kit = replace(observed, grammar=replace(observed.grammar, strictness=level))
@@ -110,9 +110,9 @@ def test_levels_grow_and_growth_keeps_to_each(folder: Path) -> None:
 
 
 def test_exchange_keeps_to_slots_too() -> None:
-    observed = shipped_kit(next(each for each in SHIPPED if each.name == "castle"))
+    observed = shipped_kit(next(kit for kit in SHIPPED if kit.name == "castle"))
     kit = replace(observed, grammar=replace(observed.grammar, strictness="slot_fillings"))
     line = Search(ContactOracle(kit), SearchConfig(method="exchange"))
     found, _ = line.run(np.random.default_rng(4), 1500, 20, "test", lambda count: None)
     assert found
-    assert all(SlotGrammar(kit, DockingTable.of(kit), True).misfits(each.assembly) == [] for each in found)
+    assert all(SlotGrammar(kit, DockingTable.of(kit), True).misfits(variant.assembly) == [] for variant in found)

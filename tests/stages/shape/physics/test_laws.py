@@ -160,7 +160,7 @@ def test_less_contact_never_helps(seed: int, dropped: int) -> None:
 @given(SEEDS, st.floats(0, 2), st.floats(0, 2))
 def test_more_glue_never_hurts(seed: int, one: float, other: float) -> None:
     shape = pile(seed)
-    less, more = (judged(shape, tension=each, friction=0.5).margin for each in (min(one, other), max(one, other)))
+    less, more = (judged(shape, tension=pull, friction=0.5).margin for pull in (min(one, other), max(one, other)))
     assert more >= less - 1e-6 or more == pytest.approx(1)
 
 
@@ -232,7 +232,7 @@ def test_requirements_name_what_is_not_met() -> None:
     stands, floats = solid(box()), solid(box(), box(at=(0, 0, 9)))
     falls = solid(box(0.1, 0.1, 1), box(1, 1, 1, at=(0.5, 0, 1)))
     asked = Requirements(rooted=True, stable=True)
-    assert [unmet_requirement(asked, each) for each in (stands, floats, falls)] == [None, "not rooted", "not stable"]
+    assert [unmet_requirement(asked, shape) for shape in (stands, floats, falls)] == [None, "not rooted", "not stable"]
     assert unmet_requirement(Requirements(), floats) is None
     assert unmet_requirement(Requirements(rooted=True), falls) is None
 

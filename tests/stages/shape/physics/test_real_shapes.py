@@ -19,7 +19,7 @@ MASONRY = PhysicsConfig(joints="dry", friction=0.7)
 SIMULATED = {"chair": 93.0, "table": 94.0, "storage": 90.0}
 """Stable shares that the authors' simulation finds on their ground truth, 100 programs a category."""
 
-pytestmark = pytest.mark.skipif(not SHARED.is_dir(), reason="the public shapes lie beside the project; not here")
+pytestmark = pytest.mark.skipif(not SHARED.is_dir(), reason="the public shapes are not on this machine")
 
 
 def masonry(name: str) -> Validity:
@@ -48,7 +48,7 @@ def test_furniture_is_rooted_and_as_often_stable_as_in_simulation(category: str)
     shapes = [shape for _, shape in box_shapes(SHARED / "shapeassembly" / f"truth_{category}.npz", "y")]
     found = judge_all(shapes, PhysicsConfig())
     assert len(found) == 60
-    assert all(each.rooted for each in found)
+    assert all(validity.rooted for validity in found)
     assert 100 * sum(stays_up(shapes, PhysicsConfig())) / 60 == pytest.approx(SIMULATED[category], abs=5)
 
 

@@ -87,7 +87,7 @@ def test_a_body_rests_on_a_face_of_its_hull_below_its_centre_and_never_rises(poi
     assert below[2] == pytest.approx(-1.0, abs=1e-5)
     assert rest.points[:, 2].min() == pytest.approx(0.0, abs=1e-12)
     # Rigid: all distances are as before.
-    before, after = (np.linalg.norm(each[:, None] - each, axis=2) for each in (points, rest.points))
+    before, after = (np.linalg.norm(cloud[:, None] - cloud, axis=2) for cloud in (points, rest.points))
     np.testing.assert_allclose(before, after, atol=1e-9)
 
 

@@ -13,7 +13,7 @@ from tests.stages.shape.physics.structures import DRY, arch, judged, solid, stud
 PLAIN_AND_STUDDED = pytest.mark.parametrize("made", [lambda body: body, studded], ids=["box", "mesh"])
 Made = Callable[[Body], Body]
 
-HEYMAN = 0.1075
+HEYMAN_THICKNESS_RATIO = 0.1075
 """Least thickness over mean radius of a semicircular arch under its own weight (Milankovitch 1907, Heyman 1969)."""
 
 
@@ -28,8 +28,8 @@ def test_tower_stands_exactly_up_to_the_harmonic_overhang(count: int, made: Made
 
 
 def test_arch_stands_down_to_the_thickness_of_heyman() -> None:
-    assert judged(solid(*arch(48, 1.01 * HEYMAN))).stable
-    fallen = judged(solid(*arch(48, 0.99 * HEYMAN)))
+    assert judged(solid(*arch(48, 1.01 * HEYMAN_THICKNESS_RATIO))).stable
+    fallen = judged(solid(*arch(48, 0.99 * HEYMAN_THICKNESS_RATIO)))
     assert not fallen.stable
     assert fallen.rooted, "it falls though it hangs together"
 
@@ -48,17 +48,17 @@ def test_block_slides_on_a_slope_of_the_arctangent_of_friction(friction: float) 
 
 
 @pytest.mark.parametrize("friction", [0.25, 0.4])
-def test_ladder_leans_down_to_the_angle_at_which_it_slips(friction: float) -> None:
+def test_leaning_board_stands_down_to_its_slipping_angle(friction: float) -> None:
     limit = (1 - friction**2) / (2 * friction)  # tangent of the angle to the ground, rough wall and rough ground
     for share, holds in ((1.01, True), (0.99, False)):
         angle = np.arctan(limit * share)
         c, s = np.cos(angle), np.sin(angle)
         vertices, faces = box(4, 0.5, 1e-4)
         turn = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
-        ladder = vertices @ turn.T
-        ladder -= [ladder[:, 0].max(), 0, ladder[:, 2].min()]
+        board = vertices @ turn.T
+        board -= [board[:, 0].max(), 0, board[:, 2].min()]
         wall = box(5, 5, 6, at=(2.5, 0, 3))
-        assert judged(solid((ladder, faces), wall), friction=friction).stable is holds
+        assert judged(solid((board, faces), wall), friction=friction).stable is holds
 
 
 @PLAIN_AND_STUDDED
@@ -90,7 +90,7 @@ def test_rigid_joints_bear_what_dry_joints_do_not() -> None:
     assert judged(shape, joints="rigid").stable, "its centre of mass is still above its foot"
 
 
-def test_parts_that_reach_into_each_other_are_one_piece() -> None:
+def test_penetrating_parts_are_one_body() -> None:
     shelf = box(2, 1, 0.2, at=(0.9, 0, 2))
     beside, into = box(2, 1, 4, at=(-1.1, 0, 2)), box(2, 1, 4, at=(-1, 0, 2))
     assert not judged(solid(beside, shelf)).stable

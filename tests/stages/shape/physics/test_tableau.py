@@ -73,9 +73,9 @@ def test_factors_are_those_of_a_general_solver(seed: int, count: int, flat: bool
     growing = rng.normal(size=(5, 6))
     growing[:2, 2:] = 0
     factors, multipliers = grow_loads(edges, LOAD, growing, 1.0)
-    assert factors == pytest.approx([by_highs(edges, LOAD, each, 1.0) for each in growing], abs=2e-6)
-    for factor, multiplier, each in zip(factors, multipliers, growing, strict=True):
+    assert factors == pytest.approx([by_highs(edges, LOAD, load, 1.0) for load in growing], abs=2e-6)
+    for factor, multiplier, load in zip(factors, multipliers, growing, strict=True):
         if 0 <= factor < 1:  # the certificate: a way to move in which no force does harm and the load works
             assert (multiplier @ edges >= -1e-6).all()
-            assert multiplier @ each == pytest.approx(1.0, abs=1e-6)
+            assert multiplier @ load == pytest.approx(1.0, abs=1e-6)
             assert multiplier @ LOAD == pytest.approx(factor, abs=1e-5)

@@ -78,7 +78,7 @@ def boxes_scene(offsets, sizes=None, edges=(), up="y"):
 
 
 def exemplar_scene(name) -> Scene:
-    """A real exemplar as it stands in its file; skips the test where there is none."""
+    """A real exemplar as it stands in its file; skips the test if it is missing."""
     import trimesh
 
     folder = EXEMPLARS / name

@@ -59,7 +59,7 @@ def test_srgb_survives_the_way_to_linear_light_and_back():
     assert (linear_to_srgb(srgb_to_linear(levels)) == levels).all()
 
 
-def test_a_sheet_holds_each_picture_in_its_place():
+def test_sheet_places_pictures_by_row_and_column():
     red = np.zeros((20, 40, 3), dtype=np.uint8) + np.array([220, 0, 0], dtype=np.uint8)
     drawing = np.full((40, 40), 255, dtype=np.uint8)
     sheet = contact_sheet([Section("Title", [[Cell(red, "caption"), Cell(drawing)]])], "Sheet", cell_width=40)

@@ -15,14 +15,17 @@ from stages.shape.views.scene import mesh_scene
 from stages.shape.views.screen import project_triangles
 from tests.stages.shape.views.solids import boxes_scene, exemplar_scene
 
-SIZE = 24
+IMAGE_PIXELS = 24
 EYES = [Camera(-40.0, 25.0), Camera(35.0, 15.0, fov=60.0), Camera(10.0, 60.0, "orthographic"), Camera(0.0, 0.0)]
 
 
 def covered(triangles):
     """How often each pixel lies in triangles (t, 3, 3): once for each whose corners turn right, less the others."""
     turns = np.sign(np.linalg.det(triangles[:, 1:, :2] - triangles[:, :1, :2]))
-    return sum(turn * (raster(each[None], SIZE, SIZE) == 0) for turn, each in zip(turns, triangles, strict=True))
+    return sum(
+        turn * (raster(triangle[None], IMAGE_PIXELS, IMAGE_PIXELS) == 0)
+        for turn, triangle in zip(turns, triangles, strict=True)
+    )
 
 
 def test_a_pixel_belongs_to_the_triangle_that_its_centre_lies_in():
@@ -40,13 +43,13 @@ def test_centres_on_an_edge_belong_to_the_triangle_to_their_right_or_below():
 
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 7, 1000]))
-def test_a_plane_of_triangles_covers_each_pixel_once(seed, grid):
+def test_plane_of_triangles_covers_every_pixel_once(seed, grid):
     """With corners on whole and half pixels, so that many edges run through centres, and anywhere."""
-    inner = np.round(np.random.default_rng(seed).uniform(-4.0, SIZE + 4.0, (30, 2)) * grid) / grid
+    inner = np.round(np.random.default_rng(seed).uniform(-4.0, IMAGE_PIXELS + 4.0, (30, 2)) * grid) / grid
     points = np.concatenate([inner, [[-9.0, -9.0], [-9.0, 40.0], [40.0, -9.0], [40.0, 40.0]]])
     corners = np.concatenate([points, np.zeros((len(points), 1))], axis=1)[Delaunay(points).simplices]
     assert (np.abs(covered(corners)) == 1).all()
-    assert (raster(corners, SIZE, SIZE) >= 0).all()
+    assert (raster(corners, IMAGE_PIXELS, IMAGE_PIXELS) >= 0).all()
 
 
 @settings(max_examples=60, deadline=None)
@@ -62,7 +65,7 @@ def test_a_closed_surface_is_entered_as_often_as_it_is_left_at_every_pixel(seed,
     scene = mesh_scene(points, faces.astype(np.int32), np.zeros((len(faces), 3), dtype=np.uint8), "y")
     camera = Camera(*rng.uniform(-80.0, 80.0, 2), distance=1.2 if seed % 2 else None)
     view = camera.look(scene.points, "y")
-    assert (covered(project_triangles(scene, view, layered_moves(scene, view), SIZE, SIZE)) == 0).all()
+    assert (covered(project_triangles(scene, view, layered_moves(scene, view), IMAGE_PIXELS, IMAGE_PIXELS)) == 0).all()
 
 
 def test_the_nearest_triangle_is_seen_and_of_equals_the_first():

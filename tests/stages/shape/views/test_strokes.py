@@ -13,13 +13,15 @@ from stages.shape.views.scene import MeshSet, Scene, mesh_scene
 from stages.shape.views.strokes import BOUNDARY_LINE, CONTOUR_LINE, CREASE_LINE, OUTLINE_LINE, find_strokes
 from tests.stages.shape.views.solids import BOX_CORNERS, BOX_EDGES, box, boxes_scene, cylinder
 
-SIZE = 256
+IMAGE_PIXELS = 256
 CORNER = Camera(30.0, 25.0)
 UP = np.array([0.0, 1.0, 0.0])
 
 
 def strokes_of(scene, camera, crease_angle=35.0, step=0.5, shortest=6.0):
-    return find_strokes(visible_triangles(scene, camera, (SIZE, SIZE), "raster"), crease_angle, step, shortest)
+    return find_strokes(
+        visible_triangles(scene, camera, (IMAGE_PIXELS, IMAGE_PIXELS), "raster"), crease_angle, step, shortest
+    )
 
 
 def lengths(strokes):
@@ -30,7 +32,7 @@ def on_screen(view, points):
     eye = points @ view.eye[:3, :3].T + view.eye[:3, 3]
     out = np.column_stack([eye, np.ones(len(eye))]) @ view.projection.T
     x, y = out[:, 0] / out[:, 3], out[:, 1] / out[:, 3]
-    return np.stack([(x + 1) / 2 * SIZE, (1 - y) / 2 * SIZE], axis=1)
+    return np.stack([(x + 1) / 2 * IMAGE_PIXELS, (1 - y) / 2 * IMAGE_PIXELS], axis=1)
 
 
 def segment_distances(points, starts, ends):
@@ -81,7 +83,7 @@ def test_a_cylinder_of_64_sides_has_two_circles_and_two_side_lines():
     starts = np.concatenate([top[:-1], bottom[:-1], [side[0] for side in sides]])
     ends = np.concatenate([top[1:], bottom[1:], [side[1] for side in sides]])
     assert segment_distances(strokes.ends.reshape(-1, 2), starts, ends).max() < 1.5
-    middle = SIZE / 2
+    middle = IMAGE_PIXELS / 2
     crossing = (strokes.ends[:, :, 1].min(axis=1) < middle) & (strokes.ends[:, :, 1].max(axis=1) >= middle)
     assert len(np.unique(np.round(strokes.ends[crossing, 0, 0] / 3))) == 2
 
@@ -123,7 +125,7 @@ def test_pieces_of_one_surface_have_no_line_where_it_goes_on_and_a_crease_where_
     assert lengths(creased).sum() == pytest.approx(lengths(met).sum(), rel=0.01)
 
 
-def test_where_two_boxes_pass_into_each_other_the_line_is_where_they_meet():
+def test_line_of_intersecting_boxes_lies_where_they_meet():
     scene = boxes_scene([(0, 0, 0), (0, 0.45, 0)], [(1, 1, 1), (0.5, 1, 0.5)])
     strokes = strokes_of(scene, CORNER)
     view = CORNER.look(scene.points, "y")
@@ -156,7 +158,7 @@ def test_specks_are_left_out_and_a_limit_of_zero_keeps_them():
     scene = boxes_scene([(0, 0, 0), (0, 0, 1)], [(1, 1, 1), (0.006, 0.006, 0.006)])
     camera = Camera(0.0, 0.0)
     clean, all_lines = (strokes_of(scene, camera, shortest=limit) for limit in (8.0, 0.0))
-    middle = np.abs(all_lines.ends.mean(axis=1) - SIZE / 2).max(axis=1) < 10
+    middle = np.abs(all_lines.ends.mean(axis=1) - IMAGE_PIXELS / 2).max(axis=1) < 10
     assert middle.any()
     assert lengths(all_lines).sum() - lengths(clean).sum() == pytest.approx(lengths(all_lines)[middle].sum())
 
