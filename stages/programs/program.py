@@ -132,7 +132,7 @@ def program_names() -> tuple[str, ...]:
 
 
 def find_program(name: str) -> Program:
-    """Find a program by its name, or by its dotted module. Raises ConfigError if there is none."""
+    """Find a program by its name, or by its dotted module. Raises ConfigError for an unknown one."""
     module = program_module(name)
     try:
         found: Any = getattr(importlib.import_module(module), "PROGRAM", None)

@@ -90,7 +90,7 @@ class Sampler:
                 values = schema.from_vector(draws.columns[:, column])
                 if self._accepts(values, value_index):
                     return values
-        value = "" if fixed is None else f" with {item} = {fixed[1]:g}"
+        value = f" with {item} = {fixed[1]:g}" if fixed else ""
         reasons = _reasons(self.refused - before, self.failure) or "none of this shard"
         raise NoMoreShapes(
             f"{self.program.name}: no shape{value} in {self.tried - first} tries ({reasons}); "

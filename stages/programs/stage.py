@@ -96,7 +96,7 @@ def _random(task: Task, sampler: Sampler) -> Iterator[SampledValues]:
     params = task.shard.params
     name = task.config.section(ProgramsConfig).program
     listed = listed_shapes(name, task.config.seed) if "listed" in params else None
-    shapes = _drawn(task, sampler) if listed is None else sampler.listed(listed[:, slice(*params["listed"])])
+    shapes = sampler.listed(listed[:, slice(*params["listed"])]) if listed is not None else _drawn(task, sampler)
     count = 0
     for values in islice(shapes, params["samples"]):
         count += 1

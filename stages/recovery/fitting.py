@@ -83,7 +83,7 @@ def best_fit(
     """Find the nearest whole shape or, for a partial cloud, the nearest shape that it may be a part of.
 
     Networks learn from partial clouds too, and estimate the whole shape. A cloud is partial where it fits much better
-    to a part of that estimate than to all of it, unless a whole shape explains all of it. Where the network does not
+    to a part of that estimate than to the whole, unless a whole shape explains all of it. Where the network does not
     tell, the results of both searches decide.
     """
     if source.points is None or budget == 1:

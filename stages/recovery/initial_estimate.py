@@ -36,7 +36,7 @@ _QUARTER_TURN = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 class InitialEstimate:
     """A program, and how an input is turned and described before the search.
 
-    model: the network that the estimate comes from; None where there is none
+    model: the network that the estimate comes from; None without a network
     estimate: probabilities of the parameters
     target: the input upright
     rotation: float64 (3, 3), turns the input upright

@@ -51,7 +51,7 @@ def recover_input(
 ) -> RecoveryResult:
     """`recover` for an input from `read_inputs`. turned: whether the front of a cloud may point along any axis."""
     source, outliers = _without_outliers(source)
-    kind = "points" if source.ink is None else "sketch"
+    kind = "points" if source.points is not None else "sketch"
     names = [program] if program else sorted({*program_names(), *(name for name, known in models if known == kind)})
     initials = [
         initial_estimate(find_program(name), models.get((name, kind)), source, up, turned, seed) for name in names

@@ -77,6 +77,6 @@ def random_shapes(program: Program, interval: Interval, rng: np.random.Generator
 
 
 def nearest_valid_values(program: Program, values: Values) -> dict[str, Value]:
-    """The nearest values that keep the program's constraints, or its base where there are none."""
+    """The nearest values that satisfy the program's constraints, or else its base."""
     valid = repair(program, values)
     return program.schema.canonical(program.schema.base)[0] if valid is None else valid

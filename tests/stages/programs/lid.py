@@ -1,4 +1,4 @@
-"""A box with or without a lid, and nothing else to choose: the smallest programs that a sweep must finish."""
+"""A box with or without a lid: the smallest programs that random sampling must finish."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A plate on a post: the further its middle stands from the post, the nearer it is to falling."""
+"""A plate on a post: the larger the distance of its middle from the post, the less stable it is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A rack of boards: a program of many structures, a dozen numbers of boards with and without a top."""
+"""A rack of boards: a program with many structures, a dozen numbers of boards with and without a top."""
 
 from __future__ import annotations
 

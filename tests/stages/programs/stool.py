@@ -1,4 +1,4 @@
-"""A stool of boxes: the smallest program that has all that programs have."""
+"""A stool of boxes: the smallest program with all features of programs."""
 
 from __future__ import annotations
 

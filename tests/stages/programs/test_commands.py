@@ -115,6 +115,6 @@ def test_mistakes_are_reported_with_a_remedy(arguments: list[str], message: str,
     assert not (tmp_path / "out").exists()
 
 
-def test_hidden_parameter_is_shown_by_the_fewest_changes() -> None:
+def test_hidden_parameter_is_shown_by_few_changes() -> None:
     assert values_showing(PROGRAM, PROGRAM.parameters[0]) == PROGRAM.schema.base
     assert values_showing(PROGRAM, PROGRAM.parameters[3]) == PROGRAM.schema.base

@@ -41,12 +41,12 @@ Part labels: `seat`, `leg`, `rail`.
     )
 
 
-def test_a_bar_in_a_sentence_does_not_end_its_column() -> None:
+def test_bar_in_a_description_does_not_end_its_column() -> None:
     barred = replace(PROGRAM.parameters[0], description="Low | high.")
     assert r"| Low \| high. |" in program_markdown(replace(PROGRAM, parameters=(barred, *PROGRAM.parameters[1:])))
 
 
-def test_a_program_without_constraints_says_nothing_of_them() -> None:
+def test_description_without_constraints_does_not_mention_them() -> None:
     free = program_markdown(replace(PROGRAM, constraints=(), non_intersecting=()))
     assert "valid when" not in free
     assert "never intersect" not in free

@@ -18,7 +18,7 @@ from tests.command import shapemill
 from tests.stages.programs.stool import PROGRAM as STOOL_PROGRAM
 
 STOOL, RACK = "tests.stages.programs.stool", "tests.stages.programs.rack"
-EACH_VALUE = {"program": STOOL, "all_values": {"train": 2, "val": 1, "test": 1}, "splits": {"shards": 2}}
+ALL_VALUES = {"program": STOOL, "all_values": {"train": 2, "val": 1, "test": 1}, "splits": {"shards": 2}}
 RANDOM = {
     "program": RACK,
     "mode": "random",
@@ -47,7 +47,7 @@ def digests(folder: Path) -> dict[str, str]:
 @pytest.fixture(scope="module")
 def stools(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, Path]:
     folder = tmp_path_factory.mktemp("stools")
-    code, printed, made = make(folder, EACH_VALUE)
+    code, printed, made = make(folder, ALL_VALUES)
     assert code == 0, printed
     return folder, printed, made
 
@@ -102,7 +102,7 @@ def test_sample_is_its_parameters(stools: tuple[Path, str, Path]) -> None:
 
 
 def test_bytes_do_not_depend_on_the_number_of_workers(stools: tuple[Path, str, Path]) -> None:
-    code, printed, made = make(stools[0], EACH_VALUE, workers=2)
+    code, printed, made = make(stools[0], ALL_VALUES, workers=2)
     assert code == 0, printed
     assert digests(made) == digests(stools[2])
     assert len(digests(made)) == 6

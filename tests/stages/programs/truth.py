@@ -56,7 +56,7 @@ def measured(parts: Sequence[Part]) -> list[list[Any]]:
 def by_value(program: Program, values: Values, name: str) -> list[list[float]]:
     """Volume and mean distance of the vertices from a point, at each value of the parameter `name`.
 
-    The other parameters are as near to `values` as constraints admit; empty where there are none.
+    The other parameters are as near to `values` as constraints admit; a row is empty where they admit nothing.
     """
     rows = []
     for value in program.schema.by_name[name].values:

@@ -1,4 +1,4 @@
-"""What is read as a cloud or a drawing, and what is told of anything else."""
+"""Inputs that are read as clouds or drawings, and the errors for others."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def only(path: Path) -> RecoveryInput | InputError:
 
 
 @pytest.mark.parametrize("suffix", [".npy", ".xyz", ".csv", ".ply"])
-def test_clouds_come_back_from_files(suffix: str, tmp_path: Path) -> None:
+def test_clouds_are_read_from_files(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"scan{suffix}"
     if suffix == ".npy":
         np.save(path, np.hstack([CLOUD, CLOUD]))  # with normals
@@ -51,7 +51,7 @@ def test_clouds_come_back_from_files(suffix: str, tmp_path: Path) -> None:
     assert np.allclose(found.points, CLOUD, atol=1e-6)
 
 
-def test_of_a_mesh_points_of_its_surface_are_taken(tmp_path: Path) -> None:
+def test_mesh_is_sampled_on_its_surface(tmp_path: Path) -> None:
     trimesh.creation.box((2, 2, 2)).export(tmp_path / "box.glb")
     found = only(tmp_path / "box.glb")
     assert isinstance(found, RecoveryInput)
@@ -60,7 +60,7 @@ def test_of_a_mesh_points_of_its_surface_are_taken(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("points", "told"),
+    ("points", "message"),
     [
         (np.empty((0, 3)), "is empty"),
         (np.zeros((1, 3)), "has 1 point: a cloud needs at least 32"),
@@ -71,34 +71,34 @@ def test_of_a_mesh_points_of_its_surface_are_taken(tmp_path: Path) -> None:
         (np.array([["a", "b", "c"]] * 40), "holds no numbers"),
     ],
 )
-def test_what_is_no_cloud_is_told(points: np.ndarray, told: str) -> None:
-    with pytest.raises(InputError, match=told):
+def test_invalid_clouds_are_reported(points: np.ndarray, message: str) -> None:
+    with pytest.raises(InputError, match=message):
         checked_cloud(points)
 
 
 @pytest.mark.parametrize("size", [40, 300, 1500])
 @pytest.mark.parametrize("inverted", [False, True])
-def test_drawings_of_any_size_and_polarity_are_nearly_the_same(size: int, inverted: bool) -> None:
+def test_drawings_of_any_size_and_polarity_are_similar(size: int, inverted: bool) -> None:
     picture = 255 - drawing(size) if inverted else drawing(size)
     found, expected = ink_from_picture(picture), ink_from_picture(drawing())
     assert found.shape == (DRAWING_SIDE_PIXELS, DRAWING_SIDE_PIXELS)
     rows, columns = np.nonzero(found)
     assert max(np.ptp(rows), np.ptp(columns)) >= DRAWING_SIDE_PIXELS - 2 * 8 - 3
     far = 10 if size == 40 else 3  # a line of a pixel of forty is wide
-    for one, other in ((found, expected), (expected, found)):
+    for ink, other in ((found, expected), (expected, found)):
         near = np.zeros_like(other)
         for row, column in np.argwhere(other):
             near[max(row - far, 0) : row + far + 1, max(column - far, 0) : column + far + 1] = True
-        assert near[one].all()
+        assert near[ink].all()
 
 
-def test_fitted_ink_is_in_the_middle_whatever_was_around_it() -> None:
+def test_fitted_ink_does_not_depend_on_its_margins() -> None:
     ink = drawing() < 128
     larger = np.pad(ink, ((10, 200), (300, 0)))
     assert np.array_equal(fit_to_square(ink), fit_to_square(larger))
 
 
-def test_what_is_no_drawing_is_told(tmp_path: Path) -> None:
+def test_invalid_drawings_are_reported(tmp_path: Path) -> None:
     photograph = RNG.integers(0, 255, (64, 64, 3)).astype(np.uint8)
     with pytest.raises(InputError, match="in colour"):
         ink_from_picture(photograph)
@@ -112,7 +112,7 @@ def test_what_is_no_drawing_is_told(tmp_path: Path) -> None:
     assert "is no picture" in str(only(tmp_path / "broken.png"))
 
 
-def test_transparent_drawings_lie_on_white(tmp_path: Path) -> None:
+def test_transparent_drawings_are_on_white(tmp_path: Path) -> None:
     layers = np.zeros((300, 300, 4), np.uint8)
     layers[..., 3] = 255 - drawing()
     Image.fromarray(layers).save(tmp_path / "house.png")
@@ -121,7 +121,7 @@ def test_transparent_drawings_lie_on_white(tmp_path: Path) -> None:
     assert np.array_equal(found.ink, ink_from_picture(drawing()))
 
 
-def test_folder_is_read_in_order_and_one_bad_file_keeps_none_back(tmp_path: Path) -> None:
+def test_folder_is_read_in_order_despite_a_bad_file(tmp_path: Path) -> None:
     np.save(tmp_path / "b.npy", CLOUD)
     np.save(tmp_path / "a.npy", CLOUD[:3])
     Image.fromarray(drawing()).save(tmp_path / "c.png")
@@ -134,7 +134,7 @@ def test_folder_is_read_in_order_and_one_bad_file_keeps_none_back(tmp_path: Path
     assert third.ink is not None
 
 
-def test_shard_gives_the_cloud_of_each_sample(tmp_path: Path) -> None:
+def test_shard_gives_the_clouds_of_its_samples(tmp_path: Path) -> None:
     stream = io.BytesIO()
     with ShardWriter(stream) as writer:
         writer.write("chair-000000", {"points.npy": array_bytes(CLOUD.astype(np.float32))})
@@ -146,7 +146,7 @@ def test_shard_gives_the_cloud_of_each_sample(tmp_path: Path) -> None:
     assert isinstance(second, InputError)
 
 
-def test_samples_whose_key_is_a_path_are_refused_and_folders_passed_over(tmp_path: Path) -> None:
+def test_keys_that_are_paths_are_refused_and_folders_skipped(tmp_path: Path) -> None:
     content = array_bytes(CLOUD)
     with tarfile.open(tmp_path / "foreign.tar", "w") as tar:
         folder = tarfile.TarInfo("clouds")
@@ -158,13 +158,13 @@ def test_samples_whose_key_is_a_path_are_refused_and_folders_passed_over(tmp_pat
             tar.addfile(entry, io.BytesIO(content))
     *refused, good = read_inputs(tmp_path / "foreign.tar")
     assert len(refused) == 5
-    assert all(isinstance(each, InputError) and "no file name" in str(each) for each in refused)
+    assert all(isinstance(error, InputError) and "no file name" in str(error) for error in refused)
     assert isinstance(good, RecoveryInput)
     assert good.name == "good"
 
 
 @pytest.mark.parametrize("name", ["nothing.ply", "text.md", "text.ply", "text.tar", "empty"])
-def test_files_that_are_nothing_of_it_are_told(name: str, tmp_path: Path) -> None:
+def test_other_files_are_reported(name: str, tmp_path: Path) -> None:
     if name == "empty":
         (tmp_path / name).mkdir()
     elif not name.startswith("nothing"):
@@ -177,12 +177,12 @@ def test_files_that_are_nothing_of_it_are_told(name: str, tmp_path: Path) -> Non
     assert name.partition(".")[0] in str(found)
 
 
-def test_program_in_place_of_a_drawing_is_not_run(tmp_path: Path) -> None:
+def test_program_instead_of_a_drawing_is_not_executed(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\nshowpage\n")
     assert "is no picture: none of PNG" in str(only(tmp_path / "a.png"))
 
 
-def test_file_that_is_cut_off_is_told_without_words_of_the_library(tmp_path: Path) -> None:
+def test_truncated_file_has_a_plain_message(tmp_path: Path) -> None:
     np.save(tmp_path / "cloud.npy", CLOUD)
     content = (tmp_path / "cloud.npy").read_bytes()
     (tmp_path / "cloud.npy").write_bytes(content[: len(content) // 2])

@@ -51,21 +51,24 @@ def off_by(values: Values, truth: Values) -> float:
 
 def test_intervals_share_no_shape() -> None:
     texts = [
-        {STOOL.schema.to_text(each.values) for each in islice(random_shapes(STOOL, part, np.random.default_rng(0)), 60)}
-        for part in (TRAIN_INTERVAL, VALIDATION_INTERVAL, TEST_INTERVAL)
+        {
+            STOOL.schema.to_text(shape.values)
+            for shape in islice(random_shapes(STOOL, interval, np.random.default_rng(0)), 60)
+        }
+        for interval in (TRAIN_INTERVAL, VALIDATION_INTERVAL, TEST_INTERVAL)
     ]
     assert not texts[0] & texts[1]
     assert not texts[0] & texts[2]
     assert not texts[1] & texts[2]
 
 
-def test_random_shapes_are_valid_and_know_what_is_hidden() -> None:
-    for each in islice(random_shapes(STOOL, TRAIN_INTERVAL, np.random.default_rng(1)), 40):
-        assert not STOOL.violated(each.values)
-        assert (each.classes[3] == 6) == (not each.values["has_rail"])
+def test_random_shapes_are_valid_with_hidden_classes() -> None:
+    for shape in islice(random_shapes(STOOL, TRAIN_INTERVAL, np.random.default_rng(1)), 40):
+        assert not STOOL.violated(shape.values)
+        assert (shape.classes[3] == 6) == (not shape.values["has_rail"])
 
 
-def test_search_alone_finds_a_stool() -> None:
+def test_search_without_a_network_finds_a_stool() -> None:
     rng = np.random.default_rng(0)
     found = refine(STOOL, base_estimate(STOOL), cloud_target(cloud_of(TALL), rng), 300, rng)
     assert found.tried <= 302
@@ -75,7 +78,7 @@ def test_search_alone_finds_a_stool() -> None:
 
 
 @pytest.mark.parametrize("budget", [1, 20, 60])
-def test_a_larger_budget_is_never_worse(budget: int) -> None:
+def test_larger_budget_is_never_worse(budget: int) -> None:
     def distance(shapes: int) -> float:
         rng = np.random.default_rng(0)
         return refine(STOOL, base_estimate(STOOL), cloud_target(cloud_of(TALL), rng), shapes, rng).distance
@@ -84,11 +87,11 @@ def test_a_larger_budget_is_never_worse(budget: int) -> None:
 
 
 @pytest.mark.parametrize("up", ["y", "z", "x"])
-@pytest.mark.parametrize("asked", [True, False])
-def test_clouds_of_any_place_size_and_axis_come_back(up: str, asked: bool) -> None:
+@pytest.mark.parametrize("up_is_given", [True, False])
+def test_clouds_of_any_position_size_and_axis_are_recovered(up: str, up_is_given: bool) -> None:
     cloud = cloud_of(TALL, n=700) * 40 + [5, -300, 2]
     turned = cloud[:, {"y": [0, 1, 2], "z": [2, 0, 1], "x": [1, 2, 0]}[up]]
-    found = recover(turned, PROGRAM, up=up if asked else "", budget=200)  # type: ignore[arg-type]
+    found = recover(turned, PROGRAM, up=up if up_is_given else "", budget=200)  # type: ignore[arg-type]
     assert found.up == up
     assert off_by(found.values, TALL) < 0.06
     assert found.placement is not None
@@ -96,11 +99,11 @@ def test_clouds_of_any_place_size_and_axis_come_back(up: str, asked: bool) -> No
     # the cloud is forty times as large as the stool
     assert chamfer_squared(there, turned) < 0.004 * 40**2
     assert np.linalg.det(found.placement[:3, :3]) > 0
-    assert any("no trained model" in each for each in found.warnings)
+    assert any("no trained model" in warning for warning in found.warnings)
 
 
 @pytest.mark.parametrize(("azimuth", "elevation"), [(-30.0, 20.0), (8.0, 15.0), (-50.0, 50.0)])
-def test_a_drawing_says_from_where_it_is_seen(azimuth: float, elevation: float) -> None:
+def test_camera_of_a_drawing_is_found(azimuth: float, elevation: float) -> None:
     view = SketchView(azimuth=azimuth, elevation=elevation)
     ink = draw_fitted(STOOL, tuple(STOOL.parts(TALL)), view, SketchesConfig(), np.random.default_rng(0))
     found = recover_input(RecoveryInput("stool", ink=ink), PROGRAM, {}, "y", 60, 0)
@@ -112,18 +115,18 @@ def test_a_drawing_says_from_where_it_is_seen(azimuth: float, elevation: float) 
     assert recover(cloud_of(TALL, n=300), PROGRAM, up="y", budget=1).as_json()["camera"] is None
 
 
-def test_equal_questions_have_equal_answers() -> None:
+def test_recovery_is_deterministic() -> None:
     cloud = cloud_of(TALL, n=300)
     assert recover(cloud, PROGRAM, budget=80).as_json() == recover(cloud, PROGRAM, budget=80).as_json()
 
 
-def test_what_is_no_stool_is_told() -> None:
+def test_unlike_input_is_reported() -> None:
     ball = np.random.default_rng(0).normal(size=(500, 3))
     found = recover(ball / np.linalg.norm(ball, axis=1, keepdims=True), PROGRAM, budget=60)
-    assert any("unlike any stool" in each for each in found.warnings)
+    assert any("unlike any stool" in warning for warning in found.warnings)
 
 
-def test_program_that_is_not_there_is_told() -> None:
+def test_unknown_program_is_reported() -> None:
     with pytest.raises(ConfigError, match="did you mean chair"):
         recover(cloud_of(TALL), "chari")
 
@@ -133,16 +136,16 @@ def test_program_is_found_by_fit() -> None:
     cloud = shape_points(vase.parts(vase.schema.base), 1500)
     found = recover(cloud, budget=1, up="y")
     assert found.program.name == "vase"
-    assert any("no program was named" in each for each in found.warnings)
+    assert any("no program was named" in warning for warning in found.warnings)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["points", "sketch"])
 def test_command_uses_the_trained_model(kind: str, tmp_path: Path) -> None:
     train(config(input=kind, rounds=1), tmp_path)
-    models, wrong = find_models(tmp_path)
+    models, problems = find_models(tmp_path)
     assert list(models) == [(PROGRAM, kind)]
-    assert not wrong
+    assert not problems
     if kind == "points":
         trimesh.PointCloud(cloud_of(TALL)).export(tmp_path / "mine.ply")
         given = tmp_path / "mine.ply"
@@ -156,17 +159,17 @@ def test_command_uses_the_trained_model(kind: str, tmp_path: Path) -> None:
         Image.fromarray(np.where(ink, 0, 255).astype(np.uint8)).save(given)
     code, printed = shapemill("recover", given, "--program", PROGRAM, "--out", tmp_path, "--budget", 40)
     assert code == 0, printed
-    said = json.loads((tmp_path / "recovered/mine.json").read_text())
-    assert set(said["confidence"]) == set(said["parameters"])
-    assert all(0.0 <= each <= 1.0 for each in said["confidence"].values())
-    assert off_by(STOOL.schema.from_text(json.dumps(said["parameters"])), STOOL.schema.base) > 0.0
-    assert said["chamfer"] < said["chamfer_of_base"]
+    described = json.loads((tmp_path / "recovered/mine.json").read_text())
+    assert set(described["confidence"]) == set(described["parameters"])
+    assert all(0.0 <= probability <= 1.0 for probability in described["confidence"].values())
+    assert off_by(STOOL.schema.from_text(json.dumps(described["parameters"])), STOOL.schema.base) > 0.0
+    assert described["chamfer"] < described["chamfer_of_base"]
     assert trimesh.load_scene(tmp_path / "recovered/mine.glb").geometry
     assert (tmp_path / "recovered/mine.png").read_bytes().startswith(b"\x89PNG")
     assert "distance" in printed
 
 
-def test_models_that_cannot_be_used_are_told_and_stop_nothing(tmp_path: Path) -> None:
+def test_unusable_models_are_reported_and_skipped(tmp_path: Path) -> None:
     entry = RecoveryModelConfig.model_validate({**SMALL, "widths": (8, 8)}, strict=False)
     tensors = new_network(entry, STOOL, 0).state_dict()
     settings = {name: value for name, value in SMALL.items() if name != "name"}
@@ -192,20 +195,20 @@ def test_models_that_cannot_be_used_are_told_and_stop_nothing(tmp_path: Path) ->
         (tmp_path / name / "weights.safetensors").write_bytes(checkpoint_bytes(tensors, header))
     (tmp_path / "list").mkdir()
     (tmp_path / "list/weights.safetensors").write_bytes(save({}, {"shapemill": "[]"}))
-    models, wrong = find_models(tmp_path)
+    models, problems = find_models(tmp_path)
     assert list(models) == [(PROGRAM, "points")]
     assert models[PROGRAM, "points"].header["figures"]["val_loss"] == 2.0
-    assert [Path(text.split("/weights.safetensors")[0]).name for text in wrong] == [
+    assert [Path(text.split("/weights.safetensors")[0]).name for text in problems] == [
         "figures", "list", "moved", "nameless", "settings", "tensors",
     ]  # fmt: skip
-    assert all(text.count("weights.safetensors") == 1 for text in wrong)
+    assert all(text.count("weights.safetensors") == 1 for text in problems)
 
 
-def test_own_models_go_before_those_that_ship_and_the_best_before_others(tmp_path: Path) -> None:
+def test_own_models_precede_shipped_ones_and_the_best_others(tmp_path: Path) -> None:
     entry = RecoveryModelConfig.model_validate({**SMALL, "widths": (8, 8)}, strict=False)
     tensors = new_network(entry, STOOL, 0).state_dict()
     settings = {name: value for name, value in SMALL.items() if name != "name"}
-    for folder, loss in (("own/mill-models/a", 3.0), ("own/mill-models/b", 2.5), ("shipped/a", 1.0)):
+    for folder, loss in (("own/toy-models/a", 3.0), ("own/toy-models/b", 2.5), ("shipped/a", 1.0)):
         header = {
             "kind": "recovery",
             "program": PROGRAM,
@@ -216,21 +219,19 @@ def test_own_models_go_before_those_that_ship_and_the_best_before_others(tmp_pat
         (tmp_path / folder).mkdir(parents=True)
         (tmp_path / folder / "weights.safetensors").write_bytes(checkpoint_bytes(tensors, header))
     for folders, best in ((("own", "shipped"), 2.5), (("nothing", "shipped"), 1.0)):
-        models, wrong = find_models(*(tmp_path / each for each in folders))
-        assert not wrong
+        models, problems = find_models(*(tmp_path / folder for folder in folders))
+        assert not problems
         assert models[PROGRAM, "points"].header["figures"]["val_loss"] == best
     halved = tmp_path / "half.safetensors"
     halved.write_bytes(slim_bytes(tmp_path / "shipped/a/weights.safetensors"))
     assert halved.stat().st_size < 0.7 * (tmp_path / "shipped/a/weights.safetensors").stat().st_size
-    for one, other in zip(
+    for half, full in zip(
         load_recovery(halved).module.parameters(), new_network(entry, STOOL, 0).parameters(), strict=True
     ):
-        np.testing.assert_allclose(one.detach(), other.detach(), atol=1e-3)
+        np.testing.assert_allclose(half.detach(), full.detach(), atol=1e-3)
 
 
-def test_weights_too_large_in_halves_ship_their_largest_tensors_as_bytes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_large_weights_are_shipped_as_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     entry = RecoveryModelConfig.model_validate({**SMALL, "widths": (8, 8), "decoder": (64, 32)}, strict=False)
     tensors = new_network(entry, STOOL, 0).state_dict()
     settings = {**{name: value for name, value in SMALL.items() if name != "name"}, "decoder": [64, 32]}
@@ -242,25 +243,25 @@ def test_weights_too_large_in_halves_ship_their_largest_tensors_as_bytes(
     slim.write_bytes(slim_bytes(path))
     assert slim.stat().st_size <= halves - 1000
     clouds = torch.rand(8, 64, 3, generator=torch.Generator().manual_seed(0))
-    one, other = (load_recovery(each).module(clouds) for each in (path, slim))
-    there = torch.isfinite(one)
-    assert float((one - other)[there].detach().abs().max()) < 0.02 * float(one[there].detach().abs().max())
+    whole, slimmed = (load_recovery(file).module(clouds) for file in (path, slim))
+    finite = torch.isfinite(whole)
+    assert float((whole - slimmed)[finite].detach().abs().max()) < 0.02 * float(whole[finite].detach().abs().max())
     monkeypatch.setattr("stages.training.recovery.ship.MAX_SHIPPED_BYTES", 1000)
     with pytest.raises(CheckpointError, match="train a smaller model"):
         slim_bytes(path)
 
 
-SHIPPED_MODELS, REFUSED = find_models(PRETRAINED_FOLDER)
+SHIPPED_MODELS, PROBLEMS = find_models(PRETRAINED_FOLDER)
 
 
-def test_what_ships_can_be_used_as_the_programs_are_now() -> None:
-    assert not REFUSED
+def test_shipped_models_fit_the_programs() -> None:
+    assert not PROBLEMS
     domains = ("cabinet", "ceiling_lamp", "chair", "table", "vase")
     assert sorted(SHIPPED_MODELS) == [(program, kind) for program in domains for kind in ("points", "sketch")]
 
 
 @pytest.mark.parametrize(("program", "kind"), sorted(SHIPPED_MODELS))
-def test_models_that_ship_see_more_than_the_base_shape(program: str, kind: str) -> None:
+def test_shipped_models_are_better_than_the_base_shape(program: str, kind: str) -> None:
     model = SHIPPED_MODELS[program, kind]
     made = find_program(program)
     shapes = list(islice(random_shapes(made, TEST_INTERVAL, np.random.default_rng(11)), 2))
@@ -289,7 +290,7 @@ def test_command_reports_mistakes_and_refused_inputs(tmp_path: Path) -> None:
         assert message in printed
 
 
-def test_what_readers_cannot_read_keeps_no_other_file_back(tmp_path: Path) -> None:
+def test_unreadable_files_do_not_stop_others(tmp_path: Path) -> None:
     (tmp_path / "list.gltf").write_text("[]")
     (tmp_path / "garbled.npy").write_bytes(b"\x93NUMPY\x01\x00\x08\x00{'descr'")
     (tmp_path / "gone.ply").symlink_to(tmp_path / "nowhere.ply")
@@ -297,10 +298,10 @@ def test_what_readers_cannot_read_keeps_no_other_file_back(tmp_path: Path) -> No
     np.save(tmp_path / "good.npy", np.random.default_rng(0).random((100, 3)))
     np.savetxt(tmp_path / "good.xyz", np.random.default_rng(0).random((100, 3)))
     given = list(read_inputs(tmp_path))
-    assert [each.name for each in given if isinstance(each, RecoveryInput)] == ["good.npy", "good.xyz"]
-    assert len([each for each in given if isinstance(each, InputError)]) == 2
+    assert [source.name for source in given if isinstance(source, RecoveryInput)] == ["good.npy", "good.xyz"]
+    assert len([source for source in given if isinstance(source, InputError)]) == 2
 
 
-def test_base_guess_begins_at_the_base_shape() -> None:
+def test_base_estimate_of_a_lamp_is_its_base_shape() -> None:
     lamp = find_program("ceiling_lamp")
     assert base_estimate(lamp).values(lamp) == lamp.schema.base

@@ -1,4 +1,4 @@
-"""One of everything that makes a mesh, by name, for tests that hold for all of it."""
+"""Meshes of all building blocks by name, for tests that hold for all of them."""
 
 from __future__ import annotations
 

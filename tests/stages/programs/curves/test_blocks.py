@@ -1,4 +1,4 @@
-"""What holds for every mesh of the library, and what exact sizes single ones have."""
+"""Properties of every building block, and exact sizes of some."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_every_block_is_made_the_same_again(name: str) -> None:
     assert one.triangles.tobytes() == two.triangles.tobytes()
 
 
-def test_sizes_are_those_of_elementary_geometry() -> None:
+def test_sizes_are_as_in_elementary_geometry() -> None:
     assert box((1, 2, 3)).volume == pytest.approx(6)
     assert sweep(line((0, 0, 0), (0, 0, 2)), rectangle(0.5, 0.25)).volume == pytest.approx(0.25)
     assert cylinder(1, 2, count=256).volume == pytest.approx(2 * np.pi, rel=1e-3)
@@ -69,7 +69,7 @@ def test_sizes_are_those_of_elementary_geometry() -> None:
     assert rounded_box((1, 1, 1), 0.49, steps=24).volume == pytest.approx(0.5432, abs=0.01)
 
 
-def test_a_quarter_revolved_is_a_quarter() -> None:
+def test_quarter_revolution_is_a_quarter() -> None:
     whole, quarter = revolve(DESIGN, count=48), revolve(DESIGN, 90, count=12)
     assert quarter.volume == pytest.approx(whole.volume / 4)
     # Counter-clockwise seen from +y: from +x towards -z.
@@ -77,19 +77,19 @@ def test_a_quarter_revolved_is_a_quarter() -> None:
     assert quarter.bounds[1, 2] == pytest.approx(0, abs=1e-12)
 
 
-def test_an_outline_ending_off_the_axis_is_closed_flat() -> None:
+def test_outline_ending_off_the_axis_is_closed_flat() -> None:
     drum = revolve(line((1, 0, 0), (1, 2, 0)), count=256)
     assert drum.volume == pytest.approx(2 * np.pi, rel=1e-3)
 
 
-def test_a_hollow_vessel_has_the_wall_it_asks_for() -> None:
+def test_hollow_vessel_has_its_wall() -> None:
     pot = revolve(hollow(line((1, 0, 0), (1, 2, 0)), 0.1), count=256)
     assert pot.volume == pytest.approx(np.pi * (2 - 0.81 * 1.9), rel=1e-3)
     with pytest.raises(ValueError, match="make it thinner"):
         hollow(line((0.05, 0, 0), (0.05, 1, 0)), 0.1)
 
 
-def test_a_vessel_may_have_its_foot_drawn() -> None:
+def test_vessel_may_have_a_foot_outline() -> None:
     bowl = revolve(hollow(polyline([(0, 0), (0.3, 0), (0.35, 0.5)]), 0.02))
     assert mesh_defects(bowl) == []
     middle = bowl.vertices[np.hypot(bowl.vertices[:, 0], bowl.vertices[:, 2]) < 1e-12]
@@ -107,7 +107,7 @@ def test_corners_of_a_swept_frame_are_mitred() -> None:
     )
 
 
-def test_profile_stands_as_up_says() -> None:
+def test_profile_leans_towards_up() -> None:
     lying = sweep(line((0, 0, 0), (1, 0, 0)), rectangle(0.1, 0.3))
     assert (lying.bounds[1] - lying.bounds[0]).tolist() == pytest.approx([1, 0.3, 0.1])
     leg = sweep(line((0, 0, 0), (0, 1, 0)), rectangle(0.1, 0.3))
@@ -118,7 +118,7 @@ def test_profile_stands_as_up_says() -> None:
         sweep(line((0, 0, 0), (0, 1, 0)), rectangle(0.1), up=(0, 2, 0))
 
 
-def test_a_style_scales_where_it_says_and_closes_at_zero() -> None:
+def test_style_scales_by_position_and_closes_at_zero() -> None:
     style = Style.knots([(0, 1.0), (0.25, (2.0, 0.5)), (1, 0.0)])
     mesh = sweep(line((0, 0, 0), (0, 4, 0)), rectangle(0.2, 0.2), style)
     ring = mesh.vertices[np.isclose(mesh.vertices[:, 1], 1.0)]
@@ -127,7 +127,7 @@ def test_a_style_scales_where_it_says_and_closes_at_zero() -> None:
     assert mesh_defects(mesh) == []
 
 
-def test_styles_that_leave_no_solid_are_refused() -> None:
+def test_styles_without_a_solid_are_refused() -> None:
     rail = line((0, 0, 0), (0, 1, 0))
     with pytest.raises(ValueError, match="only the first and the last"):
         sweep(rail, circle(0.1), Style.knots([(0, 1.0), (0.5, 0.0), (1, 1.0)]))
@@ -145,7 +145,7 @@ def test_styles_that_leave_no_solid_are_refused() -> None:
         sweep(arc(1), circle(0.1), Style.taper(1, 2))
 
 
-def test_a_smooth_style_meets_its_knots_and_stays_between_them() -> None:
+def test_smooth_style_passes_its_knots_without_overshoot() -> None:
     style = Style.knots([(0, 0.0), (0.3, 1.0), (0.6, 0.9), (1, 0.2)], smooth=True, count=50)
     scale, _ = style.at(np.array([0, 0.3, 0.6, 1.0]))
     assert scale[:, 0] == pytest.approx([0, 1, 0.9, 0.2])
@@ -168,7 +168,7 @@ def test_loft_of_rings_in_space() -> None:
     ]
 
 
-def test_a_shell_is_as_thick_as_asked_and_lies_where_its_offset_says() -> None:
+def test_shell_has_its_thickness_and_offset() -> None:
     flat = wavy_grid() * [1, 1, 0]
     for offset, low, high in ((0, -0.05, 0.05), (1, -0.1, 0), (-1, 0, 0.1)):
         shell = solidify(flat, 0.1, offset)
@@ -179,7 +179,7 @@ def test_a_shell_is_as_thick_as_asked_and_lies_where_its_offset_says() -> None:
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
-def test_a_board_lies_on_its_base_over_the_plan_that_its_profile_draws(axis: str) -> None:
+def test_board_is_on_its_base_over_its_profile(axis: str) -> None:
     profile = Profile.of([(0, 0), (3, 0), (0, 1)])
     board = extrude(profile, 0.5, axis, base=2.0)  # type: ignore[arg-type]
     place = "xyz".index(axis)
@@ -203,14 +203,14 @@ def test_any_sweep_is_closed_or_refused(points, roundness, end, turn, cap) -> No
         style = Style.taper(1.0, end if end > 1e-3 else 0.0, twist=turn, count=8)
         mesh = sweep(rail, square_circle(roundness, 0.01, 0.02), style, caps=("flat", cap))
     except ValueError:
-        # What hypothesis finds to refuse: points at one place, curves that turn back, a dome on a point.
+        # Refused: coincident points, curves that turn back, a dome on a point.
         return
     # A rail may turn tighter than its profile is wide, which folds quads; everything else holds.
     assert [fault for fault in mesh_defects(mesh) if "folded" not in fault] == []
 
 
 @pytest.mark.parametrize("first", range(4))
-def test_a_quad_with_a_notch_is_cut_there(first: int) -> None:
+def test_quad_with_a_notch_is_cut_there(first: int) -> None:
     corners = np.array([[0, 0, 0], [1, 2, 0], [0, 0.5, 0], [-1, 2, 0]], dtype=float)
     dart = QuadMesh(corners, np.roll([[0, 1, 2, 3]], first, axis=1).astype(np.int32))
     assert sorted(map(sorted, dart.triangles.tolist())) == [[0, 1, 2], [0, 2, 3]]

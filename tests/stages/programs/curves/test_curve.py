@@ -1,4 +1,4 @@
-"""Curves: sampling by arc length, frames without flips, and what is refused."""
+"""Curves: sampling by arc length, frames without flips, errors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def test_positions_are_relative_arc_length() -> None:
     assert curve.at([0, 0.5, 1]).tolist() == [[0, 0, 0], pytest.approx([1, 1, 0]), [1, 3, 0]]
 
 
-def test_positions_of_a_closed_curve_go_round() -> None:
+def test_positions_of_a_closed_curve_are_modulo_one() -> None:
     square = polyline([(0, 0), (1, 0), (1, 1), (0, 1)], closed=True)
     assert square.length == pytest.approx(4)
     assert square.at([0.875, -0.125, 1.0]).tolist() == [
@@ -29,18 +29,18 @@ def test_positions_of_a_closed_curve_go_round() -> None:
     ]
 
 
-def test_tangents_halve_a_corner_and_follow_the_piece_beside_it() -> None:
+def test_tangents_halve_a_corner_and_follow_straight_pieces() -> None:
     curve = polyline(UNEVEN)
     half = np.sqrt(0.5)
     assert curve.tangents([0.1, 0.25, 0.6]).tolist() == [[1, 0, 0], pytest.approx([half, half, 0]), [0, 1, 0]]
 
 
-def test_a_position_outside_is_refused() -> None:
+def test_position_outside_is_refused() -> None:
     with pytest.raises(ValueError, match=r"position 1\.2 is outside"):
         polyline(UNEVEN).at(1.2)
 
 
-def test_bezier_meets_its_ends_along_its_handles() -> None:
+def test_bezier_ends_are_along_its_handles() -> None:
     curve = bezier([(0, 0, 0), (0, 1, 0), (2, 1, 0), (2, 0, 0)], 40)
     assert curve.at([0, 0.5, 1]).tolist() == [[0, 0, 0], pytest.approx([1, 0.75, 0]), [2, 0, 0]]
     assert curve.tangents(0.0)[1] > 0.98
@@ -48,7 +48,7 @@ def test_bezier_meets_its_ends_along_its_handles() -> None:
         bezier(np.eye(5)[:, :3])
 
 
-def test_a_closed_bezier_joins_up() -> None:
+def test_closed_bezier_is_joined() -> None:
     k = 0.5523
     loop = bezier(
         [(1, 0), (1, k), (k, 1), (0, 1), (-k, 1), (-1, k), (-1, 0), (-1, -k), (-k, -1), (0, -1), (k, -1), (1, -k)],
@@ -60,13 +60,13 @@ def test_a_closed_bezier_joins_up() -> None:
 
 
 @pytest.mark.parametrize(("axis", "quarter"), [("x", [0, 0, 2]), ("y", [0, 0, -2]), ("z", [0, 2, 0])])
-def test_arcs_run_counter_clockwise_around_their_axis(axis, quarter) -> None:
+def test_arcs_are_counter_clockwise(axis, quarter) -> None:
     assert arc(2, 0, 90, axis).points[-1].tolist() == pytest.approx(quarter, abs=1e-12)
     assert arc(2, axis=axis).closed
     assert helix(1, 3, 2.5, axis).points[-1]["xyz".index(axis)] == pytest.approx(3)
 
 
-def test_spiral_runs_from_one_radius_to_the_other() -> None:
+def test_spiral_goes_from_one_radius_to_the_other() -> None:
     points = spiral(0.5, 2, 1.5).points
     assert np.linalg.norm(points[[0, -1]], axis=1) == pytest.approx([0.5, 2])
 
@@ -92,7 +92,7 @@ def test_degenerate_curves_are_refused(points, closed, mend) -> None:
         polyline(points, closed)
 
 
-def test_position_where_a_leg_has_a_height() -> None:
+def test_position_where_a_coordinate_has_a_value() -> None:
     leg = polyline([(0, 0, 0), (0.1, 1, 0), (0, 2, 0)])
     assert leg.at(leg.position_where("y", 0.5)).tolist() == pytest.approx([0.05, 0.5, 0])
     assert leg.position_where("y", 2.0) == pytest.approx(1)
@@ -130,12 +130,12 @@ def test_frames_are_orthonormal_and_do_not_roll(controls) -> None:
     frames_are_right(frames)
     turn = np.einsum("nij,nij->n", frames[1:, :3, :3], frames[:-1, :3, :3])
     tangent_turn = np.einsum("ni,ni->n", frames[1:, :3, 2], frames[:-1, :3, 2])
-    # A frame that does not roll turns by the angle of its tangent: the trace says by how much it turned.
+    # A frame that does not roll turns by the angle of its tangent; the trace gives the angle.
     angle = np.arccos(np.clip((turn - 1) / 2, -1, 1))
     assert angle == pytest.approx(np.arccos(np.clip(tangent_turn, -1, 1)), abs=2e-2)
 
 
-def test_frames_of_a_closed_curve_join_without_a_step() -> None:
+def test_frames_of_a_closed_curve_are_continuous() -> None:
     t = np.linspace(0, 2 * np.pi, 120, endpoint=False)
     knot = polyline(np.stack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)], 1), True)
     frames = knot.frames(knot.positions)
@@ -144,18 +144,18 @@ def test_frames_of_a_closed_curve_join_without_a_step() -> None:
     assert steps.min() > 0.95
 
 
-def test_frames_do_not_flip_where_a_curve_bends_the_other_way() -> None:
+def test_frames_do_not_flip_at_an_inflection() -> None:
     wave = polyline([(x, np.sin(3 * x), 0) for x in np.linspace(0, 6, 200)])
     frames = wave.frames(np.linspace(0, 1, 50), up=(0, 0, 1))
     assert frames[:, :3, 1] == pytest.approx(np.broadcast_to([0, 0, 1], (50, 3)))
 
 
-def test_frames_between_points_are_those_of_the_sweep_there() -> None:
+def test_frames_between_points_are_those_of_a_sweep() -> None:
     curve = helix(1, 2, 1.5)
     assert curve.frames(curve.positions[5]) == pytest.approx(curve.frames(curve.positions)[5])
     assert curve.frames(0.3)[:3, 3] == pytest.approx(curve.at(0.3))
 
 
-def test_a_curve_does_not_care_how_it_was_moved() -> None:
+def test_curve_properties_are_invariant_under_motion() -> None:
     moved = Curve.through(np.array(UNEVEN) + 5.0)
     assert moved.at(0.7) == pytest.approx(polyline(UNEVEN).at(0.7) + 5.0)

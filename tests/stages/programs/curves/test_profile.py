@@ -1,4 +1,4 @@
-"""Profiles: sizes, orientation, the way from square to circle, fillings, refusals."""
+"""Profiles: sizes, orientation, from square to circle, fillings, errors."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.stages.programs.curves.blocks import ELL, STAR
 
 
 def test_roundness_goes_from_square_to_circle() -> None:
-    square, middle, round_ = (square_circle(each, 2, count=64) for each in (0, 0.5, 1))
+    square, middle, round_ = (square_circle(roundness, 2, count=64) for roundness in (0, 0.5, 1))
     assert square.area == pytest.approx(4)
     assert np.hypot(*round_.points.T) == pytest.approx(1)
     assert 3.2 < middle.area < 3.95
@@ -28,14 +28,14 @@ def test_roundness_goes_from_square_to_circle() -> None:
 
 
 @given(st.floats(0, 1), st.floats(0.1, 2), st.floats(0.1, 2), st.sampled_from([8, 16, 24]))
-def test_every_roundness_fills_its_box_and_turns_left(roundness, width, height, count) -> None:
+def test_every_roundness_fills_its_box_counter_clockwise(roundness, width, height, count) -> None:
     profile = square_circle(roundness, width, height, count)
     assert profile.size.tolist() == pytest.approx([width, height])
     assert profile.area > 0
     assert len(profile) == count
 
 
-def test_sizes_of_the_others() -> None:
+def test_sizes_of_other_profiles() -> None:
     assert rectangle(2, 3).points.tolist() == [[1, 1.5], [-1, 1.5], [-1, -1.5], [1, -1.5]]
     assert circle(0.5, 8).size.tolist() == pytest.approx([1, 1])
     assert superellipse(2, 2, 1, 32).area == pytest.approx(2)
@@ -47,7 +47,7 @@ def test_sizes_of_the_others() -> None:
 
 
 @pytest.mark.parametrize("profile", [ELL, STAR, rectangle(1, 2), circle(1), polygon(5, 1), square_circle(0)])
-def test_a_cap_covers_the_profile_once(profile: Profile) -> None:
+def test_cap_covers_the_profile_once(profile: Profile) -> None:
     points = np.concatenate([profile.points, [profile.points.mean(axis=0)]])
     a, b, c, d = (points[profile.cap.quads[:, k]] for k in range(4))
     e, f = c - a, d - b
@@ -56,7 +56,7 @@ def test_a_cap_covers_the_profile_once(profile: Profile) -> None:
     assert twice.min() > 0
 
 
-def test_drawn_clockwise_is_the_same_profile() -> None:
+def test_orientation_and_repeated_points_do_not_matter() -> None:
     points = [(0, 0), (0, 1), (1, 0)]
     assert Profile.of(points).area == pytest.approx(0.5)
     assert Profile.of(points[::-1]).area == pytest.approx(0.5)
@@ -70,7 +70,7 @@ def test_inset_moves_every_side() -> None:
         rectangle(2, 3).inset(1.1)
 
 
-def test_moves() -> None:
+def test_profiles_are_moved_and_scaled() -> None:
     assert rectangle(2, 4).rotated(90).size.tolist() == pytest.approx([4, 2])
     assert rectangle(2).translated(3, 1).points.mean(axis=0).tolist() == [3, 1]
     assert rectangle(2).scaled(2, 3).size.tolist() == [4, 6]
@@ -90,6 +90,6 @@ def test_moves() -> None:
         (lambda: rectangle(1).scaled(0), "above 0"),
     ],
 )
-def test_refusals_say_the_mend(make, mend) -> None:
+def test_errors_name_a_remedy(make, mend) -> None:
     with pytest.raises(ValueError, match=mend):
         make()

@@ -40,14 +40,14 @@ def moved(matrix: np.ndarray, *point: float) -> list[float]:
     return (matrix @ [*point, 1])[:3].tolist()
 
 
-def test_matrices_move_points_where_they_say() -> None:
+def test_matrices_move_points() -> None:
     assert moved(rotation("y", 90), 1, 0, 0) == pytest.approx([0, 0, -1])
     assert moved(rotation("z", 90, (1, 0, 0)), 2, 0, 0) == pytest.approx([1, 1, 0])
     assert moved(scaling(2, 3, 4, (1, 1, 1)), 2, 2, 2) == pytest.approx([3, 4, 5])
     assert moved(mirroring("x", 1), 3, 2, 1) == pytest.approx([-1, 2, 1])
 
 
-def test_attach_brings_one_frame_onto_another() -> None:
+def test_attach_moves_one_frame_onto_another() -> None:
     leg, rail = polyline([(0, 0, 0), (0.2, 1, 0)]), line((0, 0, 0), (1, 0, 0))
     own, to = rail.frames(0.0), leg.frames(0.7)
     assert attach(own, to) @ own == pytest.approx(to)
@@ -81,7 +81,7 @@ def centers(parts: list[Part]) -> list[list[float]]:
     return [part.mesh.bounds.mean(axis=0).round(9).tolist() for part in parts]
 
 
-def test_copies_stand_where_they_should_and_keep_label_and_color() -> None:
+def test_copies_have_their_poses_and_keep_label_and_color() -> None:
     assert centers(radial([PEG], 4)) == [[2, 0.5, 0], [0, 0.5, -2], [-2, 0.5, 0], [0, 0.5, 2]]
     assert centers(radial([PEG], 2, angle=90)) == [[2, 0.5, 0], [0, 0.5, -2]]
     assert centers(linear([PEG], 3, (0, 1, 0))) == [[2, 0.5, 0], [2, 1.5, 0], [2, 2.5, 0]]
@@ -95,12 +95,12 @@ def test_copies_stand_where_they_should_and_keep_label_and_color() -> None:
         assert mesh_defects(part.mesh) == []
 
 
-def test_a_matrix_that_flattens_is_refused() -> None:
+def test_flattening_matrix_is_refused() -> None:
     with pytest.raises(ValueError, match="flattens"):
         PEG.transformed(scaling(1, 0, 1))
 
 
-def test_deformations_move_vertices_where_they_say() -> None:
+def test_deformations_move_vertices() -> None:
     bar = sweep(polyline([(x, 0, 0) for x in np.linspace(0, 2, 41)]), circle(0.1))
     bent = bar.deformed(bend("x", "y", 180))
     assert np.ptp(bent.vertices[:, 0]) == pytest.approx(2 * 2 / np.pi + 0.2, rel=1e-2)
@@ -131,7 +131,7 @@ def test_parts_export_as_labelled_triangles() -> None:
     assert len(exported.vertices) == 16
 
 
-def test_the_guide_runs() -> None:
+def test_example_of_the_package_runs() -> None:
     lines = (guide.__doc__ or "").split("\n")
     first = next(k for k, text in enumerate(lines) if text.startswith("    import numpy"))
     last = next(k for k, text in enumerate(lines) if text.startswith("Conventions"))

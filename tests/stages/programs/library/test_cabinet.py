@@ -1,4 +1,4 @@
-"""Cabinets stand, shut and open as their parameters say; what every program promises is tested beside this."""
+"""Cabinets have the size, fronts and shelves of their parameters; `test_every_program.py` has what holds for all."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ def cabinets(count: int, **fixed: float) -> list[Values]:
     """Random cabinets with some values fixed, all valid."""
     schema = PROGRAM.schema
     columns = draw(schema, 2 * count, np.random.default_rng(4), True).columns
-    found = [schema.canonical({**schema.from_vector(column), **fixed})[0] for column in columns.T]
-    return [values for values in found if not PROGRAM.violated(values)][:count]
+    candidates = [schema.canonical({**schema.from_vector(column), **fixed})[0] for column in columns.T]
+    return [values for values in candidates if not PROGRAM.violated(values)][:count]
 
 
-def test_the_cabinet_has_as_many_parameters_as_the_paper_says() -> None:
+def test_cabinet_has_the_published_number_of_parameters() -> None:
     assert len(PROGRAM.parameters) == 25
 
 
-def test_cabinets_stand_on_the_ground_and_are_as_high_and_as_deep_as_asked() -> None:
+def test_cabinets_have_their_height_and_depth_on_the_ground() -> None:
     for values in cabinets(200):
         bounds = np.array([part.mesh.bounds for part in build(values)])
         assert bounds[:, 0, 1].min() == pytest.approx(0.0, abs=1e-9)
@@ -35,14 +35,14 @@ def test_cabinets_stand_on_the_ground_and_are_as_high_and_as_deep_as_asked() -> 
         assert bounds[:, 0, 2].min() == pytest.approx(-values["depth"] / 2.0)
 
 
-def test_each_column_has_its_shelves_or_its_drawers_and_doors() -> None:
+def test_columns_have_shelves_or_drawers_and_doors() -> None:
     for values in cabinets(150):
         labels = Counter(part.label for part in build(values))
-        bare, shut = values["open_columns"], values["column_count"] - values["open_columns"]
-        leaves = shut * (2 if values["column_width"] > 0.55 else 1)
-        assert labels["shelf"] == (values["shelf_count"] if bare else 0) * bare
+        opened, closed = values["open_columns"], values["column_count"] - values["open_columns"]
+        leaves = closed * (2 if values["column_width"] > 0.55 else 1)
+        assert labels["shelf"] == (values["shelf_count"] if opened else 0) * opened
         assert labels["door"] == leaves
-        assert labels["drawer"] == shut * values["drawer_rows"]
+        assert labels["drawer"] == closed * values["drawer_rows"]
         assert labels["handle"] == labels["door"] + labels["drawer"]
         assert labels["glass"] == (leaves if values["door_style"] == 3 else 0)
 
@@ -50,8 +50,8 @@ def test_each_column_has_its_shelves_or_its_drawers_and_doors() -> None:
 def test_open_columns_are_in_the_middle() -> None:
     base = PROGRAM.schema.base
     kept = {
-        (count, bare): CabinetDimensions({**base, "column_count": count, "open_columns": bare}).is_open
-        for count, bare in ((3, 1), (4, 2), (2, 1), (3, 3))
+        (count, opened): CabinetDimensions({**base, "column_count": count, "open_columns": opened}).is_open
+        for count, opened in ((3, 1), (4, 2), (2, 1), (3, 3))
     }
     assert kept == {
         (3, 1): [False, True, False],
@@ -61,31 +61,31 @@ def test_open_columns_are_in_the_middle() -> None:
     }
 
 
-def test_fronts_do_not_overlap_and_stay_within_the_case() -> None:
+def test_fronts_are_disjoint_and_within_the_case() -> None:
     for values in cabinets(150, open_columns=0):
         cabinet = CabinetDimensions(values)
         fronts = [part.mesh.bounds for part in build(values) if part.label in {"door", "drawer"}]
-        for place, one in enumerate(fronts):
-            assert -cabinet.half < one[0, 0] < one[1, 0] < cabinet.half
-            assert cabinet.floor < one[0, 1] < one[1, 1] < cabinet.ceiling
-            for other in fronts[:place]:
-                apart = np.maximum(one[0, :2], other[0, :2]) - np.minimum(one[1, :2], other[1, :2])
-                assert apart.max() > 0.0015
+        for index, front in enumerate(fronts):
+            assert -cabinet.half < front[0, 0] < front[1, 0] < cabinet.half
+            assert cabinet.floor < front[0, 1] < front[1, 1] < cabinet.ceiling
+            for other in fronts[:index]:
+                gap = np.maximum(front[0, :2], other[0, :2]) - np.minimum(front[1, :2], other[1, :2])
+                assert gap.max() > 0.0015
 
 
-def test_handles_sit_on_their_fronts() -> None:
+def test_handles_are_on_their_fronts() -> None:
     for values in cabinets(150, open_columns=0):
         parts = build(values)
         fronts = [part.mesh.bounds for part in parts if part.label in {"door", "drawer"}]
         for part in parts:
             if part.label == "handle":
                 low, high = part.mesh.bounds
-                held = [a for a, b in fronts if (a[:2] < low[:2]).all() and (high[:2] < b[:2]).all()]
-                assert len(held) == 1, PROGRAM.schema.to_text(values)
+                holding = [a for a, b in fronts if (a[:2] < low[:2]).all() and (high[:2] < b[:2]).all()]
+                assert len(holding) == 1, PROGRAM.schema.to_text(values)
 
 
 @pytest.mark.parametrize("kind", range(3))
-def test_handles_of_the_lowest_doors_are_sound(kind: int) -> None:
+def test_handles_of_the_lowest_doors_have_no_defects(kind: int) -> None:
     low = {"height": 0.7, "base_height": 0.24, "drawer_rows": 4, "drawer_share": 1.0, "open_columns": 0}
     for values in cabinets(20, **low, handle_type=kind, handle_size=0.0):
         for part in build(values):

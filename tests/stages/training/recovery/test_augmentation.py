@@ -1,4 +1,4 @@
-"""Inputs changed by chance, many at once."""
+"""Augmented clouds and drawings."""
 
 from __future__ import annotations
 
@@ -12,46 +12,46 @@ from stages.training.recovery.drawings import DRAWING_SIDE_PIXELS
 
 
 def clouds(n: int) -> torch.Tensor:
-    """Cubes of 400 points, stored, all the same."""
+    """Equal cubes of 400 points, quantized."""
     points = np.random.default_rng(1).random((400, 3)) * 7.0
     return torch.from_numpy(np.array([quantized_cloud(points)] * n))
 
 
-def seen(n: int, points: int, share: float) -> torch.Tensor:
+def augmented(n: int, points: int, share: float) -> torch.Tensor:
     return augment_clouds(clouds(n), points, share, Generator().manual_seed(2))
 
 
-def test_clouds_that_are_not_spoilt_are_points_of_the_shape_each_once() -> None:
-    found = seen(3, 400, 0.0)
+def test_uncorrupted_clouds_are_points_of_the_shape_without_repeats() -> None:
+    found = augmented(3, 400, 0.0)
     assert torch.equal(found.sort(dim=1).values[0], found.sort(dim=1).values[2])
     assert not torch.equal(found[0], found[2])
     torch.testing.assert_close(found.abs().amax(dim=(1, 2)), torch.full((3,), 0.5))
 
 
-def test_spoilt_clouds_have_noise_or_have_lost_up_to_two_thirds_of_their_points() -> None:
-    found = seen(64, 400, 1.0)
-    distinct = torch.tensor([len(each.unique(dim=0)) for each in found])
+def test_corrupted_clouds_have_noise_or_fewer_points() -> None:
+    found = augmented(64, 400, 1.0)
+    distinct = torch.tensor([len(cloud.unique(dim=0)) for cloud in found])
     assert distinct.min() > 100
     # a seventh has noise alone
     assert 3 <= (distinct == 400).sum() <= 20
     assert found.abs().amax() < 0.5001
 
 
-def test_what_is_lost_comes_again_as_often_as_anything_else() -> None:
-    counts = [each.unique(dim=0, return_counts=True)[1] for each in seen(64, 400, 1.0)]
-    assert all(each.max() - each.min() <= 1 for each in counts)
+def test_remaining_points_are_repeated_evenly() -> None:
+    counts = [cloud.unique(dim=0, return_counts=True)[1] for cloud in augmented(64, 400, 1.0)]
+    assert all(count.max() - count.min() <= 1 for count in counts)
 
 
-def test_a_share_is_spoilt() -> None:
-    found = seen(200, 400, 0.5)
-    lost = torch.tensor([len(each.unique(dim=0)) < 400 for each in found])
+def test_a_share_is_corrupted() -> None:
+    found = augmented(200, 400, 0.5)
+    lost = torch.tensor([len(cloud.unique(dim=0)) < 400 for cloud in found])
     assert 0.3 < lost.float().mean() < 0.55
 
 
-def test_precision_of_the_network_is_none_of_the_clouds() -> None:
+def test_clouds_do_not_depend_on_the_precision_of_the_network() -> None:
     with torch.autocast("cpu", torch.bfloat16):
-        found = seen(8, 200, 1.0)
-    assert torch.equal(found, seen(8, 200, 1.0))
+        found = augmented(8, 200, 1.0)
+    assert torch.equal(found, augmented(8, 200, 1.0))
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def drawing() -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
     return ink
 
 
-def test_drawings_come_back_from_their_bits(drawing: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> None:
+def test_drawings_are_unpacked_from_their_bits(drawing: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> None:
     found = unpack_drawings(torch.from_numpy(np.packbits(drawing)[None]))
     assert np.array_equal(found[0, 0].numpy() > 0, drawing)
 

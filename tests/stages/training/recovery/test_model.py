@@ -1,4 +1,4 @@
-"""The network on one device and the other."""
+"""The network on CPUs and GPUs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from stages.training.recovery.settings import RecoveryModelConfig
 from tests.stages.programs.stool import PROGRAM as STOOL
 
 
-def test_squares_are_halved_on_a_gpu_as_they_are_elsewhere() -> None:
+def test_pooling_for_gpus_equals_max_pooling() -> None:
     generator = torch.Generator().manual_seed(3)
     features = torch.randn(2, 3, 7, 10, generator=generator, requires_grad=True)
     weight = torch.randn(2, 3, 3, 5, generator=generator)
@@ -21,7 +21,7 @@ def test_squares_are_halved_on_a_gpu_as_they_are_elsewhere() -> None:
     torch.testing.assert_close(gradient, wanted)
 
 
-def test_places_of_points_are_read_in_full_whatever_the_precision() -> None:
+def test_coordinates_have_full_precision_under_autocast() -> None:
     net = RecoveryNet(RecoveryModelConfig(name="small", points=64), STOOL.parameters)
     seen: list[torch.Tensor] = []
     net.encoder.convolutions[0].register_forward_hook(lambda _, __, features: seen.append(features))

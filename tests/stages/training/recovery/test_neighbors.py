@@ -1,4 +1,4 @@
-"""Neighbours and edge convolutions, against what they are by definition."""
+"""Nearest neighbours and edge maxima equal their definitions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def distances(points: Tensor) -> Tensor:
 
 @pytest.mark.parametrize("features", [3, 5])
 @given(seed=st.integers(0, 2**31), n=st.integers(1, 80), flat=st.booleans())
-def test_neighbors_are_as_near_as_the_nearest(features: int, seed: int, n: int, flat: bool) -> None:
+def test_neighbors_are_the_nearest(features: int, seed: int, n: int, flat: bool) -> None:
     rng = np.random.default_rng(seed)
     cloud = rng.normal(size=(2, n, features)).round(1)  # with points that coincide
     cloud[..., -1] *= not flat
@@ -30,7 +30,7 @@ def test_neighbors_are_as_near_as_the_nearest(features: int, seed: int, n: int, 
     torch.testing.assert_close(distances(points).gather(-1, found).sort(dim=-1).values, expected, atol=2e-3, rtol=0)
 
 
-def test_neighbors_are_told_apart_where_other_numbers_are_short() -> None:
+def test_neighbors_have_full_precision_under_autocast() -> None:
     line = torch.stack([torch.linspace(0.4, 0.5, 50), torch.zeros(50)], dim=-1)[None]
     with torch.autocast("cpu", torch.bfloat16):
         found = nearest_neighbors(line, 3)
@@ -38,7 +38,7 @@ def test_neighbors_are_told_apart_where_other_numbers_are_short() -> None:
     torch.testing.assert_close(distances(line).gather(-1, found).sort(dim=-1).values, expected, atol=1e-4, rtol=0)
 
 
-def test_neighbors_of_a_cloud_with_one_point_far_away() -> None:
+def test_neighbors_of_a_cloud_with_an_outlier() -> None:
     points = torch.rand(1, 300, 3, generator=torch.Generator().manual_seed(0))
     points[0, 7] = 1000.0
     found = nearest_neighbors(points, 5)
@@ -46,7 +46,7 @@ def test_neighbors_of_a_cloud_with_one_point_far_away() -> None:
     torch.testing.assert_close(distances(points).gather(-1, found), expected, atol=1e-4, rtol=1e-4)
 
 
-def test_edge_maximum_and_its_gradient_are_those_of_all_edges() -> None:
+def test_edge_maximum_and_gradient_equal_those_of_all_edges() -> None:
     generator = torch.Generator().manual_seed(1)
     features = torch.randn(2, 30, 8, generator=generator, requires_grad=True)
     neighbors = torch.randint(30, (2, 30, 6), generator=generator)
@@ -58,7 +58,7 @@ def test_edge_maximum_and_its_gradient_are_those_of_all_edges() -> None:
     found = edge_maximum(features, neighbors)
     (gradient,) = torch.autograd.grad((found * weight).sum(), features)
     torch.testing.assert_close(found, expected)
-    # a neighbour that is listed twice gets its gradient once here, and in two halves there: the same sum
+    # a neighbour listed twice gets its gradient once here and in two halves there, with the same sum
     torch.testing.assert_close(gradient, wanted)
     at_once = _EdgeMaximumOnGpu.apply(features, neighbors)
     (gradient,) = torch.autograd.grad((at_once * weight).sum(), features)
@@ -66,7 +66,7 @@ def test_edge_maximum_and_its_gradient_are_those_of_all_edges() -> None:
     torch.testing.assert_close(gradient, wanted, atol=1e-4, rtol=0)
 
 
-def test_gradient_of_all_edges_at_once_leaves_determinism_as_it_was() -> None:
+def test_gradient_for_gpus_restores_determinism() -> None:
     strict = torch.are_deterministic_algorithms_enabled()
     torch.use_deterministic_algorithms(True)
     try:
@@ -75,5 +75,5 @@ def test_gradient_of_all_edges_at_once_leaves_determinism_as_it_was() -> None:
         assert torch.are_deterministic_algorithms_enabled()
     finally:
         torch.use_deterministic_algorithms(strict)
-    # each of the second half is the greatest for all nine or for none
+    # a point is the maximum for all nine or for none
     assert set((features.grad[0, :, 2:]).round(decimals=4).unique().tolist()) == {0.0, 9.0}

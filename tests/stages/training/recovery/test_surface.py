@@ -1,4 +1,4 @@
-"""Even points and distances between clouds."""
+"""Even points, distances between clouds, frames and subsamples."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def test_chamfer_distance_is_that_of_all_pairs(seed: int, n: int, m: int) -> Non
     assert np.isclose(chamfer_squared(a, b), brute_chamfer(a, b))
 
 
-def test_even_points_lie_on_the_surface_and_as_many_in_each_part_as_its_area_says() -> None:
+def test_even_points_are_on_the_surface_and_proportional_to_area() -> None:
     points = even_points(SQUARES, FACES, 3000)
     assert (points[:, 2] == 0.0).all()
     assert (points >= SQUARES.min(axis=0)).all()
     assert (points <= SQUARES.max(axis=0)).all()
     counts, _, _ = np.histogram2d(points[:, 0], points[:, 1], bins=(6, 2), range=((0, 3), (0, 1)))
-    # by chance a cell of 250 would miss by 16; these miss by less
+    # random points in a cell of 250 deviate by 16, these by less
     assert np.abs(counts - 250).max() < 20
 
 
@@ -41,7 +41,7 @@ def test_even_points_move_little_with_the_surface() -> None:
     assert np.abs(even_points(SQUARES, FACES, 500) - even_points(moved, FACES, 500)).max() < 0.004
 
 
-def test_frame_is_of_any_place_and_size() -> None:
+def test_frame_normalizes_any_position_and_size() -> None:
     points = np.random.default_rng(0).normal(size=(50, 3))
     frame = frame_of(points)
     normalized = frame.normalized(points)
@@ -51,7 +51,7 @@ def test_frame_is_of_any_place_and_size() -> None:
 
 
 @given(seed=st.integers(0, 2**31), n=st.integers(1, 30))
-def test_taken_takes_every_point_as_often_as_any(seed: int, n: int) -> None:
+def test_subsample_draws_points_equally_often(seed: int, n: int) -> None:
     points = np.arange(10, dtype=np.float64)[:, None] * np.ones(3)
     counts = np.bincount(subsample(points, n, np.random.default_rng(seed))[:, 0].astype(int), minlength=10)
     assert counts.sum() == n

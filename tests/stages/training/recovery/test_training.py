@@ -1,4 +1,4 @@
-"""Training of recovery on the real mill."""
+"""Training of recovery in the real pipeline."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FOLDER = "stools-models/small-tests_stages_programs_stool-0"
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["points", "sketch"])
-def test_model_of_a_program_is_published_and_is_the_same_twice(kind: str, tmp_path: Path) -> None:
+def test_model_of_a_program_is_published_deterministically(kind: str, tmp_path: Path) -> None:
     wanted = config(input=kind)
     assert train(wanted, tmp_path / "one").made == 6
     card = (tmp_path / "one" / FOLDER / "README.md").read_text()
@@ -30,20 +30,20 @@ def test_model_of_a_program_is_published_and_is_the_same_twice(kind: str, tmp_pa
 
 
 @pytest.mark.slow
-def test_each_round_learns_from_shapes_of_its_own_and_of_those_before(tmp_path: Path) -> None:
+def test_rounds_learn_from_their_shapes_and_earlier_ones(tmp_path: Path) -> None:
     train(config(), tmp_path)
     records = {
         path.stem: json.loads(path.read_text()) for path in tmp_path.glob(".work/stools/training/records/*.json")
     }
     name = "small-tests_stages_programs_stool-"
     inputs = [sorted(records[f"{name}0-r000{number}"]["inputs"]) for number in (0, 1)]
-    first, second = [[each for each in of_round if "-pool" in each] for of_round in inputs]
+    first, second = [[name for name in of_round if "-pool" in name] for of_round in inputs]
     assert first == [f"training/{name}pool0000.safetensors"]
     assert second == [*first, f"training/{name}pool0001.safetensors"]
 
 
 @pytest.mark.slow
-def test_it_learns_what_a_stool_is(tmp_path: Path) -> None:
+def test_training_learns_a_stool(tmp_path: Path) -> None:
     wanted = config(
         learning_rate=0.01,
         points=128,
@@ -57,12 +57,12 @@ def test_it_learns_what_a_stool_is(tmp_path: Path) -> None:
     )
     train(wanted, tmp_path)
     rows = list(csv.DictReader((tmp_path / FOLDER / "curves.csv").read_text().splitlines()))
-    # by chance it would be right in about a sixth
+    # a random choice is right in about a sixth
     assert float(rows[-1]["val_accuracy"]) > 0.3
     assert float(rows[-1]["val_chamfer"]) < 0.02
 
 
-def test_a_program_that_is_not_there_is_told_before_anything_starts() -> None:
+def test_unknown_program_is_reported_first() -> None:
     with pytest.raises(ConfigError, match="did you mean chair"):
         STAGE.check(config(programs=["chari"]))
     with pytest.raises(ConfigError, match="it learns from programs, but the config has no program"):

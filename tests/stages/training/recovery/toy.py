@@ -24,8 +24,7 @@ PROGRAM = "tests.stages.programs.stool"
 SMALL: Mapping[str, Any] = {
     "kind": "recovery", "name": "small", "points": 64, "neighbors": 6, "widths": [8, 8], "embedding": 8,
     "channels": [2, 2, 4, 4, 4, 4, 4, 4], "decoder": [16, 8],
-"batch_size": 8, "steps": 6, "max_rounds": 2,
-    "validation_shapes": 6, "shapes_per_round": 6, "augmented_share": 0.5,
+    "batch_size": 8, "steps": 6, "max_rounds": 2, "validation_shapes": 6, "shapes_per_round": 6, "augmented_share": 0.5,
 }  # fmt: skip
 
 
