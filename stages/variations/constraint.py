@@ -1,7 +1,7 @@
 """Global constraints: properties of a whole shape that no neighbourhood tells (substructures §5.3).
 
-A constraint is a module of `stages.variations.constraints` with the constraint's name that defines
-`CONSTRAINT = GlobalConstraint(...)`. A config asks for it by name, with the part labels that it concerns.
+A constraint is a module of `stages.variations.constraints` with the constraint's name that defines `CONSTRAINT =
+GlobalConstraint(...)`. A config asks for it by name, with the part labels that it concerns.
 """
 
 from __future__ import annotations
@@ -94,8 +94,7 @@ def build_repair(kit: Kit, constraints: Mapping[str, Labels], max_factor: float,
     """Return what resizes parts of an assembly until it meets all constraints of a config.
 
     most: largest factor of a part; rigid: labels of parts that keep their size. The repair returns None where it fails
-        or
-    a contact would break.
+        or a contact would break.
     """
     known, unmet, resizer = find_constraints(), build_test(kit, constraints), Resizer(kit, max_factor, rigid)
     makers = [(known[name].repair, labels) for name, labels in constraints.items()]

@@ -14,8 +14,7 @@ def vary(kit: Kit, count: int, rng: np.random.Generator, config: SearchConfig | 
     """Return `count` new assemblies of the kit's parts, or fewer where `config.tries_per_round` tries find no more.
 
     Every neighbourhood and every contact occurs in the exemplars, by the kit's grammar. No two assemblies are the same
-    by
-    `config.duplicates`, and none is a piece of an exemplar unless `config.sub_assemblies`. Hubs are not restored.
+    by `config.duplicates`, and none is a piece of an exemplar unless `config.sub_assemblies`. Hubs are not restored.
     """
     search = Search(ContactOracle(kit), config or SearchConfig())
     variants, _ = search.run(rng, search.config.tries_per_round, count, kit.name, lambda _: None)

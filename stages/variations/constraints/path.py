@@ -19,8 +19,7 @@ from stages.variations.substitution.ground import GroundTest
 
 LOWER_END, UPPER_END = 0, 1
 """Which end of the shared span of two parts stays: the lower one where a part is made lower, since both may stand on
-the
-ground, and the upper one where it is made taller.
+the ground, and the upper one where it is made taller.
 """
 
 

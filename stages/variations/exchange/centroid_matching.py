@@ -17,8 +17,7 @@ def match_centroids(rng: np.random.Generator, kit: KitTables, a: ShapeTables, b:
 
     The first match in random order counts. Its images go to `ws.images`; the docking transform, fitted to the centroids
     without reflection, goes to `ws.transform`. One boundary part, or several in a row, leave a rotation undecided: the
-    known
-    weakness of this rule. The fit's residual rejects mirrored matches.
+    known weakness of this rule. The fit's residual rejects mirrored matches.
     """
     count, tolerance = int(ws.counts[N_BOUNDARY]), kit.limits[0]
     boundary = ws.boundary[:count]

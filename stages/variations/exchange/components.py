@@ -1,8 +1,7 @@
 """Choice of what stays of the shape that a piece is docked into (strings §4).
 
 B without the images of the boundary falls into components. Those stay with which every boundary part has a
-neighbourhood
-that the grammar admits.
+neighbourhood that the grammar admits.
 """
 
 from __future__ import annotations
@@ -89,8 +88,7 @@ def _possible_neighbours(tolerance, a, b, ws, components):
     """Return what each boundary part may have around it: `(firsts, lasts, near, owner, touched)`.
 
     The k-th may have neighbours of the types near[firsts[k]:lasts[k]], each if the component `owner` stays, always
-    where
-    that is -1; all int64.
+    where that is -1; all int64.
     touched: bool (components,), whether a component is next to a boundary part
     """
     count = ws.counts[N_BOUNDARY]

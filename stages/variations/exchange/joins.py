@@ -16,10 +16,8 @@ def join(rng, kit, a, b, ws, min_parts, max_parts):
     """Put the piece of A, moved, in place of the part of B that its boundary cuts off.
 
     Boundary parts replace their images. Of B without the images, components stay so that the neighbourhood of each
-    boundary
-    part is in the grammar; parts of them that coincide with parts of the piece are merged. Fills the variant's parts
-    and
-    inherited edges.
+    boundary part is in the grammar; parts of them that coincide with parts of the piece are merged. Fills the variant's
+    parts and inherited edges.
     """
     ws.counts[TRY_NUMBER] += 1
     ws.counts[N_EDGES] = 0
@@ -118,9 +116,7 @@ def _put_rest(kit, a, b, ws, piece):
 
 @numba.njit(cache=True)
 def _part_of_piece(by_type, first, last, from_a, translations, point, tolerance):
-    """Return which of the parts by_type[first:last] of A is in the variant at a point, as a part of the variant, or
-    -1.
-    """
+    """Return which of the parts by_type[first:last] of A is in the variant at a point, by its number there, or -1."""
     for k in range(first, last):
         v = from_a[by_type[k]]
         if v >= 0 and squared_distance(translations[v], point) <= tolerance**2:

@@ -14,8 +14,7 @@ def correct_orientations(dockings: DockingTable, ws: Workspace) -> bool:
     fails.
 
     A part is wrong if its pose relative to a neighbour was not observed. The poses that its neighbours' observed
-    dockings
-    would give it at its place are tried in turn until one suits all neighbours. Labels of the edges are set.
+    dockings would give it at its place are tried in turn until one suits all neighbours. Labels of the edges are set.
     """
     parts, count = int(ws.counts[N_PARTS]), int(ws.counts[N_EDGES])
     edges = ws.edges[:count].astype(np.int32)

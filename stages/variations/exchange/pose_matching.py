@@ -12,10 +12,8 @@ from stages.variations.kernels.structs import MIN_UPRIGHT_COSINE, N_BOUNDARY, N_
 
 
 @numba.njit(cache=True)
-def _transform_between(rotation, translation, symmetry, onto_rotation, onto_translation, transform):
-    """Write the transform that takes a part's pose, by one of its symmetries, to another pose into
-    `apply_transform`.
-    """
+def _transform_between(rotation, translation, symmetry, onto_rotation, onto_translation, out):
+    """Write the transform that takes a part's pose, by one of its symmetries, to another pose into `out`."""
     for i in range(3):
         x, y, z = 0.0, 0.0, 0.0
         for k in range(3):
@@ -23,11 +21,11 @@ def _transform_between(rotation, translation, symmetry, onto_rotation, onto_tran
             y += onto_rotation[i, k] * symmetry[k, 1]
             z += onto_rotation[i, k] * symmetry[k, 2]
         for j in range(3):
-            transform[i, j] = 0.0 + x * rotation[j, 0] + y * rotation[j, 1] + z * rotation[j, 2]
+            out[i, j] = 0.0 + x * rotation[j, 0] + y * rotation[j, 1] + z * rotation[j, 2]
     for i in range(3):
-        transform[3, i] = onto_translation[i]
+        out[3, i] = onto_translation[i]
         for j in range(3):
-            transform[3, i] -= transform[i, j] * translation[j]
+            out[3, i] -= out[i, j] * translation[j]
 
 
 @numba.njit(cache=True)
@@ -35,8 +33,7 @@ def _fit_transform(kit, a, b, ws):
     """Refit the docking transform to the whole boundary by least squares, without changing handedness (strings §4).
 
     It uses the SVD of their covariance. Each part counts with its centroid and its three axes, so one boundary part, or
-    a
-    row of them, determines the transform too.
+    a row of them, determines the transform too.
     """
     count = ws.counts[N_BOUNDARY]
     centre_a, centre_b = np.zeros(3), np.zeros(3)

@@ -19,8 +19,7 @@ def insert_or_remove_unit(rng, kit, a, ws):
     A row are parts of one type that look the same way, along an axis of one of them. The piece moves from one part of
     the row
     to the other: away from the rest of A, which inserts the parts between, or into it, which removes them. The boundary
-        has
-    images only where the whole cross-section repeats.
+        has images only where the whole cross-section repeats.
     """
     seed = random_below(rng, len(a.types))
     image = _another_of_its_row(rng, kit, a, seed, ws.stack)

@@ -1,10 +1,8 @@
 """Growing one shape: the most constrained part first, whole patterns at once, backtracking along a trail.
 
 Example: a part P has the candidates {A, B}, {A, C}. `propagate` places A, which both have. `_draw` chooses {A, B},
-    which
-is a decision; `assign` prunes {A, C} and `propagate` places B. If B's domain is empty that is a CONFLICT: `undo` takes
-B
-off and restores {A, C}, `prune` removes {A, B}, and `propagate` places C.
+which is a decision; `assign` prunes {A, C} and `propagate` places B. If B's domain is empty that is a CONFLICT: `undo`
+takes B off and restores {A, C}, `prune` removes {A, B}, and `propagate` places C.
 """
 
 from __future__ import annotations

@@ -61,9 +61,7 @@ def find_placement(
 
 @numba.njit(cache=True)
 def add_placement(kit, contacts, state, part_type, rotation, translation):
-    """Add a placement of a type at a pose, with links to the parts that forbid or touch it; return it, or
-    NO_PLACEMENT.
-    """
+    """Add a placement of a type at a pose, linked to the parts that forbid or touch it; return it, or NO_PLACEMENT."""
     placement = state.counts[N_PLACEMENTS]
     if placement == len(state.placement_types):
         return NO_PLACEMENT

@@ -133,8 +133,7 @@ def connect(kit, contacts, ws):
     """Add the contacts between parts of A alone and of B alone, then test the grammar.
 
     With UNKNOWN the pairs in `ws.unknown` must be resolved first. The final outcome does not depend on what was known:
-    first
-    the grammar of parts that no such contact can change, then forbidden contacts, then the grammar of all parts.
+    first the grammar of parts that no such contact can change, then forbidden contacts, then the grammar of all parts.
     """
     ws.counts[N_UNKNOWNS] = 0
     pairs = _overlaps(ws.boxes, ws.counts[N_PARTS], ws.origin, True, 1.1 * kit.limits[1], ws.near)

@@ -50,9 +50,7 @@ class Archive:
         return self._cells.add(cell), self._histograms.add(histogram)
 
     def crowds(self, places: np.ndarray) -> np.ndarray:
-        """Return how common the variants at k places int (k, 2) are, int64 (k,); the rarest have the smallest
-        numbers.
-        """
+        """Return how common the variants at k places int (k, 2) are, int64 (k,), small numbers for rare ones."""
         crowds: np.ndarray = self._cells.counts[places[:, 0]] * self._histograms.counts[places[:, 1]]
         return crowds
 

@@ -26,8 +26,7 @@ class CopiedPieces:
     """How much of a shape is a verbatim copy.
 
     A piece is a connected set of parts that stand so in one exemplar: one rigid transform, no reflection, lays each
-    part
-    on one that looks the same, and the contacts that connect the parts are contacts there too.
+    part on one that looks the same, and the contacts that connect the parts are contacts there too.
 
     largest: share of the shape's parts in its largest piece, 0 to 1
     pieces: number of pieces that cover the shape, chosen greedily
@@ -65,8 +64,7 @@ class CopyDetector:
         """Return how much of `assembly` is copied.
 
         labels: int32 (m, 2), directed docking labels of its edges, as from `DockingTable.label_edges`; -1 where no
-            exemplar
-        shows the contact
+            exemplar shows the contact
         """
         shape = shape_tables(assembly, labels, self._types)
         parts, starts, owners = rigid_pieces(

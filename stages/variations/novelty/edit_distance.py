@@ -18,9 +18,8 @@ def edit_bounds(first: Assembly, second: Assembly) -> tuple[int, int]:
     """Return a lower and an upper bound of the graph edit distance of two assemblies of one kit.
 
     Lower bound: the cheapest assignment of parts, where a pair costs 1 if the types differ, plus half the difference of
-    the degrees, since each edit of a contact concerns two parts.
-    Upper bound: the cost of the edits of the cheapest assignment, where a pair also costs half the difference of its
-    neighbour types.
+    the degrees, since each edit of a contact concerns two parts. Upper bound: the cost of the edits of the cheapest
+    assignment, where a pair also costs half the difference of its neighbour types.
     """
     types = 1 + int(max(first.types.max(), second.types.max()))
     around_first, around_second = _neighbour_counts(first, types), _neighbour_counts(second, types)

@@ -22,8 +22,7 @@ def kit_overlap(kit: Kit) -> dict[str, Any]:
 
     Proof: a shape graph is connected. Suppose it holds a neighbourhood that only one exemplar shows and one that only
     another shows. On a path between them either two adjacent neighbourhoods have no exemplar in common, which is a
-    joint,
-    or several exemplars show one of them.
+    joint, or several exemplars show one of them.
     """
     if len(kit.exemplars) < 2:
         return {}

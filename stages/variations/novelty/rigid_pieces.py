@@ -261,9 +261,7 @@ def rigid_pieces(groups, dockings, types, handed, tails, joints, target, budget)
 
 @numba.njit(cache=True)
 def cover(parts, starts, n):
-    """Return how many of the pieces cover n parts by greedy set cover, counting each part in none of them as one
-    piece.
-    """
+    """Return how many of the pieces cover n parts by greedy set cover; a part in none of them counts as a piece."""
     pieces = len(starts) - 1
     first, following = np.full(n + 1, -1, dtype=np.int64), np.full(pieces, -1, dtype=np.int64)
     for piece in range(pieces - 1, -1, -1):

@@ -16,7 +16,7 @@ def splits_table(measures: Mapping[str, Mapping[str, Any]]) -> str:
     """Return the splits of each kit as Markdown: a table, what its figures mean, and what came out short.
 
     measures: by kit `pool`, `split_by`, `min_shared_surface`, `discarded` and `splits`: of each split `wanted` and
-    `samples`, and of val and test `compared`, `median` and `most`
+        `samples`, and of val and test `compared`, `median` and `most`
     """
     lines = [
         "| kit | split | samples | asked for | shared with train, median | most |",

@@ -34,12 +34,12 @@ class HubRestorer:
     """Puts the hubs of a kit back into shapes.
 
     upright: whether a hub stands below, above or next to a part only as one of its type did in an exemplar; otherwise
-    symmetries of the part may turn it over
+        symmetries of the part may turn it over
     """
 
-    def __init__(self, answers: ContactOracle, upright: bool) -> None:
-        self.answers = answers
-        self.kit = answers.kit
+    def __init__(self, oracle: ContactOracle, upright: bool) -> None:
+        self.oracle = oracle
+        self.kit = oracle.kit
         self._up = np.array({"y": [0.0, 1.0, 0.0], "z": [0.0, 0.0, 1.0]}[self.kit.up]) if upright else np.zeros(3)
         self._hub_poses = {hub: self._observed(hub) for hub in self.kit.grammar.hubs}
 
@@ -47,10 +47,8 @@ class HubRestorer:
         """Return `assembly` with hub parts where they fit, after its own parts, and with their contacts.
 
         Candidate poses are those that parts of the assembly had a hub at in an exemplar, most agreed first. A hub fits
-        where
-        it has most of the neighbours that one of its type had in an exemplar and every contact is an observed docking.
-        A shape
-        with stretched parts gets none: no exemplar shows how a hub docks to these.
+        where it has most of the neighbours that one of its type had in an exemplar and every contact is an observed
+        docking. Shapes with stretched parts get none, since no exemplar shows how a hub docks to these.
         """
         kit = self.kit
         if assembly.stretches is not None:
@@ -75,10 +73,9 @@ class HubRestorer:
 
         required >= 1: minimum number of hub parts.
         0 < required < 1: all three must hold. (1) Every spanning hub is present. (2) The most connected hub type has at
-        least
-        `required` times its number per part in the exemplars, and at least one. (3) At most MAX_SHARE_LACKING_HUBS of
-        the parts
-        lack a hub type that all parts of their type touch in the exemplars: a rail ends where its road ends.
+            least `required` times its number per part in the exemplars, and at least one. (3) At most
+            MAX_SHARE_LACKING_HUBS of the parts lack a hub type that all parts of their type touch in the exemplars: a
+            rail ends where its road ends.
         """
         kit = self.kit
         fitted = whole.types[np.isin(whole.types, kit.grammar.hubs)]
@@ -117,7 +114,7 @@ class HubRestorer:
         for exemplar in self.kit.exemplars:
             whole = exemplar.assembly
             for hub, place in zip(exemplar.removed_hubs.types.tolist(), exemplar.removed_hubs.poses, strict=True):
-                answers = self.answers.around(whole.types, whole.poses, hub, place)
+                answers = self.oracle.around(whole.types, whole.poses, hub, place)
                 whole = _with_part(whole, hub, place, np.flatnonzero(answers >= 0).tolist())
             for part_type, hubs in zip(whole.types.tolist(), self._touching_hubs(whole), strict=True):
                 always[part_type] = always.get(part_type, hubs) & hubs
@@ -161,7 +158,7 @@ class HubRestorer:
         for place in hubs.poses[hubs.types == hub]:
             relative = invert(assembly.poses) @ place
             for part, part_type in enumerate(assembly.types.tolist()):
-                if self.answers.dockings.label(part_type, hub, relative[part : part + 1])[0] >= 0:
+                if self.oracle.dockings.label(part_type, hub, relative[part : part + 1])[0] >= 0:
                     docked.append((part_type, relative[part], assembly.poses[part, :3, :3].T @ self._up))
         return docked
 
@@ -198,7 +195,7 @@ class HubRestorer:
         self, hub: int, place: FloatArray, types: np.ndarray, poses: FloatArray, near: np.ndarray
     ) -> list[int] | None:
         """Return the parts among `near` that a hub at `place` touches, or None where the hub is forbidden there."""
-        answers = self.answers.around(types[near], poses[near], hub, place)
+        answers = self.oracle.around(types[near], poses[near], hub, place)
         if (answers == FORBIDDEN_CONTACT).any():
             return None
         touched: list[int] = near[answers != NO_CONTACT].tolist()

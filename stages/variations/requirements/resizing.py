@@ -72,8 +72,7 @@ class Resizer:
         """Return the assembly with one part scaled about the height where it meets its neighbour `held`.
 
         `held` and everything attached to it stay; what is attached to the part elsewhere moves along. None where
-        scaling is
-        not allowed or something would have to move in two ways at once.
+        scaling is not allowed or something would have to move in two ways at once.
         end: as for `meeting`
         """
         level = self.meeting(assembly, part, held, end)

@@ -20,8 +20,7 @@ def broken_contact(kit: Kit, assembly: Assembly) -> str | None:
     """Return why the contacts of an assembly are not those of its edges, or None.
 
     Reasons: `contact lost`, `touches what it should not`, or `parts clash`, where parts interpenetrate deeper than in
-        the
-    exemplars by more than STRETCHED_DEPTH of the smaller one.
+    the exemplars by more than STRETCHED_DEPTH of the smaller one.
     """
     shape = kit_shape(kit, assembly)
     meshes, types, poses = shape.meshes, shape.assembly.types, shape.assembly.poses

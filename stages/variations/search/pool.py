@@ -12,8 +12,8 @@ keys.npy: uint64 (k, 2), keys by colour refinement
 digests.npy: uint8 (k, 2, 32), of the canonical graph without and with docking labels
 lineage.jsonl
 
-Files of a pool shard: kept.npy int64 (k, 2), search and index there of each variant that it kept, counts.npy int32
-(k, types) of parts by type, and features.npy, keys.npy and digests.npy as above.
+Files of a pool shard: kept.npy int64 (k, 2), search and index there of each variant that it kept, counts.npy int32 (k,
+    types) of parts by type, and features.npy, keys.npy and digests.npy as above.
 """
 
 from __future__ import annotations

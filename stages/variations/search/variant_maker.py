@@ -1,5 +1,4 @@
-"""One try of an operator: exchange, substitution, replacement or growth, then the tests that every variant must
-pass."""
+"""One try of an operator (exchange, substitution, replacement, growth) and the tests that every variant must pass."""
 
 from __future__ import annotations
 
@@ -109,9 +108,7 @@ class VariantMaker:
         return graph if self.config.duplicates == "graph" else docked
 
     def histogram(self, types: np.ndarray) -> int:
-        """Return a hash of a type histogram; by meshes even with `types: meaning`, since what looks different is
-        new.
-        """
+        """Return a hash of a type histogram, by meshes even with `types: meaning`: what looks different is new."""
         return int(self._histogram_weights[types].sum(dtype=np.uint64))
 
     def keys_of(self, shape: Parent) -> tuple[int, int]:
@@ -168,8 +165,8 @@ class VariantMaker:
     def replace(self, rng: np.random.Generator, planned: PlannedTry) -> tuple[Variant | str, float, PlannedTry]:
         """Replace a piece by an equivalent one.
 
-        Return a new variant or the reason for a failure, the work, and the try that it counts for: an earlier one
-        while operations of its pair are left.
+        Return a new variant or the reason for a failure, the work, and the try that it counts for: an earlier one while
+        operations of its pair are left.
         """
         assert self._replacer is not None, "no try replaces where the method forbids it"
         outcome, work = self._replacer.replace(rng, planned, self.ws)
@@ -287,7 +284,7 @@ class VariantMaker:
         """Return the maximum number of parts of a shape of the types (n,).
 
         It is set by the largest exemplar that has all of them: a row of one exemplar's parts must not grow with another
-        exemplar. Where none has all, it is `max_parts`.
+            exemplar. Where none has all, it is `max_parts`.
         """
         whole = self._has[:, np.unique(types)].all(axis=1)
         return max(3, round(self.config.max_size * self._sizes[whole].max())) if whole.any() else self.max_parts

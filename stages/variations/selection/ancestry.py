@@ -45,8 +45,7 @@ class Ancestry:
         """Return for each variant that becomes a sample the names of its nearest ancestors.
 
         These are samples of its own split and exemplars. Variants that are left out or in another split are replaced by
-        their
-        own ancestors.
+        their own ancestors.
         key_of: key of each sample by variant; split_of: its split
         """
         named_parents: dict[int, list[str]] = {}

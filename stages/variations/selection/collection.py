@@ -70,8 +70,7 @@ def _sample(
 
     Equal graphs with hubs are equal without them, so hubs never take a graph into another split. The lineage names as
     `parents` samples of its own split and exemplars, and as `made_of` what the variant was put together from:
-    exemplars, or
-    variants by the `name` that each has in the search.
+    exemplars, or variants by the `name` that each has in the search.
     """
     bare, _ = found.assembly(index)
     assembly = restorer.fit(bare)

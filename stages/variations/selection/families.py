@@ -19,15 +19,13 @@ DISCARDED_SPLIT = -1
 """Instead of a split: the variant is too near to another split."""
 REGION_COUNTS = (16, 8, 4, 2, 1)
 """Numbers of regions of a split, tried in turn until enough is left for train: many small regions show more of the
-pool, a
-few large ones have less around them.
+pool, a few large ones have less around them.
 """
 CUTS_TRIED, NEARLY_ENOUGH_SHARE = 6, 0.9
 """Cuts tried for each number of regions; of several regions only while train gets nearly its share."""
 MEMBERS_DRAWN, MIDDLES_DRAWN = 4, 16
 """Variants drawn for each member and for the middle of a region; the one with least around it is taken. A middle with
-little
-enough around it is taken at once.
+little enough around it is taken at once.
 """
 MIN_TRAIN_SHARE = 0.5
 """Share of what is wanted that train gets before val and test: a pool of near-duplicates has only train."""
@@ -60,8 +58,7 @@ def cut_families(near: Near, count: int, wanted: Mapping[str, int], rng: np.rand
 
     Val, test and train get the wanted numbers if any number of regions leaves enough. Otherwise val and test are halved
     until train has its share. If even that fails, the best cut gives most to the split with the smallest share,
-    provided
-    that train has MIN_TRAIN_SHARE. A part of a large pool is cut first to learn how many regions it allows.
+    provided that train has MIN_TRAIN_SHARE. A part of a large pool is cut first to learn how many regions it allows.
     """
     max_regions = max(REGION_COUNTS)
     if count > 2 * TRIAL_SIZE:

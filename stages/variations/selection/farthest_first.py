@@ -20,8 +20,7 @@ def select_diverse(
     """Return which of k variants are taken, int64 (min(wanted, k),), the most different first.
 
     Each is the farthest from the kit's exemplars and from all taken before. Beyond `config.max_farthest_first` the rest
-    are
-    drawn at random.
+    are drawn at random.
     counts: int32 (k, types), parts by type
     features: float32 (k, 10)
     """

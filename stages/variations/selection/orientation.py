@@ -39,8 +39,7 @@ class OrientationFix:
         """Return the angle about the vertical by which an assembly is turned from the exemplars, in degrees, 0 to 360.
 
         Under it most contacts have a direction that they have in an exemplar; 0 where no turn is better. A contact seen
-        in
-        several directions counts less.
+        in several directions counts less.
         """
         votes = np.zeros(360 // BIN_DEGREES)
         exact = np.zeros(len(votes))
@@ -68,8 +67,7 @@ class OrientationFix:
         """Return for each contact a key of the types of its parts, int (m,), and the vector between their centres.
 
         The vector float64 (m, 3) points from the part of the smaller type to the other. Contacts between parts of one
-        type have
-        no direction and are left out.
+        type have no direction and are left out.
         """
         i, j = assembly.edges[:, 0], assembly.edges[:, 1]
         first, second = assembly.types[i].astype(np.int64), assembly.types[j].astype(np.int64)
@@ -81,8 +79,7 @@ class OrientationFix:
 
     def _turns(self, vectors: FloatArray, seen: FloatArray) -> tuple[FloatArray, np.ndarray]:
         """Return the angles (k,) in degrees about the vertical between vectors (n, 3) and `seen` ones (m, 3), and which
-        vector each
-        is of, int (k,). Vectors match if they have equal length and slope; vertical ones have no direction.
+        vector each is of, int (k,). Vectors match if they have equal length and slope; vertical ones have no direction.
         """
         level = [np.hypot(rows[:, self._across], rows[:, self._along]) for rows in (vectors, seen)]
         alike = np.abs(level[0][:, None] - level[1][None]) < self._tolerance

@@ -176,9 +176,8 @@ def _best_of_seed(tables, shape, other, order, first, misses, best, stop, alignm
     `best`.
 
     The first area of at least `stop` is returned at once. Seeds are tested in the same order: those with few
-    counterparts
-    reject a wrong alignment fastest. Seeds before `first` have missed with every good alignment, so they count as
-    misses.
+    counterparts reject a wrong alignment fastest. Seeds before `first` have missed with every good alignment, so they
+    count as misses.
     """
     part, kind = tables.seeds[shape, order[first]], tables.kinds[shape, order[first]]
     for target in range(tables.firsts[other, kind], tables.firsts[other, kind + 1]):

@@ -1,9 +1,8 @@
 """Attachment of parts that go by meaning: where a part always touched others it touches something (substructures §5.3).
 
 A grammar of meanings counts the neighbours of a part, which says little where many parts have one label: a shelf
-between
-two uprights, all of them boards, might hang from one. Here the sides of a part's box, and the halves of each side, tell
-where it is attached.
+between two uprights, all of them boards, might hang from one. Here the sides of a part's box, and the halves of each
+side, tell where it is attached.
 """
 
 from __future__ import annotations
@@ -15,8 +14,7 @@ from stages.shape.kit import Assembly, Kit
 
 MIN_SIDE_DISTANCE = 0.6
 """A contact is at a side if its centre is this far out from the middle of the box, as a share of the way to the side.
-It is
-surely there if it is also thinnest across that side.
+It is surely there if it is also thinnest across that side.
 """
 MIN_HALF_DISTANCE, SURE_HALF_DISTANCE = 0.2, 0.4
 """It is in a half of that side if it is this far from the middle towards the half's end, and surely so from the second.

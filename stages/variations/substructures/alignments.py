@@ -57,8 +57,7 @@ def find_region_swaps(
     Where one region is left over the result would be the giver.
     up: axis that alignments keep, or -1
     max_work: parts laid on others at most; pairs of parts are taken from everywhere in both shapes, so that a list that
-        is
-    cut short has the alignments under which most coincides
+        is cut short has the alignments under which most coincides
     """
     symmetries = np.concatenate([part_type.symmetries for part_type in kit.types])
     starts = np.cumsum([0, *(len(part_type.symmetries) for part_type in kit.types)])
@@ -88,14 +87,13 @@ def _placed(kit: Kit, assembly: Assembly) -> _Placed:
 def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same, max_work):
     """List region swaps: `here` of graph `a` is the base, `there` of graph `b` the giver.
 
-    state: leader, the union-find forest of regions: parts of the base, then of the giver, -1 where they coincide;
-    image and back, the part of the other shape that a part coincides with, or -1; queue, the matched parts of the base;
-    visited, the (part, part, symmetry) triples whose alignment was seen
+    state: leader, the union-find forest of regions: parts of the base, then of the giver, -1 where they coincide; image
+        and back, the part of the other shape that a part coincides with, or -1; queue, the matched parts of the base;
+        visited, the (part, part, symmetry) triples whose alignment was seen
     Invariant: between two alignments `image` and `back` are -1 everywhere.
     ends: all pairs are visited (`is_whole`), MAX_SWAPS are listed, or max_work is spent
     Returns turns and shifts that lay the base on the giver, regions and images of each, what is listed, meetings, work,
-    and
-    is_whole.
+    and is_whole.
     """
     n, m = len(a.types), len(b.types)
     max_symmetries = 0
@@ -199,9 +197,7 @@ def _divisor(i, j):
 
 @numba.njit(cache=True)
 def _lay(here, there, turn, shift, turns, starts, tolerance, image, back, queue, visited):
-    """Lay part on part and mark the triples that give this alignment; return the numbers of matched parts and
-    triples.
-    """
+    """Lay part on part and mark the triples that give this alignment; return numbers of matched parts and triples."""
     count, triples = 0, 0
     for x in range(len(here.types)):
         (px, py, pz), kind = _moved(turn, shift, here.centroids[x]), here.types[x]

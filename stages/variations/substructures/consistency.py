@@ -1,6 +1,5 @@
 """Which regions along an alignment can be swapped together: those that leave every part between them with a
-neighbourhood
-that the grammar admits (substructures §4.3.1).
+neighbourhood that the grammar admits (substructures §4.3.1).
 
 A part that coincides with one of the other shape has the neighbours of one or the other where one region is next to it,
 and both were seen. Between several regions it may have some of each, which was not seen.

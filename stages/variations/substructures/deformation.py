@@ -26,8 +26,7 @@ def deform(kit: Kit, base: Side, giver: Side, boundary: np.ndarray, piece: np.nd
     """Return the transforms float64 (k, 4, 4) of the k parts of a piece, in their order.
 
     The transform of a part is the mean of those of the boundary, weighted by the inverse of the distance from its
-    centre to
-    the origins of their frames.
+    centre to the origins of their frames.
     boundary: int64 (b, 2), darts as in `Operations`; at least one row has no dummy edge
     piece: bool (m,), parts of the giver that come
     """
@@ -53,8 +52,7 @@ def is_oriented_alike(kit: Kit, base: Side, giver: Side, boundary: np.ndarray) -
     (§5.3).
 
     Only their direction from the part outside to the cut counts: that part is alike in both shapes, while the one
-        inside may
-    be a knob or a beam.
+        inside may be a knob or a beam.
     """
     rows = boundary[(boundary >= 0).all(axis=1)]
     (own, _, _), (sites, _, _) = _cut_edges(kit, base, rows[:, 0]), _cut_edges(kit, giver, rows[:, 1])
@@ -66,9 +64,7 @@ def is_oriented_alike(kit: Kit, base: Side, giver: Side, boundary: np.ndarray) -
 
 
 def boundary_moves(kit: Kit, base: Side, giver: Side, rows: np.ndarray) -> tuple[FloatArray, FloatArray]:
-    """Return the origins of the giver's frames, float64 (b, 3), and what moves them onto those of the base, (b, 4,
-    4).
-    """
+    """Return the origins of the giver's frames, float64 (b, 3), and what moves them onto the base's, (b, 4, 4)."""
     (_, aims, own), (_, origins, edges) = (
         _cut_edges(kit, side, rows[:, column]) for column, side in enumerate((base, giver))
     )
@@ -86,8 +82,7 @@ def boundary_moves(kit: Kit, base: Side, giver: Side, rows: np.ndarray) -> tuple
 
 
 def _cut_edges(kit: Kit, side: Side, darts: np.ndarray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return three vectors (b, 3) of each dart: from the centre of the part outside to the cut, the cut, and on to the
-    inside.
+    """Return three vectors (b, 3) of each dart: from the centre of the part outside to the cut, the cut, and inwards.
 
     The cut is the centre of what the boxes of both parts have in common.
     """

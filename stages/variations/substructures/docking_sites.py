@@ -1,11 +1,9 @@
 """The cyclic order of the docking sites of each part, from the positions of its neighbours (substructures §4.3.2).
 
 Parts are separate meshes, so no surface runs through a whole shape along which their borders could be followed. The
-order
-is that of the neighbours' centroids, projected into the plane that fits them best. Of 753 parts of seven real models,
-23
-have an open border along which all of three or more neighbours lie; in each the order along it is that of the
-projection.
+order is that of the neighbours' centroids, projected into the plane that fits them best. Of 753 parts of seven real
+models, 23 have an open border along which all of three or more neighbours lie; in each the order along it is that of
+the projection.
 """
 
 from __future__ import annotations
@@ -43,9 +41,7 @@ def docking_graph(kit: Kit, assembly: Assembly, labels: IntArray) -> OrderedGrap
 
 
 def contact_graph(kit: Kit, assembly: Assembly, labels: IntArray) -> OrderedGraph:
-    """Return the same with docking sites in the order of the neighbours' numbers, for uses that need no cyclic
-    order.
-    """
+    """Return the same with docking sites in the order of the neighbours' numbers, where no cyclic order is needed."""
     tails, heads = np.concatenate([assembly.edges, assembly.edges[:, ::-1]]).T.astype(np.int64)
     order = np.lexsort((heads, tails))
     position = np.empty(len(order), dtype=np.int64)
@@ -63,11 +59,9 @@ def cyclic_order(sites: FloatArray, axes: FloatArray) -> list[int]:
     """Return the order of `sites` float64 (k, 3), seen from their part, counter-clockwise round the plane's normal.
 
     Sites in one direction go from the far side of the plane to the near one, then by distance; those over the part
-    itself
-    go first.
+    itself go first.
     axes: float64 (a, 3), directions that decide what the sites leave open, the most decisive first: the normal where
-        they
-    lie on a line or no plane fits best, and its side
+        they lie on a line or no plane fits best, and its side
     """
     if len(sites) < 3 or not sites.any():
         return list(range(len(sites)))

@@ -1,11 +1,9 @@
 """Dummy edges of the dual: how a boundary passes over what two graphs do not have in common (substructures §4.4).
 
 The paper joins dual nodes at a distance of two. Where the outside of two pieces falls into several parts that agree,
-the
-arc between them may have any length. So a boundary goes on here from any place along the contour of an unmatched
-region:
-the distance is not limited, but the choice is. Of two places in a row the nearer one is taken; the farther one is
-reached by another operation from there.
+the arc between them may have any length. So a boundary goes on here from any place along the contour of an unmatched
+region: the distance is not limited, but the choice is. Of two places in a row the nearer one is taken; the farther one
+is reached by another operation from there.
 """
 
 from __future__ import annotations

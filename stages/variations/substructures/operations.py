@@ -28,8 +28,7 @@ from stages.variations.substructures.regions import find_regions, region_of
 
 MAX_DUMMY_WORK = 5_500_000
 """Darts looked at for symmetries with dummy edges, about a third of a second. These are for sparse outliers: in dense
-graphs
-the rest is left out, those with most dummy edges first.
+graphs the rest is left out, those with most dummy edges first.
 """
 MAX_WAITING = 1 << 17
 """Symmetries that wait to be continued over dummy edges at most, which bounds memory."""
@@ -72,10 +71,9 @@ def find_operations(a: OrderedGraph, b: OrderedGraph, violations: int = 0, by_do
 
     An operation is one unmatched region of a maximal partial symmetry, so no alike pair of parts is left out at its
     boundary. Without violations each is found from a pair of darts: O(k² n²), in practice far below k n². A symmetry
-    that
-    meets no part twice is the same from all its pairs and is found once.
+    that meets no part twice is the same from all its pairs and is found once.
     violations: dummy edges of a symmetry at most, 0 to 3 (§4.4, "robust matching"); the work is exponential in it, and
-    operations with fewer come first
+        operations with fewer come first
     by_docking: whether edges match by their dockings too, not by types alone
     """
     return Operations(*_enumerate(side_by_side(a, b), len(a.tails), a is b, by_docking, violations))

@@ -124,8 +124,7 @@ def lay_over(graph, d, e, by_docking, passed, over):
     0.
 
     It goes on over each of `passed` int64 (q, 4) in turn, as `go_on` takes them. `over` is as `lift` leaves it. The
-    order is
-    breadth first, so that where a way round leads elsewhere the nearer match stays.
+    order is breadth first, so that where a way round leads elsewhere the nearer match stays.
     """
     over.counts[CONFLICTS] = over.counts[DEFECTS] = over.counts[MATCHED] = 0
     total = _extend(graph, d, e, -1, 0, by_docking, over)
@@ -142,7 +141,7 @@ def go_on(graph, dummy, by_docking, over):
     """Continue the current symmetry over one dummy edge of the dual (§4.4); return by how much its hash grows, or 0.
 
     dummy: int64 (4,), either (d, e, 0 or 1, place), where the first or the second graph has one more docking site, or
-    (x, y, -1, 0), darts beyond an unmatched region, from which the symmetry goes on
+        (x, y, -1, 0), darts beyond an unmatched region, from which the symmetry goes on
     """
     more = _extend(graph, dummy[0], dummy[1], dummy[2], dummy[3], by_docking, over)
     return more + pair_hash(dummy[0], dummy[3]) if more != 0 and dummy[2] >= 0 else more

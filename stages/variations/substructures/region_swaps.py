@@ -86,8 +86,7 @@ class RegionSwaps:
         """Return what to draw, in random order.
 
         These are the numbers of all listed swaps and, counted on from those, the number of each alignment, once for
-        each subset
-        of its regions or, of many, some times for each region.
+        each subset of its regions or, of many, some times for each region.
         """
         regions = (self.regions == np.arange(self.regions.shape[1])).sum(axis=1)
         again = np.minimum(2 ** np.minimum(regions, 16) - 2 - regions, MAX_COMPOSITIONS_PER_REGION * regions)

@@ -28,10 +28,8 @@ def find_regions(graph, by_docking, over):
 
     A row is (x, y), darts that are matched and whose edges are not, or a dart that a dummy edge passed over, (x, -1) or
     (-1, y). What is connected in either graph without its matched nodes is one region. It is explored from all rows in
-    turn,
-    a node at a time, until all but one region have come to an end: a symmetry of few parts costs little, however large
-    the
-    rest.
+    turn, a node at a time, until all but one region have come to an end: a symmetry of few parts costs little, however
+    large the rest.
     """
     _find_rows(graph, by_docking, over)
     rows, row_of, lines, marks = over.rows[: over.counts[ROWS]], over.row_of, over.lines, over.marks
@@ -147,9 +145,7 @@ def _join(i, j, lines, marks):
 
 @numba.njit(cache=True)
 def cut_off(graph, cut):
-    """Return what the darts `cut` int64 (b,) point to and what is connected with it without crossing them, bool
-    (n,).
-    """
+    """Return what the darts `cut` int64 (b,) point to and what is connected to it without crossing, bool (n,)."""
     inside, is_wall = np.zeros(len(graph.types), dtype=np.bool_), np.zeros(len(graph.tails), dtype=np.bool_)
     waiting = np.empty(len(cut) + len(graph.tails), dtype=np.int64)
     count = 0

@@ -36,8 +36,7 @@ def replace_piece(base: OrderedGraph, giver: OrderedGraph, boundary: np.ndarray)
     """Put the giver's piece in place of the base's; return None where two parts would touch twice, or one itself.
 
     boundary: int64 (b, 2), as in `Operations`; what stays of the base meets the giver's piece as what stayed of the
-        giver
-    met it. Where a piece is empty the parts at both sides of its boundary meet.
+        giver met it. Where a piece is empty the parts at both sides of its boundary meet.
     """
     taken, piece = piece_of(base, boundary[:, 0]), piece_of(giver, boundary[:, 1])
     from_base, from_giver = np.full(len(taken), -1), np.full(len(piece), -1)

@@ -1,7 +1,7 @@
 """A sheet of replacements: source, cut, replacement and result of each, in the colours of the two pieces.
 
 The source is the shape that gave more parts: a shape with four new parts is easier to read than four parts with a new
-shape. Shapes are drawn without hubs; results lie as their sources do, not as in the dataset.
+    shape. Shapes are drawn without hubs; results lie as their sources do, not as in the dataset.
 """
 
 from __future__ import annotations
@@ -69,9 +69,7 @@ def replacements_sheet(kit: Kit, samples: Sequence[Sample]) -> bytes | None:
 
 
 def known_shapes(kit: Kit, samples: Sequence[Sample]) -> dict[str, Named]:
-    """Return exemplars and samples by their names in lineages, with their names here: samples by their keys, as
-    made.
-    """
+    """Return exemplars and samples by their names in lineages, with their names here: keys for samples."""
     known = {exemplar.name: (exemplar.name, exemplar.assembly) for exemplar in kit.exemplars}
     return known | {sample.lineage["name"]: (sample.key, _as_made(kit, sample)) for sample in samples}
 

@@ -38,8 +38,7 @@ from stages.variations.substructures.stretching import stretch_onto
 
 FIRST_WORK, WORK_FACTOR = 1 << 19, 16
 """Parts laid on others when two shapes are first drawn, and the factor of it each time they are drawn again with
-nothing
-left. Alignments under which most coincides come first.
+nothing left. Alignments under which most coincides come first.
 """
 MIN_DRAWS = 48
 """Operations of a pair that are carried out before another pair's turn; more if listing them took longer."""
@@ -50,8 +49,7 @@ EMBEDDING_WORK = 12.0
 MAX_ORDERED_SHARE, MAX_DEFORMED_SHARE = 0.1, 0.75
 """Largest share of the work for operations by the order of docking sites where alignments are known too. They find what
 moves the parts that stay apart, and take long to list. The second holds where pieces may be deformed or stretched,
-which
-only these operations do.
+which only these operations do.
 """
 WITHIN_PROBABILITY = 0.25
 """Probability that a shape is laid on itself whatever else was drawn: recursive rules are within one shape."""
@@ -60,8 +58,7 @@ DEFORM_PROBABILITY = 0.5
 """
 
 Placement = tuple[FloatArray, FloatArray, Docked]
-"""The transform of the piece (4, 4) or of each of its parts (k, 4, 4), the poses of the base, and what docks to
-what."""
+"""The transform of the piece (4, 4) or of its parts (k, 4, 4), the poses of the base, and what docks to what."""
 DARTS_PER_WORK = 4000.0
 """Darts, and pairs of them, that are looked at in the time of work 1."""
 
@@ -94,8 +91,8 @@ class Replacer:
     """Replaces pieces within limits of size.
 
     With `matching: pose`, region swaps along alignments come first: they fit without deformation. Afterwards operations
-    match edges by dockings, which keeps matched parts rigid. Where types go by meaning, pieces may be stretched, or
-    matching is by centroid, edges match by the types at their ends alone.
+        match edges by dockings, which keeps matched parts rigid. Where types go by meaning, pieces may be stretched, or
+        matching is by centroid, edges match by the types at their ends alone.
 
     After an OK try these describe it:
     base: what the piece was put into: the chosen shape, or what a recursive rule had made of it before the last time
@@ -169,9 +166,7 @@ class Replacer:
     def _operate(
         self, rng: np.random.Generator, pair: OpenPair, operations: Operations, number: int, ws: Workspace
     ) -> tuple[int, float]:
-        """Carry out an operation along a boundary of docking sites, in the workspace; return the outcome and the
-        work.
-        """
+        """Carry out an operation along a boundary of docking sites, in the workspace; return outcome and work."""
         work = 0.0
         count = len(operations)
         boundary = operations.boundary(number % count)[:, :: 1 if number < count else -1]
@@ -339,9 +334,7 @@ class Replacer:
             set_edge(ws.stamp, ws.label, ws.edges, ws.counts, *contact)
 
     def _by_docking_of_labels(self, rng: np.random.Generator, pair: OpenPair, exchanged: Exchanged) -> Placement | None:
-        """Return the same where parts of one label have other meshes: a docking of one of them, fitted to the
-        others.
-        """
+        """Return the same where parts of one label have other meshes: one docking, fitted to the others."""
         base, giver, kit, up = pair.base.assembly, pair.giver.assembly, self.oracle.kit, self.tables.up
         docking = find_docking(rng, kit.label_of, self.oracle.dockings, giver, base, exchanged)
         if docking is None or (up >= 0 and docking[0][up, up] < MIN_UPRIGHT_COSINE):

@@ -105,9 +105,7 @@ def swap_key(base, giver, taken, piece, image):
 
 @numba.njit(cache=True)
 def refined(colours, edges, labels):
-    """Return the hash of a graph by colour refinement, as `graph_key` computes it, from its edges in both
-    directions.
-    """
+    """Return the hash of a graph by colour refinement, as `graph_key` does, from its edges in both directions."""
     classes = 0
     for _ in range(len(colours)):
         fresh = np.empty_like(colours)

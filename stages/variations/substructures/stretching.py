@@ -18,8 +18,7 @@ from stages.variations.substructures.embedding import Side
 
 RELATIVE_STIFFNESS = 1e-6
 """Cost of turning away from the mean of the boundary's transforms, relative to the spread of the boundary: enough to
-decide
-what the boundary leaves open.
+decide what the boundary leaves open.
 """
 MAX_TILT = 1e-3
 """Entries of a linear map that tilt the vertical, or a floor, by less are 0."""
@@ -39,9 +38,8 @@ def stretch_onto(
     None.
 
     The map brings the places where the piece touches what stays of the giver nearest to where the boundary's transforms
-    move
-    them. Rigid parts move rigidly as the map moves their centres. None where the map does not come near the boundary,
-    stretches beyond `max_factor`, mirrors or tilts.
+    move them. Rigid parts move rigidly as the map moves their centres. None where the map does not come near the
+    boundary, stretches beyond `max_factor`, mirrors or tilts.
     boundary: int64 (b, 2), darts as in `Operations`
     piece: bool (m,), parts of the giver that come
     up: axis that stays upright, or -1

@@ -72,7 +72,7 @@ def test_resolved_settings_are_printed(made: tuple[Path, str]) -> None:
 def test_near_copies_are_rejected_if_auto_finds_enough_other_variants(tmp_path: Path) -> None:
     shapes = sorted(map(str, (ROOT / "datasets" / "exemplars" / "playground").glob("*.glb")))
     kit = stated({"name": "open", "shapes": shapes, "disconnected": "auto"})
-    variations = {"samples_per_kit": 24, "search": {"tries": 2000}, "splits": {"by": "graph", "shards": 1}}
+    variations = {"samples_per_kit": 24, "search": {"tries_per_round": 2000}, "splits": {"by": "graph", "shards": 1}}
     config = {"name": "toy", "exemplars": {"kits": [kit]}, "variations": variations}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     run(tmp_path, ("autoconfig", "exemplars", "variations"))
@@ -133,7 +133,10 @@ def test_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path) -> 
     assert not list((work / "autoconfig").glob("*.json"))
     assert list((work / "proportions").glob("toy-train-*.tar"))
     del written["proportions"]
-    written["variations"] = {"samples_per_kit": 8, "search": {"duplicates": "graph", "tries": 400, "patience": 800}}
+    written["variations"] = {
+        "samples_per_kit": 8,
+        "search": {"duplicates": "graph", "tries_per_round": 400, "patience": 800},
+    }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(written))
     run(tmp_path, ("autoconfig", "exemplars", "variations"))
     assert list((work / "variations").glob("toy-train-*.tar"))

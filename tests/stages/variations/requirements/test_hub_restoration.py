@@ -140,7 +140,7 @@ def test_rails_end_where_their_road_ends() -> None:
     found = {}
     for count, pose_of_part in poses.items():
         types = np.full(count, rail, dtype=np.int16)
-        whole = restorer.fit(Assembly(types, pose_of_part, restorer.answers.contact.contacts(types, pose_of_part)))
+        whole = restorer.fit(Assembly(types, pose_of_part, restorer.oracle.contact.contacts(types, pose_of_part)))
         assert len(whole) > count, "it has its road"
         found[count] = restorer.has_hubs(0.5, whole)
     assert found == {10: True, 11: False, 15: False}

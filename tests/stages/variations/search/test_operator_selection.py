@@ -52,7 +52,7 @@ def test_one_exemplar_uses_no_families_and_no_crossing() -> None:
 @pytest.mark.parametrize("growth_share", [0.0, 1.0])
 def test_unguided_search_draws_plain_parents(growth_share: float) -> None:
     unguided = SearchConfig(method="exchange", growth_share=growth_share, novelty=NoveltyConfig(guided=False))
-    line = Search(line_of(2).answers, unguided)
+    line = Search(line_of(2).oracle, unguided)
     assert set(planned(line)) == {0 if growth_share else 1}
 
 
@@ -78,7 +78,7 @@ def test_growth_gets_its_earned_share_of_the_work(guided: bool) -> None:
 
 def test_growth_in_vain_gets_the_minimum_share() -> None:
     """Exchange has brought nothing either, so that both are worth the same but for what was forgotten."""
-    line, shares = Search(line_of(2).answers, SearchConfig(method="both")), []
+    line, shares = Search(line_of(2).oracle, SearchConfig(method="both")), []
     choices = line.operators.plan(np.random.default_rng(1), line.parents, line.archive, 1000)
     exchanged, growth = (
         next(planned for planned in choices if (planned.operator == GROWTH) == grown) for grown in (False, True)
