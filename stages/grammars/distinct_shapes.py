@@ -41,8 +41,8 @@ class SampledShape:
 class DistinctShapes:
     """Samples shapes of a grammar until there are enough, or no more.
 
-    A draw is rejected if it differs from the exemplar or an earlier shape by less than `config.min_difference`, because
-    many productions restore nearly what was there. Of draws that differ little the one that differs most is taken.
+    A draw is rejected if it differs from the exemplar or an earlier shape by less than `config.min_difference`. Many
+    productions restore nearly what was there. Of draws that differ little the one that differs most is taken.
     """
 
     def __init__(

@@ -45,8 +45,8 @@ MAX_OPTIONS_SHOWN = 3
 def grammar_sheet(extracted: ExtractedGrammar) -> bytes:
     """Return a PNG of a grammar.
 
-    It shows the exemplar, its sites in a colour for each class, what may replace the piece at a site of each class
-    (yellow) in red, and each grid with other numbers of cells.
+    It shows the exemplar, its sites in a colour for each class, and each grid with other numbers of cells. At a site of
+    each class it shows the piece (yellow) and what may replace it (red).
     """
     grammar, whole = extracted.grammar, _whole(extracted)
     exemplar = [

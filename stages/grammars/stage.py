@@ -1,7 +1,7 @@
 """Stage `grammars`: meshes in one piece and clouds in; random and resized shapes of their grammars out.
 
 The first shards extract a grammar each: `<name>.json`, `<name>.tar`, `<name>.png`. One shard then samples the shapes of
-all grammars, rejects those that collide or look like earlier ones, and assigns the others to splits and shards. The
+all grammars and assigns them to splits and shards. It rejects shapes that collide or look like earlier ones. The
 samples are in the shards `<dataset>-<split>-<index>.tar`. A sample has no meshes: its text is its derivation, which
 `stages.grammars.derived_shape.shape_of_text` turns into the shape.
 """

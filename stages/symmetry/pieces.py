@@ -48,8 +48,8 @@ def repeated_pieces(vertices: FloatArray, faces: IntArray) -> list[SurfacePiece]
     """Cut a mesh, vertices (v, 3) and faces (f, 3), between the copies of what repeats.
 
     Equal pieces are one, with all their poses; a mesh without repetition is one piece. Repetitions are taken in the
-    order of the surface that they save, as long as the surface of distinct pieces shrinks by more than PART_COST a
-    piece. Two repetitions that cross cut the pieces of a 2-grid. Triangles without area are left out.
+    order of the surface that they save, as long as distinct pieces lose more than PART_COST of the surface each. Two
+    repetitions that cross cut the pieces of a 2-grid. Triangles without area are left out.
     """
     corners = vertices[faces]
     grid = surface_grid(corners, RADIUS_SHARE)

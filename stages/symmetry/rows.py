@@ -62,8 +62,8 @@ def chunks_along(copy: Soup, row: CopyRow, rest: Soup, grid: SurfaceGrid) -> tup
     copy: triangles of the copy at multiple 0
     rest: triangles among which is what runs along the row
 
-    Connected triangles count if they are longer than MIN_STEPS_ALONG steps of the row and, seen along it, lie no
-    farther than the radius from the box of its copies. Fragments inside the box of such triangles go with them.
+    Connected triangles count if they are longer than MIN_STEPS_ALONG steps of the row. Seen along the row, they must
+    lie within the radius of the box of its copies. Fragments inside the box of such triangles go with them.
     """
     frame = np.linalg.qr(np.column_stack([row.direction, np.eye(3)]))[0]
     frame[:, 0] = row.direction

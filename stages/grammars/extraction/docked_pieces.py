@@ -77,7 +77,7 @@ def find_docked_pieces(grid: SurfaceGrid, transforms: FloatArray) -> list[Docked
     sites. A power of the transform need not be one of the candidates, which are few, because turns and diagonals may
     carry more of the surface. But it must carry corners, as each candidate does. Sites that slip on the surface in
     three ways, where a piece could dock anywhere, are left out. Two sites are equal under a transform if the whole site
-    is r-symmetric under it and comes to lie on the other, with the piece on the same side.
+    is r-symmetric under it and maps onto the other. The pieces must lie on the same side.
     """
     kept: list[BoolArray] = []
     known = _Sites(grid)

@@ -72,8 +72,8 @@ def scanned_grid(cloud: ScannedCloud, share: float) -> ScannedGrid:
     Points are projected onto the planes of their patches, so that points in the wrong cell because of noise return.
     Outliers and points on no patch are left out.
 
-    Raises ConfigError for a cloud with too few points, with points that are not finite or lie on a line, that is too
-    thin for the radius, or so noisy that cells cannot tell planes apart.
+    Raises ConfigError for a cloud with too few points, or with points that are not finite or lie on a line. Also for a
+    cloud too thin for the radius, or so noisy that cells cannot tell planes apart.
     """
     points = cloud.points
     _check(points)

@@ -62,8 +62,8 @@ def is_among(keys: np.ndarray, queries: np.ndarray) -> BoolArray:
 def items_moved_into(grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> np.ndarray:
     """Return the items that lie in ascending `cells` moved by `pose` (4, 4), int64 (m,), ascending.
 
-    No point of a cell is farther from its centre than the width of a cell, so only items in the box around the moved
-    centres are tested.
+    Only items in the box around the moved centres are tested: no point of a cell is farther from its centre than the
+    width of a cell.
     """
     centres = transform_points(pose, grid.centres(cells))
     home = (centres - grid.origin) / grid.cell_size

@@ -54,9 +54,9 @@ def find_docking_sites(
 
     kept, kept_back: bool (n,), the `r_symmetric_cells` of the transform
 
-    Regions that are not r-symmetric, of the surface and of its image, depend on each other where the border of one is
-    taken to the border of the other. All regions that depend on each other make one pair of pieces. A pair of all
-    regions of both is no operation, because it moves the whole surface.
+    The regions that are not r-symmetric, of the surface and of its image, depend on each other. They do where the
+    border of one is taken to the border of the other. All regions that depend on each other make one pair of pieces. A
+    pair of all regions of both is no operation, because it moves the whole surface.
     """
     regions, regions_back = _regions(~kept, grid.neighbours), _regions(~kept_back, grid.neighbours)
     count, count_back = int(regions.max(initial=-1)) + 1, int(regions_back.max(initial=-1)) + 1
@@ -157,8 +157,8 @@ def _regions(chosen, neighbours):
 def _links(kept, regions, regions_back, neighbours, points, starts, transform, origin, size, keys):
     """Link regions of the surface to regions of its image.
 
-    Returns pairs (region, region of the image), int64 (l, 2), whose borders the transform takes onto each other, and
-    pairs (cell, region), int64 (b, 2), of r-symmetric cells next to regions.
+    Returns int64 (l, 2), pairs of a region and a region of the image whose borders the transform takes onto each other,
+    and int64 (b, 2), pairs of an r-symmetric cell and a region next to it.
     """
     links, border = [(0, 0) for _ in range(0)], [(0, 0) for _ in range(0)]
     at, cell = np.empty(3), np.empty(3, dtype=np.int64)

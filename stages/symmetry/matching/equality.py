@@ -21,8 +21,8 @@ def soups_match(
 
     max_difference: share of the area by which the two may differ
 
-    The areas must agree. Probe points on all triangles but the smallest, which make up that share of the surface, must
-    lie within twice the tolerance of the other surface.
+    The areas must agree. Probe points must lie within twice the tolerance of the other surface. The smallest triangles,
+    which make up that share of the surface, have none.
     """
     from stages.shape.geometry.mesh_pairs import build_tree, points_on_surface
 

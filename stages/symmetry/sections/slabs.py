@@ -72,8 +72,8 @@ def _layers(soup: Soup, family: ParallelCuts) -> Iterator[tuple[int, Soup]]:
 def _corner_and_widths(families: Sequence[ParallelCuts], layers: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     """Return where a slab begins, float64 (3,), and two numbers for each family, float64 (2 n,).
 
-    The numbers are the width of the slab and 0, or 0 and a unique number for a slab without a beginning or an end,
-    which equals no other.
+    The numbers are the width of the slab and 0. A slab without a beginning or an end equals no other: its numbers are 0
+    and a unique number.
     """
     low, widths = np.zeros(3), []
     for family, layer in zip(families, layers, strict=True):

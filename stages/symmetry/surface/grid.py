@@ -90,8 +90,8 @@ class SurfaceGrid:
 def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
     """Build the grid of triangles (f, 3, 3) for a radius of `share` of the longest side of their box.
 
-    Triangles without area are left out. A side of a triangle is a boundary where the triangle's plane ends, whatever
-    the connectivity of the mesh, so that T-junctions and duplicate triangles make no boundary.
+    Triangles without area are left out. A side of a triangle is a boundary where the triangle's plane ends. The
+    connectivity of the mesh does not matter, so that T-junctions and duplicate triangles make no boundary.
     """
     faces = np.flatnonzero(has_area(corners))
     corners = np.ascontiguousarray(corners[faces])

@@ -1,7 +1,7 @@
 """The castle: towers on a square lattice, joined by walls, gates and halls, with bridges out of the gates.
 
-Towers are 5.0 apart and 2.0 wide, so that whatever joins two of them is 3.0 long, and a bridge span of 4.0 leads from
-a gate to a pier or to the gate of the next ward, always back onto the lattice.
+The distance of towers is 5.0 and their width 2.0, so what joins two of them is 3.0 long. A bridge span of 4.0 leads
+from a gate to a pier or to the gate of the next ward, and so back onto the lattice.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The temple precinct: columns on a square lattice, each bay closed by a stylobate span below and a beam above.
 
-The distance of columns is 3.0. Every bay is a cycle of four parts. A cell of four bays may have a floor, and as a
-roof a gable that continues in the next cell, a dome, or a second storey. Roofs rest on beams alone and clear the
+The distance of columns is 3.0. Every bay is a cycle of four parts. A cell of four bays may have a floor. Its
+roof is a gable that continues in the next cell, a dome, or a second storey. Roofs rest on beams alone and clear the
 columns, so that a roof does not depend on its surroundings.
 """
 
