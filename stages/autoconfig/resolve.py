@@ -137,7 +137,8 @@ def resolve_max_copied(trial: TrialResult | None) -> tuple[float, str]:
         return 1.0, "a part that replaces another leaves all other parts in place"
     if trial.non_copy_rate < MIN_NON_COPY_RATE:
         return 1.0, f"only {trial.non_copy_rate:.0%} of the hits of a short search are no near copies"
-    return NEAR_COPY_SHARE, f"rejects near copies; a short search finds {trial.non_copy_rate:.0%} other hits"
+    reason = f"rejects near copies; {trial.non_copy_rate:.0%} of the hits of a short search are more than that"
+    return NEAR_COPY_SHARE, reason
 
 
 def _requirements(analysis: ContactAnalysis, candidates: Sequence[CandidateSetting]) -> dict[str, tuple[Any, str]]:

@@ -22,13 +22,13 @@ HALL = {
     "roof": box(1, 0.12, 1),
     "lamp": box(0.1, 0.3, 0.1),
 }
-"""A column ends .04 below a roof that rests on walls: without contact."""
+"""A column ends 0.04 below a roof on walls, without contact."""
 
 LOOSE = ContactConfig(tolerance=0.05, kinds=("face",))
 
 
 def hall(bays: int, storeys: int = 1, columns: bool = True) -> list[Placed]:
-    """A row of bays: a floor, a wall behind it as high as some storeys, a roof; a column of one storey in front."""
+    """Return bays with a floor, a wall of some storeys at the back, a roof, and a one-storey column in front."""
     placed: list[Placed] = []
     for k in range(bays):
         placed += [("floor", pose(k, -0.05, 0)), ("roof", pose(k, storeys + 0.06, 0))]

@@ -25,18 +25,18 @@ def raw_part(name: str, body: Body, pose: np.ndarray, label: str | None = None) 
 
 
 def model(parts: Mapping[str, tuple[Body, Sequence[float]]], name: str = "blocks") -> Model:
-    """A model with a part for each name: its body and where it stands."""
-    made = tuple(raw_part(key, body, placed(*at)) for key, (body, at) in parts.items())
-    return Model(Path(f"{name}.glb"), made, "nodes", f"{len(made)} scene nodes", ())
+    """Return a model with one part a name, each with its body and position."""
+    parts_at = tuple(raw_part(key, body, placed(*at)) for key, (body, at) in parts.items())
+    return Model(Path(f"{name}.glb"), parts_at, "nodes", f"{len(parts_at)} scene nodes", ())
 
 
 def ring() -> Model:
-    """Four cubes around a square: neighbours share faces, opposite ones an edge."""
+    """Return four cubes around a square: neighbours share faces, opposite cubes an edge."""
     return model({f"cube.{k}": (CUBE, (k in (1, 2), k in (2, 3), 0)) for k in range(4)}, "ring")
 
 
 def block_config(**settings: Any) -> KitConfig:
-    """A config of a kit whose models are handed in, so that no file is looked for; what it does not say is decided."""
+    """Return a resolved config of a kit whose models are passed in, so that no file is read."""
     return KitConfig.model_construct(
         **{key: field.get_default(call_default_factory=True) for key, field in KitConfig.model_fields.items()}
         | {"name": "blocks", "shapes": ()}

@@ -1,4 +1,4 @@
-"""Model files written by hand: what readers are tried on."""
+"""Model files written by hand for tests of readers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BOX_FACES = np.array(
 
 
 def box(size: tuple[float, float, float] = (1, 1, 1), at: tuple[float, float, float] = (0, 0, 0)) -> np.ndarray:
-    """The corners of a box, float64 (8, 3), for BOX_FACES; it faces outward."""
+    """Return the corners of a box, float64 (8, 3), for the outward faces BOX_FACES."""
     unit = np.array([[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], dtype=np.float64)
     return unit * size + at
 
@@ -27,7 +27,7 @@ def signed_volume(vertices: np.ndarray, faces: np.ndarray) -> float:
 
 
 def world_triangles(vertices: np.ndarray, faces: np.ndarray, pose: np.ndarray | None = None) -> np.ndarray:
-    """Triangles in the world, (f, 9), each from its lowest corner on, sorted: equal for equal oriented surfaces."""
+    """Return triangles in the world, (f, 9), from their lowest corners, sorted: equal for equal oriented surfaces."""
     pose = np.eye(4) if pose is None else pose
     corners = (vertices @ pose[:3, :3].T + pose[:3, 3])[faces]
     rows = []
@@ -48,7 +48,7 @@ def png(pixels: np.ndarray) -> bytes:
 
 
 class Glb:
-    """Builds a glTF header and its binary chunk."""
+    """Build a glTF header and its binary chunk."""
 
     def __init__(self) -> None:
         self.header: dict[str, Any] = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}]}
@@ -111,7 +111,7 @@ class Glb:
 
 
 def write_obj(path: Path, boxes: dict[str, np.ndarray], head: str = "", before: dict[str, str] | None = None) -> Path:
-    """An OBJ with one object a box; `before` holds lines that stand in front of an object's faces."""
+    """Write an OBJ with one object a box; `before` holds lines in front of an object's faces."""
     lines = [head]
     for number, (name, corners) in enumerate(boxes.items()):
         lines.append(f"o {name}")
@@ -137,7 +137,7 @@ def textured_glb(image: str) -> Glb:
 
 
 def textured_dae(image: str) -> str:
-    """A square that two nodes place, one below the other, with a texture, the file `image`."""
+    """Write a square that two nodes place, one above the other, with a texture, the file `image`."""
     return f"""<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
 <asset><created>2020-01-01T00:00:00Z</created><modified>2020-01-01T00:00:00Z</modified>

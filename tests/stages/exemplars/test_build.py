@@ -1,3 +1,5 @@
+"""A kit is built from models: types, labels, pieces, hubs and refusals."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -40,8 +42,8 @@ class TestTypes:
             # Each mesh stands in coordinates of its own.
             turned = transform_points(placed(*rng.normal(size=3), random_rotation(rng)), vertices)
             parts.append(raw_part(f"p{k}", (turned, faces), placed(0.8 * k, 0, 0, random_rotation(rng))))
-        made = Model(Path("mixed.glb"), tuple(parts), "nodes", "", ())
-        kit = observe_models(block_config(), [made]).kit
+        model_of = Model(Path("mixed.glb"), tuple(parts), "nodes", "", ())
+        kit = observe_models(block_config(), [model_of]).kit
         assembly = kit.exemplars[0].assembly
         assert assembly.types.tolist() == [0, 1] * 3
         assert kit.exemplars[0].part_names == tuple(f"p{k}" for k in range(6))
@@ -72,9 +74,9 @@ class TestTypes:
 
     def test_labels_tell_congruent_parts_apart_if_the_config_says_so(self) -> None:
         parts = [raw_part(f"{label}.{k}", CUBE, placed(float(k)), label) for k, label in enumerate("aabba")]
-        made = Model(Path("labels.glb"), tuple(parts), "nodes", "", ())
-        assert block_kit(made).exemplars[0].assembly.types.tolist() == [0] * 5
-        kit = block_kit(made, types="labels")
+        model_of = Model(Path("labels.glb"), tuple(parts), "nodes", "", ())
+        assert block_kit(model_of).exemplars[0].assembly.types.tolist() == [0] * 5
+        kit = block_kit(model_of, types="labels")
         assert kit.exemplars[0].assembly.types.tolist() == [0, 0, 1, 1, 0]
         assert kit.type_names() == ("a", "b")
         assert mirror_twins(kit.types, 1e-3) == []
@@ -147,17 +149,17 @@ class TestRefusals:
         assert "no part has a triangle with area" in refusal(model({"a": (line, (0, 0, 0)), "b": (line, (1, 0, 0))}))
 
     def test_refused_models_can_be_observed(self) -> None:
-        seen = observe_models(block_config(), [model({"only": (CUBE, (0, 0, 0))})])
-        assert len(seen.refusals) == 1
-        assert len(seen.kit.types[0].symmetries) == 24
+        observation = observe_models(block_config(), [model({"only": (CUBE, (0, 0, 0))})])
+        assert len(observation.refusals) == 1
+        assert len(observation.kit.types[0].symmetries) == 24
 
 
 class TestLeftOut:
     def test_coincident_parts_are_left_out_and_named(self) -> None:
         quarter = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
         again = [raw_part(name, CUBE, placed(1, 0, 0, quarter)) for name in ("again", "and again")]
-        made = Model(Path("thrice.glb"), (again[0], *ring().parts, again[1]), "nodes", "", ())
-        kit, report = build_kit(block_config(), [made])
+        model_of = Model(Path("thrice.glb"), (again[0], *ring().parts, again[1]), "nodes", "", ())
+        kit, report = build_kit(block_config(), [model_of])
         assert kit.exemplars[0].part_names == ("again", "cube.0", "cube.2", "cube.3")
         assert len(kit.exemplars[0].assembly.edges) == len(block_kit(ring()).exemplars[0].assembly.edges)
         (warning,) = (warning for warning in report.warnings if "left out" in warning)
@@ -167,8 +169,8 @@ class TestLeftOut:
     def test_nested_parts_are_kept(self) -> None:
         eighth = np.array([[1, -1, 0], [1, 1, 0], [0, 0, np.sqrt(2)]]) / np.sqrt(2)
         parts = (*ring().parts, raw_part("turned", CUBE, placed(1, 0, 0, eighth)))
-        seen = observe_models(block_config(), [Model(Path("turned.glb"), parts, "nodes", "", ())])
-        assert len(seen.kit.exemplars[0].assembly) == len(ring().parts) + 1
+        observation = observe_models(block_config(), [Model(Path("turned.glb"), parts, "nodes", "", ())])
+        assert len(observation.kit.exemplars[0].assembly) == len(ring().parts) + 1
 
     def test_part_without_area_is_left_out_and_named(self) -> None:
         flat = CUBE[0], np.array([[0, 1, 1], [2, 2, 2]], dtype=np.int32)
@@ -253,16 +255,16 @@ class TestPieces:
 
 
 def test_model_a_million_units_away_has_the_same_contacts(tmp_path: Path) -> None:
-    found = []
+    kits = []
     for shift in (0.0, 1e6):
         glb = Glb()
         cube = glb.mesh(glb.primitive(file_box(), BOX_FACES), name="cube")
         for k in range(5):
             glb.node(name=f"cube.{k}", mesh=cube, translation=[shift + k, shift, 0.0])
         glb.node(name="on top", mesh=cube, translation=[shift + 0.5, shift + 1.0, 0.0])
-        made = read_model(glb.write(tmp_path / f"{shift:g}.glb"))
-        found.append((block_kit(made), made.warnings))
-    (near, quiet), (away, warned) = found
+        model_of = read_model(glb.write(tmp_path / f"{shift:g}.glb"))
+        kits.append((block_kit(model_of), model_of.warnings))
+    (near, quiet), (away, warned) = kits
     assert away.exemplars[0].assembly.edges.tolist() == near.exemplars[0].assembly.edges.tolist()
     assert len(near.exemplars[0].assembly.edges) == 6
     assert [docking.kind for docking in away.grammar.dockings] == [docking.kind for docking in near.grammar.dockings]

@@ -1,3 +1,5 @@
+"""Congruences of meshes: symmetry groups, mirror images and tolerances."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -17,7 +19,7 @@ TETRAHEDRON: Body = (
 )
 SCALENE: Body = (np.array([[0, 0, 0], [3, 0, 0], [0.4, 2, 0], [1, 0.5, 1.2]]), TETRAHEDRON[1])
 HELIX = joined(box(), box(at=(1, 0, 0)), box(at=(1, 1, 0)), box(at=(1, 1, 1)))
-"""Four cubes in a screw: no rotation makes its mirror image of it."""
+"""Four cubes in a screw, which no rotation maps to their mirror image."""
 
 
 def group(body: Body, reflections: bool = False) -> FloatArray:
@@ -34,7 +36,7 @@ def moved(body: Body, pose: FloatArray) -> Body:
 
 
 def split(body: Body) -> Body:
-    """The same surface in four times as many triangles."""
+    """Return the same surface with four triangles for one."""
     vertices, faces = body
     corners = vertices[faces]
     middles = (corners + np.roll(corners, -1, axis=1)) / 2
@@ -130,7 +132,7 @@ def test_screw_and_its_mirror_image_are_two_types_unless_reflections_count() -> 
 
 
 def test_small_rotation_of_a_long_part_is_no_symmetry() -> None:
-    """It moves all of the part by less than the tolerance, whatever the part looks like."""
+    """The rotation moves all of the part by less than the tolerance, for any part."""
     vertices, faces = prism(6, 1.0, 60.0)
     turn = np.array([0.0, 0.01, 2.0, 2.01, 4.0, 4.01])
     reach = np.array([1.0, 1.0, 0.8, 0.8, 0.6, 0.6])

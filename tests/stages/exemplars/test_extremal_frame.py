@@ -1,3 +1,5 @@
+"""The local frame of a part by extremal points."""
+
 from __future__ import annotations
 
 import numpy as np

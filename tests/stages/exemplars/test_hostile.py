@@ -1,4 +1,4 @@
-"""Hostile model files end in a model read rightly, or in one clear error that names file and element, in seconds."""
+"""Hostile model files are read correctly or refused within seconds, with file and element."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def ply(header: str, body: str) -> bytes:
 
 
 def doubling(levels: int) -> str:
-    """Nodes that place each other twice, level upon level."""
+    """Return nodes that place the next level twice, on every level."""
     nodes = "".join(
         f'<node id="d{k}"><instance_node url="#d{k + 1}"/><instance_node url="#d{k + 1}"/></node>'
         for k in range(levels)
@@ -128,7 +128,7 @@ def test_name_that_is_no_text_is_ignored(tmp_path: Path) -> None:
     (tmp_path / "m.glb").write_bytes(changed_glb(lambda header: header["meshes"][0].update(name=7)))
     model = read_model(tmp_path / "m.glb", "auto", LIMITS)
     assert {part.mesh_name for part in model.parts} == {"mesh0"}
-    assert model.warnings[0] == "mesh 0 has a name that is no text, and goes without"
+    assert model.warnings[0] == "mesh 0 has a name that is no text; it is ignored"
 
 
 def test_names_can_be_shown_and_written_anywhere(tmp_path: Path) -> None:
@@ -136,8 +136,8 @@ def test_names_can_be_shown_and_written_anywhere(tmp_path: Path) -> None:
     (tmp_path / "m.glb").write_bytes(
         changed_glb(lambda header: [node.update(name=name) for node, name in zip(header["nodes"], names, strict=False)])
     )
-    found = [part.name for part in read_model(tmp_path / "m.glb", "auto", LIMITS).parts]
-    assert found == ["\ufffd", "a\ufffd[31mb\ufffd"]
+    names = [part.name for part in read_model(tmp_path / "m.glb", "auto", LIMITS).parts]
+    assert names == ["\ufffd", "a\ufffd[31mb\ufffd"]
     write_obj(tmp_path / "m.obj", {"n" * 100_000: box(), "m": box(at=(2, 0, 0))})
     assert len(read_model(tmp_path / "m.obj", "auto", LIMITS).parts[0].name) == 201
 
@@ -227,11 +227,11 @@ def test_good_files_are_read_without_warnings(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_mutated_files_are_read_or_refused(tmp_path: Path) -> None:
-    found = list(outcomes(tmp_path, 110, seed=1))
-    assert [outcome.message for outcome in found if outcome.end == "escaped"] == []
-    assert [outcome.message for outcome in found if outcome.end == "stopped"] == []
-    assert Counter(outcome.end for outcome in found)["read"] >= 20
-    assert max(outcome.cpu for outcome in found) < LIMITS.cpu_seconds
+    results = list(outcomes(tmp_path, 110, seed=1))
+    assert [outcome.message for outcome in results if outcome.end == "escaped"] == []
+    assert [outcome.message for outcome in results if outcome.end == "stopped"] == []
+    assert Counter(outcome.end for outcome in results)["read"] >= 20
+    assert max(outcome.cpu for outcome in results) < LIMITS.cpu_seconds
 
 
 @pytest.mark.skipif(not HOSTILE.is_dir(), reason="the files that showed a fault are not next to the project")

@@ -20,7 +20,7 @@ MESHES = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}
 
 
 def on_plate(links: int) -> list[Placed]:
-    """cap - link - ... - link - cap on a plate: the caps, which are taller than the links, touch it with their feet."""
+    """Return cap - link - ... - link - cap on a plate, which only the taller caps touch."""
     return [*chain(links), ("plate", pose((links - 1) / 2, -0.55, 0))]
 
 
@@ -30,27 +30,27 @@ def observe(shapes: list[list[Placed]], meshes: dict[str, trimesh.Trimesh] = MES
 
 def test_dropped_hubs_are_neither_in_the_exemplars_nor_among_the_types() -> None:
     with_plate, without = on_plate(3), chain(3)
-    seen = observe([with_plate], hubs=HubConfig(types=("plate",), restore=False))
+    observation = observe([with_plate], hubs=HubConfig(types=("plate",), restore=False))
     plain = observe([without])
-    assert not seen.refusals
-    assert seen.kit.type_names() == plain.kit.type_names() == ("cap", "link")
-    assert seen.kit.exemplars[0].part_names == plain.kit.exemplars[0].part_names
-    np.testing.assert_array_equal(seen.kit.exemplars[0].assembly.edges, plain.kit.exemplars[0].assembly.edges)
-    assert seen.kit.grammar.neighbourhoods == plain.kit.grammar.neighbourhoods
-    assert seen.kit.grammar.hubs == ()
-    assert any("1 hubs are left out of the graph: plate" in warning for warning in seen.warnings)
+    assert not observation.refusals
+    assert observation.kit.type_names() == plain.kit.type_names() == ("cap", "link")
+    assert observation.kit.exemplars[0].part_names == plain.kit.exemplars[0].part_names
+    np.testing.assert_array_equal(observation.kit.exemplars[0].assembly.edges, plain.kit.exemplars[0].assembly.edges)
+    assert observation.kit.grammar.neighbourhoods == plain.kit.grammar.neighbourhoods
+    assert observation.kit.grammar.hubs == ()
+    assert any("1 hubs are left out of the graph: plate" in warning for warning in observation.warnings)
 
 
 def test_restored_hub_is_a_type_with_dockings_that_no_neighbourhood_counts() -> None:
-    seen = observe([on_plate(3)], hubs=HubConfig(types=("plate",), restore=True))
-    kit = seen.kit
+    observation = observe([on_plate(3)], hubs=HubConfig(types=("plate",), restore=True))
+    kit = observation.kit
     cap, link, plate = (kit.type_names().index(name) for name in ("cap", "link", "plate"))
     assert kit.grammar.hubs == (plate,)
     assert plate not in kit.exemplars[0].assembly.types
     assert kit.grammar.neighbourhoods[cap] == {((link, 1),): 2}
     assert kit.grammar.neighbourhoods[plate] == {((cap, 2),): 1}
     assert {(docking.a, docking.b) for docking in kit.grammar.dockings} >= {(cap, plate)}
-    assert len(seen.kinds[0]) == len(seen.contacts[0]) == len(kit.exemplars[0].assembly.edges)
+    assert len(observation.kinds[0]) == len(observation.contacts[0]) == len(kit.exemplars[0].assembly.edges)
 
 
 def test_kit_with_hubs_and_a_loose_grammar_survives_files(tmp_path: Any) -> None:
@@ -98,7 +98,7 @@ def test_loose_grammar_of_parts_with_many_contacts_is_accepted() -> None:
 
 
 def renamed(model: Model, turn: np.ndarray) -> Model:
-    """The model with other names and with a rotation of every mesh undone in its pose."""
+    """Return the model with other names and with rotated meshes, undone by their poses."""
     parts = []
     for part in model.parts:
         new = part.pose @ np.linalg.inv(turn)
@@ -113,13 +113,13 @@ def test_renamed_and_rotated_copy_has_the_same_types_and_aliases() -> None:
     shapes = [chain(3)]
     model = models_of(CHAIN, shapes)[0]
     turn = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3])
-    seen = observe_models(config_of([*shapes, *shapes]), [model, renamed(model, turn)])
+    observation = observe_models(config_of([*shapes, *shapes]), [model, renamed(model, turn)])
     alone = observe_models(config_of(shapes), [model])
-    assert not seen.refusals
-    assert seen.kit.type_names() == ("cap", "link")
-    assert seen.aliases == {"cap": ("pac",), "link": ("knil",)}
+    assert not observation.refusals
+    assert observation.kit.type_names() == ("cap", "link")
+    assert observation.aliases == {"cap": ("pac",), "link": ("knil",)}
     assert alone.aliases == {}
-    first, second = (exemplar.assembly for exemplar in seen.kit.exemplars)
+    first, second = (exemplar.assembly for exemplar in observation.kit.exemplars)
     np.testing.assert_array_equal(first.types, second.types)
     np.testing.assert_array_equal(first.edges, second.edges)
-    assert len(seen.kit.grammar.dockings) == len(alone.kit.grammar.dockings)
+    assert len(observation.kit.grammar.dockings) == len(alone.kit.grammar.dockings)

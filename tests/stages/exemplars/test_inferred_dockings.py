@@ -1,4 +1,4 @@
-"""Fits: where parts may dock that never met, and how far from there."""
+"""Inferred dockings of parts that never met, and their slack."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ def kit() -> Kit:
 
 
 def fits(kit: Kit) -> dict[tuple[str, str], Docking]:
-    found = [docking for docking in kit.grammar.dockings if docking.slack]
-    by_names = {(kit.types[part_type.a].name, kit.types[part_type.b].name): part_type for part_type in found}
-    assert len(by_names) == len(found)
+    inferred = [docking for docking in kit.grammar.dockings if docking.slack]
+    by_names = {(kit.types[part_type.a].name, kit.types[part_type.b].name): part_type for part_type in inferred}
+    assert len(by_names) == len(inferred)
     return by_names
 
 
 def test_every_leg_fits_under_every_corner_of_every_top(kit: Kit) -> None:
     # turned about their axes, and the tops about theirs, the four corners look alike: one fit for each pair
-    found = fits(kit)
-    assert set(found) == {("top", "leg"), ("top", "leg_2"), ("leg", "top_2"), ("top_2", "leg_2")}
-    under_thin = found["top", "leg_2"].pose[:3, 3]
+    inferred = fits(kit)
+    assert set(inferred) == {("top", "leg"), ("top", "leg_2"), ("leg", "top_2"), ("top_2", "leg_2")}
+    under_thin = inferred["top", "leg_2"].pose[:3, 3]
     assert np.abs(under_thin) == pytest.approx([0.8, 0.1 + 0.5, 0.8])
-    over_square = found["leg", "top_2"].pose[:3, 3]
+    over_square = inferred["leg", "top_2"].pose[:3, 3]
     assert np.abs(over_square) == pytest.approx([0.8, 0.15 + 0.5, 0.8])
-    assert all(docking.count == 0 and docking.kind == "face" and docking.depth == 0 for docking in found.values())
+    assert all(docking.count == 0 and docking.kind == "face" and docking.depth == 0 for docking in inferred.values())
 
 
 def test_shorter_leg_hangs_from_the_top() -> None:
@@ -76,13 +76,13 @@ def test_inferred_docking_holds_within_its_slack_at_every_image_and_from_both_si
     way = np.array(direction) / max(np.linalg.norm(direction), 1e-9)
     moved = pose(0, 0, 0, quarter_turns) @ fit.pose
     moved[:3, 3] += way * share * fit.slack
-    asked = table.fit(fit.b, fit.a, invert(moved)) if is_back else table.fit(fit.a, fit.b, moved)
+    fitting = table.fit(fit.b, fit.a, invert(moved)) if is_back else table.fit(fit.a, fit.b, moved)
     expected = (2 * index + is_back, 2 * index + 1 - is_back)
     distance = np.linalg.norm(way) * share
     if distance < 0.99:
-        assert asked == expected
+        assert fitting == expected
     elif distance > 1.01:
-        assert asked is None
+        assert fitting is None
 
 
 _KITS: list[Kit] = []

@@ -1,4 +1,4 @@
-"""Meanings by a config's word, for models whose parts are called by numbers."""
+"""Labels from the config, for models with numbered parts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LABEL_MAP = {"top": ("p0",), "leg": ("p[1-4]",)}
 
 
 def numbered(model: Model, folder: str) -> Model:
-    """A model whose parts are called by numbers and whose meshes have no names that tell."""
+    """Return a model with numbered parts and meshes without useful names."""
     parts = tuple(
         replace(part, name=f"p{number}", label=None, mesh_name=f"m{part.mesh_name}{folder}")
         for number, part in enumerate(model.parts)

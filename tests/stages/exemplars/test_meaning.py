@@ -1,4 +1,4 @@
-"""Types by meaning: one label over several surfaces, and nothing new where labels are the names."""
+"""Types by meaning: one label for several surfaces."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def test_surfaces_of_one_label_are_types_of_their_own_with_one_meaning(kit: Kit)
 
 def test_neighbourhoods_are_those_of_labels_and_dockings_those_of_surfaces(kit: Kit) -> None:
     assert kit.grammar.neighbourhoods == {0: {((1, 4),): 2}, 1: {((0, 1),): 8}}
-    seen = [(docking.a, docking.b, docking.count) for docking in kit.grammar.dockings if docking.count]
-    assert seen == [(0, 1, 4), (2, 3, 4)]
+    observed = [(docking.a, docking.b, docking.count) for docking in kit.grammar.dockings if docking.count]
+    assert observed == [(0, 1, 4), (2, 3, 4)]
 
 
 def test_neighbourhoods_are_those_of_labels_also_where_parts_stand_apart_and_are_left_out() -> None:
@@ -70,7 +70,7 @@ def test_part_label_is_its_meaning_and_part_name_its_surface(kit: Kit) -> None:
 
 
 def mixed(kit: Kit) -> Assembly:
-    """The thin top on two square legs and two round ones, as nobody has seen it."""
+    """Return the thin top on two square and two round legs, which no exemplar shows."""
     whole = kit.exemplars[0].assembly
     types = whole.types.copy()
     types[[1, 4]] = 3
@@ -95,7 +95,7 @@ def test_geometry_check_uses_labels_for_neighbourhoods_and_surfaces_for_contacts
     three = Assembly(assembly.types[:4], assembly.poses[:4], assembly.edges[:3])
     assert faults(kit, three) == ["top.000 has a neighbourhood that the grammar does not admit: 3 leg"]
     assembly.poses[1, 1, 3] += 0.05
-    assert any("reach" in fault and "into fault other" in fault for fault in faults(kit, assembly))
+    assert any("reach" in fault and "into each other" in fault for fault in faults(kit, assembly))
 
 
 def test_hubs_cannot_be_left_out_by_meaning() -> None:

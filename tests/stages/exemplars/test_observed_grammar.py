@@ -1,3 +1,5 @@
+"""Neighbourhoods, dockings and depths observed in assemblies."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -52,10 +54,10 @@ class TestNeighbourhoods:
 
 class TestDockings:
     def test_cubes_in_a_ring_dock_in_two_ways_whichever_side_they_show(self) -> None:
-        found = {docking.kind: docking for docking in block_kit(ring()).grammar.dockings}
-        assert {kind: docking.count for kind, docking in found.items()} == {"face": 4, "line": 2}
-        assert all(docking.depth == pytest.approx(0.0, abs=1e-5) for docking in found.values())
-        assert np.linalg.norm(found["line"].pose[:3, 3]) == pytest.approx(np.sqrt(2))
+        dockings = {docking.kind: docking for docking in block_kit(ring()).grammar.dockings}
+        assert {kind: docking.count for kind, docking in dockings.items()} == {"face": 4, "line": 2}
+        assert all(docking.depth == pytest.approx(0.0, abs=1e-5) for docking in dockings.values())
+        assert np.linalg.norm(dockings["line"].pose[:3, 3]) == pytest.approx(np.sqrt(2))
 
     def test_turning_a_cube_in_itself_makes_no_docking_of_its_own(self) -> None:
         quarter = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
@@ -82,9 +84,9 @@ class TestDockings:
         start, other = placed(rotation=random_rotation(rng)), placed(5, 5, 5)
         poses = np.array([start, start @ pose, other @ pose, other])
         edges = np.array([[0, 1], [2, 3]], dtype=np.int32)
-        (found,) = observe_dockings(types, [Assembly(np.zeros(4, np.int16), poses, edges)], 1e-3)
-        assert found.count == 2
-        np.testing.assert_allclose(found.pose, pose, atol=1e-12)
+        (dockings,) = observe_dockings(types, [Assembly(np.zeros(4, np.int16), poses, edges)], 1e-3)
+        assert dockings.count == 2
+        np.testing.assert_allclose(dockings.pose, pose, atol=1e-12)
 
     def test_poses_within_tolerance_are_one_docking_and_beyond_are_two(self) -> None:
         types = [part(hull(np.random.default_rng(3)))]
@@ -93,8 +95,8 @@ class TestDockings:
         for index, shift in enumerate(shifts):
             poses += [placed(0, 9.0 * index), placed(1.0, 9.0 * index + shift * 1e-3)]
         edges = np.arange(8, dtype=np.int32).reshape(-1, 2)
-        found = observe_dockings(types, [Assembly(np.zeros(8, np.int16), np.array(poses), edges)], 1e-3)
-        assert [docking.count for docking in found] == [3, 1]
+        dockings = observe_dockings(types, [Assembly(np.zeros(8, np.int16), np.array(poses), edges)], 1e-3)
+        assert [docking.count for docking in dockings] == [3, 1]
 
     def test_every_contact_of_an_exemplar_is_found_again_in_the_table(self) -> None:
         rng = np.random.default_rng(4)
@@ -105,13 +107,13 @@ class TestDockings:
         assembly = Assembly(kinds, poses, contact.contacts(kinds, poses))
         contacts = observe_contacts(types, [assembly], contact, 0.01, ("point", "line", "face"))
         grammar = observe_grammar(types, [assembly], contacts, ("point", "line", "face"))
-        (kept,), (found,) = contacts.counted, contacts.kinds
+        (kept,), (dockings,) = contacts.counted, contacts.kinds
         assert kept.edges.tolist() == assembly.edges.tolist()
         labels = DockingTable(types, grammar.dockings, 0.01).label_edges(kinds, poses, assembly.edges)
         assert len(labels) > 5
         assert labels.min() >= 0
-        assert sum(docking.count for docking in grammar.dockings) == len(assembly.edges) == len(found)
-        assert [grammar.dockings[label].kind for label in (labels[:, 0] // 2).tolist()] == list(found)
+        assert sum(docking.count for docking in grammar.dockings) == len(assembly.edges) == len(dockings)
+        assert [grammar.dockings[label].kind for label in (labels[:, 0] // 2).tolist()] == list(dockings)
 
     def test_depth_is_the_penetration_of_two_parts(self) -> None:
         parts = {"a": (CUBE, (0, 0, 0)), "b": (CUBE, (0.75, 0, 0)), "c": (CUBE, (1.5, 0, 0))}

@@ -1,3 +1,5 @@
+"""Readers of every format: parts, names, colours, and refusals with the mend."""
+
 from __future__ import annotations
 
 import contextlib

@@ -1,4 +1,4 @@
-"""The contact graphs and part types of public models, against what was measured on them with other tools."""
+"""Contact graphs and part types of public models, compared with measurements by other tools."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from stages.shape.kit import ContactKind, Kit
 EXEMPLARS = Path(__file__).resolve().parents[4] / "shared" / "exemplars"
 FOLDERS = sorted(path.parent for path in EXEMPLARS.glob("[ah]*/exemplar.json"))
 TOLERANCES = {"h01": 5e-3, "h03": 5e-3, "h04": 1e-2, "h06": 1e-2, "h09": 1e-2, "h10": 2e-3}
-"""The shares of the median part diagonal by which the edges of `exemplar.json` were measured, where not 1e-3."""
+"""Contact tolerances with which the edges of `exemplar.json` were measured, if not 1e-3 of the median diagonal."""
 ALL_KINDS: tuple[ContactKind, ...] = ("point", "line", "face")
 
 MIRRORED = {"a08": 1, "h06": 3}
@@ -27,7 +27,7 @@ MIRRORED = {"a08": 1, "h06": 3}
 DOUBLED = {"a05": ["Wall3WindowGrate.002", "Wall3WindowGrate.003"], "a11": ["wall_empty.019", "roof_tile_empty.041"]}
 """Models with coincident parts, which are left out here and present in the measurements."""
 PRINTED = {"a17": 1}
-"""A tile with a printed pattern is the plain tile with other triangles: one surface, one type."""
+"""The printed tile has the surface of the plain tile with other triangles, so both are one type."""
 
 pytestmark = pytest.mark.skipif(not FOLDERS, reason="the public exemplars are not next to the project")
 
@@ -41,7 +41,7 @@ def build(folder: Path, mirrored: bool = False, kinds: tuple[ContactKind, ...] =
 
 
 def measured(folder: Path) -> dict[str, Any]:
-    """What was measured of a model, without the parts that stand twice in it."""
+    """Return the measurements of a model without its coincident parts."""
     described: dict[str, Any] = json.loads((folder / "exemplar.json").read_text())
     doubled = DOUBLED.get(folder.name[:3], [])
     keep = [index for index, part in enumerate(described["part_list"]) if part["node"] not in doubled]
@@ -56,8 +56,8 @@ def measured(folder: Path) -> dict[str, Any]:
 
 
 def edges(kit: Kit) -> list[list[int]]:
-    found: list[list[int]] = kit.exemplars[0].assembly.edges.tolist()
-    return found
+    contacts: list[list[int]] = kit.exemplars[0].assembly.edges.tolist()
+    return contacts
 
 
 def pairs(listed: list[list[Any]]) -> list[list[int]]:
@@ -114,9 +114,9 @@ def test_masonry_has_the_interfaces_of_its_authors(short: str) -> None:
 
 def test_cross_vault_has_the_interfaces_of_its_authors_where_faces_count() -> None:
     folder = folder_of("a26")
-    found = edges(build(folder, kinds=("face",)))
-    assert found == pairs(measured(folder)["author_interface_graph"])
-    assert len(found) == 452
+    contacts = edges(build(folder, kinds=("face",)))
+    assert contacts == pairs(measured(folder)["author_interface_graph"])
+    assert len(contacts) == 452
 
 
 def test_race_track_is_one_loop_where_faces_count() -> None:

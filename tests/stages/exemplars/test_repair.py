@@ -1,3 +1,5 @@
+"""Repair of meshes: duplicates, solids that touch, orientation."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -15,7 +17,7 @@ EXEMPLARS = Path(__file__).resolve().parents[4] / "shared" / "exemplars"
 
 
 def rainbow(faces: np.ndarray) -> np.ndarray:
-    """A colour of its own for each face."""
+    """Return a different colour for every face."""
     return np.column_stack([np.arange(len(faces)), np.full(len(faces), 7), np.full(len(faces), 9)]).astype(np.uint8)
 
 

@@ -1,3 +1,5 @@
+"""What makes a part: nodes, materials, colours and connected components."""
+
 from __future__ import annotations
 
 import itertools
@@ -23,7 +25,7 @@ def boxes(corners: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def painted(corners: list[np.ndarray], colors: list[tuple[int, int, int]]) -> ModelScene:
-    """One surface of boxes, each in its colour."""
+    """Return one surface of boxes with different colours."""
     vertices, faces = boxes(corners)
     paint = np.repeat(np.array(colors, dtype=np.uint8), 12, axis=0)
     surface = Surface("all", vertices, faces.astype(np.int32), paint, paint=paint)

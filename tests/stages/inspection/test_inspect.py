@@ -27,7 +27,7 @@ def inspect(*arguments: object) -> int:
 
 
 def ring(folder: Path, name: str = "ring.obj") -> Path:
-    """Four cubes around a square."""
+    """Write four cubes around a square."""
     corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
     return write_obj(folder / name, {f"cube.{k:03d}": box(at=at) for k, at in enumerate(corners)})
 
