@@ -132,7 +132,9 @@ def attempts(
         if assembly is not None:
             faults = len(assembly_faults(instantiator.kit, assembly, instantiator.upright))
         parts, rank = len(graph.types), len(graph.edges) - len(graph.types) + 1
-        results.append(InstantiationAttempt(parts, rank, assembly, instance.reason, faults, instance.tries, seconds))
+        results.append(
+            InstantiationAttempt(parts, rank, assembly, instance.reason, faults, instance.placements, seconds)
+        )
     return results
 
 

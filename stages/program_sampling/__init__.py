@@ -1,1 +1,1 @@
-"""Trained models write ShapeAssembly programs, which stage `shapeassembly` makes shapes of (shapeassembly §6.1)."""
+"""Samples ShapeAssembly programs from trained models for stage `shapeassembly` (shapeassembly §6.1)."""

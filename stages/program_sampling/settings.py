@@ -8,6 +8,6 @@ from pipeline.config import StrictModel
 
 
 class ProgramSamplingConfig(StrictModel):
-    """How the models of `shapeassembly.sampled` write their programs."""
+    """How the models of `shapeassembly.sampled` sample programs."""
 
-    programs_per_shard: int = Field(500, ge=1, le=100_000, description="Most programs of a shard; unit: programs.")
+    programs_per_shard: int = Field(500, ge=1, le=100_000, description="programs in a shard at most; unit: programs")

@@ -1,6 +1,6 @@
-"""Stage `program_sampling`: trained models in; the programs, which stage `shapeassembly` reads like others.
+"""Stage `program_sampling`: ShapeAssembly programs from trained models, which stage `shapeassembly` reads.
 
-A shard is some of the programs of one model, `.jsonl`, one a line: what they are called, and their text.
+A shard is some of the programs of one model, `.jsonl`, one a line: category, name and text.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from stages.program_sampling.settings import ProgramSamplingConfig
 from stages.shapeassembly.settings import SampledPrograms, ShapeAssemblyConfig
 from stages.shapeassembly.syntax.printer import print_program
 
-BYTES_A_PROGRAM = 3_000
+BYTES_PER_PROGRAM = 3_000
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """The shards of every model, in the order of the config. Raises ConfigError where one is not there."""
-    most = plan.config.section(ProgramSamplingConfig).programs_per_shard
+    """Plan the shards of every model, in the order of the config. Raises ConfigError for a missing model."""
+    max_programs = plan.config.section(ProgramSamplingConfig).programs_per_shard
     shards: list[Shard] = []
     for source in plan.config.section(ShapeAssemblyConfig).sampled:
         digest = file_digest(_weights(plan, source))
-        for first in range(0, source.samples, most):
+        for first in range(0, source.samples, max_programs):
             params = {
                 "kind": source.name,
                 "folder": source.folder,
@@ -35,9 +35,9 @@ def plan(plan: Plan) -> list[Shard]:
                 "temperature": source.temperature,
                 "top_p": source.top_p,
                 "first": first,
-                "samples": min(most, source.samples - first),
+                "samples": min(max_programs, source.samples - first),
             }
-            shards.append(Shard(f"{plan.config.name}-written-{len(shards):06d}", params))
+            shards.append(Shard(f"{plan.config.name}-sampled-{len(shards):06d}", params))
     return shards
 
 
@@ -52,10 +52,10 @@ def _weights(plan: Plan, source: SampledPrograms) -> Path:
 
 
 def run_shard(task: Task) -> Outcome:
-    """Programs that a model writes; those that it begins and gives up are refused.
+    """Sample programs; those given up by the model are rejected.
 
-    Raises Rejected for weights that are none of a model of programs of this kit, and for a model that gives up nearly
-    all; ShardFailed for weights that are others than when the run began.
+    Raises Rejected for weights of another kind or kit, and for a model that gives up nearly all programs; ShardFailed
+    for weights that have changed since the run began.
     """
     from stages.training.checkpoint import CheckpointError
     from stages.training.load import load_program_sampler
@@ -66,41 +66,41 @@ def run_shard(task: Task) -> Outcome:
         raise ShardFailed(f"{path} has changed since the run began")
     try:
         model = load_program_sampler(path, {"kit": params["kit"]}, params["top_p"])
-        programs, drawn = model.sample(params["samples"], task.rng("points"), params["temperature"])
+        programs, started = model.sample(params["samples"], task.rng("points"), params["temperature"])
     except (CheckpointError, ValueError) as error:
         raise Rejected(f"{path}: {error}") from error
-    if drawn > len(programs):
-        task.reject(params["folder"], "given up while it was written", count=drawn - len(programs))
+    if started > len(programs):
+        task.reject(params["folder"], "given up while it was sampled", count=started - len(programs))
     with task.output(f"{task.shard.name}.jsonl") as stream:
         for number, program in enumerate(programs, params["first"]):
             name = f"{params['folder']}/{number:06d}"
             stream.write(json_bytes({"kit": params["kind"], "name": name, "text": print_program(program)}))
-    return Outcome(0, {"programs": len(programs), "drawn": drawn})
+    return Outcome(0, {"programs": len(programs), "started": started})
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """How many programs each model has begun for those that it wrote."""
+    """Report how many programs each model started for those that it completed."""
     lines = []
     for source in plan.config.section(ShapeAssemblyConfig).sampled:
-        found = [
+        summaries = [
             plan.summary("program_sampling", shard.name)
             for shard in STAGE.plan(plan)
             if shard.params["kind"] == source.name
         ]
-        done = [each for each in found if each is not None]
+        done = [summary for summary in summaries if summary is not None]
         if done:
-            written, drawn = (sum(each[name] for each in done) for name in ("programs", "drawn"))
-            lines.append(f"{source.folder}: {written:,} programs of {drawn:,} begun")
+            programs, started = (sum(summary[name] for summary in done) for name in ("programs", "started"))
+            lines.append(f"{source.folder}: {programs:,} programs of {started:,} started")
     return lines
 
 
 def estimate_bytes(plan: Plan) -> int:
-    """Of all programs."""
-    return BYTES_A_PROGRAM * sum(each.samples for each in plan.config.section(ShapeAssemblyConfig).sampled)
+    """Return the bytes of all programs."""
+    return BYTES_PER_PROGRAM * sum(source.samples for source in plan.config.section(ShapeAssemblyConfig).sampled)
 
 
 def trial(config: Config) -> ProgramSamplingConfig:
-    """The few programs that stage `shapeassembly` asks for in its own."""
+    """Return the same config: the trial of stage `shapeassembly` has few programs."""
     return config.section(ProgramSamplingConfig)
 
 

@@ -1,1 +1,1 @@
-"""Samples that a trained model dreamt: strings drawn from it, put together as shapes, and kept where they are valid."""
+"""Generates shapes by sampling strings from trained models and instantiating them."""

@@ -1,4 +1,4 @@
-"""The collection: which dreamt shapes become samples, and in which split and shard they stand."""
+"""The collection: generated shapes become samples, each in a split and a shard."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from stages.string_sampling.settings import StringSamplingConfig
 
 
 def assignment_shard(plan: Plan, models: Sequence[ModelRounds]) -> Shard:
-    """The shard that shares out what all models have found, once they have ended."""
+    """Return the shard that assigns the shapes of all models to splits, once they have ended."""
     sources = plan.config.section(StringSamplingConfig).sources
-    pools = [[shard.name for shard in each.shards if shard.params["job"] == "pool"] for each in models]
+    pools = [[shard.name for shard in model.shards if shard.params["job"] == "pool"] for model in models]
     params = {
         "job": "assignment",
         "models": [
@@ -29,13 +29,12 @@ def assignment_shard(plan: Plan, models: Sequence[ModelRounds]) -> Shard:
         ],
         "splits": plan.config.section(StringSamplingConfig).splits.model_dump(mode="json"),
     }
-    return Shard(
-        f"{plan.config.name}-assignment", params, tuple(f"string_sampling/{each}" for own in pools for each in own)
-    )
+    inputs = tuple(f"string_sampling/{pool}" for own in pools for pool in own)
+    return Shard(f"{plan.config.name}-assignment", params, inputs)
 
 
 def planned_collection(plan: Plan, assignment: Shard) -> list[Shard]:
-    """The shards of the collection, `<dataset>-<split>-<index>`; none until the assignment is made."""
+    """Return the shards of the collection, `<dataset>-<split>-<index>`; none before the assignment."""
     summary = plan.summary("string_sampling", assignment.name)
     if summary is None:
         return []
@@ -43,37 +42,34 @@ def planned_collection(plan: Plan, assignment: Shard) -> list[Shard]:
         Shard(
             f"{plan.config.name}-{split}-{number:06d}",
             {"job": "collection", "split": split, "number": number, "samples": size, "assignment": assignment.name},
-            (*(f"string_sampling/{lane}" for lane in lanes), f"string_sampling/{assignment.name}"),
+            (*(f"string_sampling/{worker}" for worker in workers), f"string_sampling/{assignment.name}"),
         )
         for split in SPLITS
-        for number, (size, lanes) in enumerate(summary["shards"][split])
+        for number, (size, workers) in enumerate(summary["shards"][split])
     ]
 
 
 def run_assignment(task: Task) -> Outcome:
-    """Files of the shard: `.jsonl`, for each sample its lane and key there, its own key, split and shard, in the order
-    of the samples. Two models that have dreamt one graph of a kit have it once.
+    """Write `.jsonl`: for each sample its worker and key there, its own key, split and shard, in order.
 
-    Raises ConfigError where no model has found anything.
+    A graph that two models generated counts once. Raises ConfigError if no model has found a shape.
     """
     params, splits = task.shard.params, SplitConfig.model_validate(task.shard.params["splits"])
     rows: list[dict[str, Any]] = []
     seen: set[tuple[str, str]] = set()
     counts: Counter[str] = Counter()
     for model in params["models"]:
-        kit, taken = model["kit"], 0
+        kit, accepted = model["kit"], 0
         for row in (row for pool in model["pools"] for row in read_pool(task, pool)):
             if (kit, row["graph"]) in seen:
                 task.reject(row["key"], "duplicate of another model's")
-            elif taken < model["samples"]:
+            elif accepted < model["samples"]:
                 seen.add((kit, row["graph"]))
-                rows.append({"lane": row["lane"], "found": row["key"], "key": f"{kit}-{counts[kit]:06d}"})
+                rows.append({"worker": row["worker"], "found": row["key"], "key": f"{kit}-{counts[kit]:06d}"})
                 counts[kit] += 1
-                taken += 1
+                accepted += 1
     if not rows:
-        raise ConfigError(
-            "no model of string_sampling.sources has dreamt a shape; the rejects say what became of its strings"
-        )
+        raise ConfigError("no model of string_sampling.sources has generated a shape; the rejects give the reasons")
     split_of = assign_splits([[row] for row in range(len(rows))], splits, task.rng("splits"))
     rows_of = assign_shards(split_of, splits, task.rng("order"))
     placed = [
@@ -83,7 +79,7 @@ def run_assignment(task: Task) -> Outcome:
         for row in members.tolist()
     ]
     shards = {
-        split: [(len(members), sorted({rows[row]["lane"] for row in members.tolist()})) for members in of_shards]
+        split: [(len(members), sorted({rows[row]["worker"] for row in members.tolist()})) for members in of_shards]
         for split, of_shards in rows_of.items()
     }
     with task.output(f"{task.shard.name}.jsonl") as stream:
@@ -100,17 +96,17 @@ def run_collection(task: Task) -> Outcome:
         for row in map(json.loads, assignment)
         if (row["split"], row["shard"]) == (params["split"], params["number"])
     ]
-    wanted = {(row["lane"], row["found"]) for row in mine}
-    found = {
-        (lane, sample.key): sample
-        for lane in sorted({lane for lane, _ in wanted})
-        for sample in read_samples(task.input("string_sampling", f"{lane}.tar"))
-        if (lane, sample.key) in wanted
+    wanted = {(row["worker"], row["found"]) for row in mine}
+    samples = {
+        (worker, sample.key): sample
+        for worker in sorted({worker for worker, _ in wanted})
+        for sample in read_samples(task.input("string_sampling", f"{worker}.tar"))
+        if (worker, sample.key) in wanted
     }
     counts: Counter[str] = Counter()
     with task.output(f"{name}.tar") as stream, ShardWriter(stream) as writer:
         for row in mine:
-            sample = replace(found[row["lane"], row["found"]], key=row["key"], split=params["split"])
+            sample = replace(samples[row["worker"], row["found"]], key=row["key"], split=params["split"])
             write_sample(writer, sample)
-            counts[str(sample.lineage["known"])] += 1
-    return Outcome(len(mine), {"split": params["split"], "samples": len(mine), "known": dict(sorted(counts.items()))})
+            counts[str(sample.lineage["novelty"])] += 1
+    return Outcome(len(mine), {"split": params["split"], "samples": len(mine), "novelty": dict(sorted(counts.items()))})

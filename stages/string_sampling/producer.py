@@ -1,4 +1,4 @@
-"""What stage `string_sampling` says of itself as a producer of samples."""
+"""Stage `string_sampling` as a producer of samples."""
 
 from __future__ import annotations
 
@@ -16,30 +16,31 @@ from stages.string_sampling.settings import StringSamplingConfig
 
 
 def _measures(plan: Plan) -> Mapping[str, Any]:
-    """For each model what it drew, what of it became shapes, and why the rest did not."""
+    """Return the draws, shapes and rejects of each model."""
     config = plan.config.section(StringSamplingConfig)
-    found = {}
+    measures = {}
     for number, source in enumerate(config.sources):
         model = model_rounds(plan, number, source)
-        refused: Counter[str] = Counter()
-        for lane in model.lanes:
-            refused.update(plan.rejects("string_sampling", lane))
-        begun = plan.summary("string_sampling", model.shards[0].name) or {"weights": "", "graphs": 0}
-        found[f"{source.dataset}/{source.model}-{source.kit}-{source.seed} {source.way}"] = {
-            "weights": begun["weights"],
-            "learnt": begun["graphs"],
-            "drawn": len(model.pools) * config.lanes * config.draws,
-            "shapes": sum(each["new"] for each in model.pools),
-            "refused": dict(sorted(refused.items())),
+        rejected: Counter[str] = Counter()
+        for worker in model.workers:
+            rejected.update(plan.rejects("string_sampling", worker))
+        brought = plan.summary("string_sampling", model.shards[0].name) or {"weights": "", "graphs": 0}
+        measures[f"{source.dataset}/{source.model}-{source.kit}-{source.seed} {source.sampling}"] = {
+            "weights": brought["weights"],
+            "training_graphs": brought["graphs"],
+            "drawn": len(model.pools) * config.parallel_searches * config.draws,
+            "shapes": sum(pool["new"] for pool in model.pools),
+            "rejected": dict(sorted(rejected.items())),
         }
-    return found
+    return measures
 
 
 def _card(plan: Plan) -> Sequence[str]:
-    rows = ["| model | weights | graphs it learnt from | draws | new shapes |", "|---|---|---:|---:|---:|"]
+    rows = ["| model | weights | training graphs | draws | new shapes |", "|---|---|---:|---:|---:|"]
     rows += [
-        f"| {name} | `{each['weights'][:12]}…` | {each['learnt']:,} | {each['drawn']:,} | {each['shapes']:,} |"
-        for name, each in _measures(plan).items()
+        f"| {name} | `{measured['weights'][:12]}…` | {measured['training_graphs']:,} | {measured['drawn']:,} "
+        f"| {measured['shapes']:,} |"
+        for name, measured in _measures(plan).items()
     ]
     return ["\n".join(rows)]
 
@@ -51,19 +52,19 @@ def _lineage(_: Config) -> Mapping[str, RecordField]:
             {**text, "description": "dataset that the model was trained on, and the model's folder there"}
         ),
         "weights": RecordField({"type": "string", "pattern": "^[0-9a-f]{64}$", "description": "sha256 of its weights"}),
-        "way": RecordField({**text, "description": "how the point of the latent space was found"}),
-        "string": RecordField({**text, "description": "what the model wrote there"}),
-        "tries": RecordField(
+        "sampling": RecordField({**text, "description": "how the latent point was chosen"}),
+        "string": RecordField({**text, "description": "string decoded there"}),
+        "placements": RecordField(
             {
                 "type": "integer",
                 "minimum": 1,
-                "description": "parts that were put down until the string was a shape; at least the number of parts",
+                "description": "parts placed until the string was a shape; at least the number of parts",
             }
         ),
-        "known": RecordField(
+        "novelty": RecordField(
             {
                 "enum": ["new", "train", "exemplar"],
-                "description": "whether the model has learnt from a shape of this graph, or an exemplar has it",
+                "description": "new, or a graph of a training shape or an exemplar",
             }
         ),
     }
@@ -73,17 +74,16 @@ PRODUCER = Producer(
     language="kit",
     keys="string_sampling.sources",
     asked=lambda config: bool(config.section(StringSamplingConfig).sources),
-    sentence="models that have learnt the strings of other shapes write new ones; each is put together part by part at "
-    "the dockings of its kit, and kept where the contacts, found anew from the meshes, the neighbourhoods and the "
-    "dockings are as the exemplars show them.",
-    splits="No two samples have the same shape graph. Near relatives may stand in different splits.",
+    sentence="models trained on the strings of other shapes generate new strings. Each is instantiated part by part "
+    "with the dockings of its kit, and kept if its contacts, computed from the meshes, its neighbourhoods and "
+    "its dockings are those of the exemplars.",
+    splits="No two samples have the same shape graph. Similar shapes may be in different splits.",
     graphs_share_split=True,
     lineage=_lineage,
     origins=lambda plan: exemplar_origins(plan.config),
     limits=(
-        "All parts are those of the exemplars, and they meet only as parts meet there.",
-        "A model writes what is like what it has learnt from: that of another dataset of the same kits, whose splits "
-        "are not those of this one.",
+        "All parts are those of the exemplars, and they dock as parts do there.",
+        "A model generates shapes like its training shapes, which are of another dataset with other splits.",
     ),
     card=_card,
     measures=_measures,

@@ -1,4 +1,4 @@
-"""The rounds of a model: lanes that draw beside each other, and a pool that has each graph once."""
+"""The rounds of a model: parallel search workers, and a pool that has each graph once."""
 
 from __future__ import annotations
 
@@ -16,71 +16,76 @@ from stages.string_sampling.source import source_shard
 
 @dataclass(frozen=True)
 class ModelRounds:
-    """The rounds of one model as far as they are known. pools: summaries of the finished ones; ended: why there is no
-    other round, empty where there is one."""
+    """The rounds of one model, as far as they are known."""
 
     shards: tuple[Shard, ...]
-    lanes: tuple[str, ...]
+    workers: tuple[str, ...]
+    """Shards of the search workers."""
     pools: tuple[Mapping[str, Any], ...]
+    """Summaries of the finished pools."""
     ended: str
+    """Why there is no further round; empty if there is one."""
 
 
 def model_rounds(plan: Plan, number: int, source: SourceConfig) -> ModelRounds:
-    """The rounds of a model: another one until there are as many shapes as wanted, or `patience` of them in a row were
-    in vain, or there were `rounds`. Raises ConfigError where the model is not there."""
+    """Plan the rounds of a model, until it has enough shapes, `patience` rounds without a new one, or `max_rounds`.
+
+    Raises ConfigError if the model is missing.
+    """
     config = plan.config.section(StringSamplingConfig)
-    begun = source_shard(plan, number, source)
-    shards = [begun]
-    lanes: list[str] = []
+    brought = source_shard(plan, number, source)
+    shards = [brought]
+    workers: list[str] = []
     pools: list[Mapping[str, Any]] = []
-    how = config.model_dump(mode="json", include={"known", "tries", "upright", "require", "draws"})
-    how["sources"] = [{**source.model_dump(mode="json"), "samples": 1}]  # how many are wanted is no lane's business
+    settings = config.model_dump(mode="json", include={"duplicates", "max_placements", "upright", "require", "draws"})
+    settings["sources"] = [{**source.model_dump(mode="json"), "samples": 1}]  # workers do not depend on their number
     kit = f"exemplars/{source.kit}"
-    for place in range(config.rounds):
-        before = [f"s{number:02}-r{each:03}-pool" for each in range(place)]
-        names = [f"s{number:02}-r{place:03}-lane{lane:02}" for lane in range(config.lanes)]
-        params = {"job": "lane", "settings": how, "from": begun.name, "before": before}
-        inputs = (kit, f"string_sampling/{begun.name}", *(f"string_sampling/{each}" for each in before))
+    for index in range(config.max_rounds):
+        before = [f"s{number:02}-r{earlier:03}-pool" for earlier in range(index)]
+        names = [f"s{number:02}-r{index:03}-worker{worker:02}" for worker in range(config.parallel_searches)]
+        params = {"job": "worker", "settings": settings, "from": brought.name, "before": before}
+        inputs = (kit, f"string_sampling/{brought.name}", *_inputs(before))
         shards += [Shard(name, params, inputs) for name in names]
-        lanes += names
-        last = f"s{number:02}-r{place:03}-pool"
-        pooled = {"job": "pool", "lanes": names, "before": before}
-        shards.append(Shard(last, pooled, tuple(f"string_sampling/{each}" for each in (*names, *before))))
+        workers += names
+        last = f"s{number:02}-r{index:03}-pool"
+        shards.append(Shard(last, {"job": "pool", "workers": names, "before": before}, _inputs([*names, *before])))
         summary = plan.summary("string_sampling", last)
         if summary is None:
-            return ModelRounds(tuple(shards), tuple(lanes), tuple(pools), "")
+            return ModelRounds(tuple(shards), tuple(workers), tuple(pools), "")
         pools.append(summary)
-        ended = _ended(source.samples, config.patience, pools)
+        ended = _reason_to_end(source.samples, config.patience, pools)
         if ended:
-            return ModelRounds(tuple(shards), tuple(lanes), tuple(pools), ended)
-    return ModelRounds(tuple(shards), tuple(lanes), tuple(pools), f"{config.rounds} rounds are over")
+            return ModelRounds(tuple(shards), tuple(workers), tuple(pools), ended)
+    return ModelRounds(tuple(shards), tuple(workers), tuple(pools), f"{config.max_rounds} rounds are over")
 
 
-def _ended(wanted: int, patience: int, pools: Sequence[Mapping[str, Any]]) -> str:
-    if sum(each["new"] for each in pools) >= wanted:
-        return "as many as wanted"
-    if len(pools) >= patience and not any(each["new"] for each in pools[-patience:]):
-        return f"{patience} rounds brought nothing new"
+def _inputs(shards: Sequence[str]) -> tuple[str, ...]:
+    return tuple(f"string_sampling/{shard}" for shard in shards)
+
+
+def _reason_to_end(wanted: int, patience: int, pools: Sequence[Mapping[str, Any]]) -> str:
+    if sum(pool["new"] for pool in pools) >= wanted:
+        return "all shapes found"
+    if len(pools) >= patience and not any(pool["new"] for pool in pools[-patience:]):
+        return f"{patience} rounds without a new shape"
     return ""
 
 
 def run_pool(task: Task) -> Outcome:
-    """Files of the shard: `.graphs.txt`, digests of the graphs that the lanes of a round have found and that no round
-    before had, each once; `.jsonl`, for each its lane, its key there and its graph."""
+    """Write the new graphs of a round, each once.
+
+    `.graphs.txt`: their digests; `.jsonl`: for each its worker, its key there, and its graph.
+    """
     params, name = task.shard.params, task.shard.name
-    seen = {
-        each
-        for pool in params["before"]
-        for each in task.input("string_sampling", f"{pool}.graphs.txt").read_text().split()
-    }
+    seen = {digest for pool in params["before"] for digest in pool_graphs(task, pool)}
     rows: list[dict[str, Any]] = []
-    for lane in params["lanes"]:
-        for sample in read_samples(task.input("string_sampling", f"{lane}.tar")):
+    for worker in params["workers"]:
+        for sample in read_samples(task.input("string_sampling", f"{worker}.tar")):
             if sample.graph in seen:
                 task.reject(sample.key, "duplicate")
                 continue
             seen.add(sample.graph)
-            rows.append({"lane": lane, "key": sample.key, "graph": sample.graph})
+            rows.append({"worker": worker, "key": sample.key, "graph": sample.graph})
     with task.output(f"{name}.graphs.txt") as stream:
         stream.write("".join(f"{row['graph']}\n" for row in rows).encode())
     with task.output(f"{name}.jsonl") as stream:
@@ -89,5 +94,10 @@ def run_pool(task: Task) -> Outcome:
 
 
 def read_pool(task: Task, pool: str) -> list[dict[str, Any]]:
-    """What `run_pool` wrote in `pool`, one of the inputs."""
+    """Read the rows of a pool, one of the inputs."""
     return [json.loads(line) for line in task.input("string_sampling", f"{pool}.jsonl").read_bytes().splitlines()]
+
+
+def pool_graphs(task: Task, pool: str) -> list[str]:
+    """Read the digests of the graphs in a pool, one of the inputs."""
+    return task.input("string_sampling", f"{pool}.graphs.txt").read_text().split()

@@ -1,4 +1,4 @@
-"""A trained model as a source of shapes: found by its name, brought into the mill with what it must not repeat."""
+"""A trained model as a source of shapes, copied into the pipeline's folder with its training graphs."""
 
 from __future__ import annotations
 
@@ -29,23 +29,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ModelSource:
-    """A model with what it has learnt from. strings: those of training that it can read; known: graphs of training,
-    digests of their strings' graphs; edges: which contacts its strings tell of; weights: their sha256."""
+    """A model and its training data."""
 
     model: TrainedStringVae
     strings: list[str]
+    """Training strings that it can encode."""
     known: frozenset[bytes]
+    """Digests of the graphs of training strings."""
     edges: Edges
+    """The contacts in its strings."""
     weights: str
+    """sha256 of its weights."""
 
     @property
     def whole(self) -> bool:
-        """Whether its strings tell of all contacts."""
+        """Whether its strings have all contacts."""
         return self.edges == "all"
 
 
 def source_shard(plan: Plan, number: int, source: SourceConfig) -> Shard:
-    """The shard that brings a model into the mill. Raises ConfigError where it is not there, with what makes it."""
+    """Return the shard that copies a model. Raises ConfigError for a missing one, with the command that makes it."""
     name = f"{source.model}-{source.kit}-{source.seed}"
     files = {
         "weights": f"{source.dataset}-models/{name}/weights.safetensors",
@@ -53,37 +56,37 @@ def source_shard(plan: Plan, number: int, source: SourceConfig) -> Shard:
         "vocabulary": f"{source.dataset}-corpus/vocabulary.json",
     }
     digests = {}
-    for what, file in files.items():
+    for role, file in files.items():
         path = plan.published(file)
         if not path.is_file():
-            mend = f"make train with its config and MODEL={source.model}" if what == "weights" else "make strings there"
+            mend = f"make train with its config and MODEL={source.model}" if role == "weights" else "make strings there"
             raise ConfigError(
                 f"{plan.config.path}: string_sampling.sources.{number}: there is no {path}: dataset"
                 f" {source.dataset} has no "
-                f"{what} of {name if what == 'weights' else source.kit}; {mend} first"
+                f"{role} of {name if role == 'weights' else source.kit}; {mend} first"
             )
-        digests[what] = file_digest(path)
+        digests[role] = file_digest(path)
     params = {"job": "source", "kit": source.kit, "files": files, "digests": digests}
     return Shard(f"s{number:02}-source", params, (f"exemplars/{source.kit}",))
 
 
 def run_source(task: Task) -> Outcome:
-    """Files of the shard: `.weights.safetensors`; `.strings.txt`, the training strings that the model can read;
-    `.json`, which contacts these tell of; and `.known.npy`, uint8 (k, 32), digests of their graphs, each once,
-    ascending.
+    """Copy a model and its training data.
 
-    Raises Rejected for weights that are not of this kit, or not to be read.
+    `.weights.safetensors`; `.strings.txt`: training strings that the model can encode; `.json`: the contacts in them;
+    `.known.npy`: uint8 (k, 32), distinct digests of their graphs, ascending. Raises Rejected for unreadable weights,
+    and for those of another kit.
     """
     from stages.training.checkpoint import CheckpointError
     from stages.training.string_vae.trained import load_string_vae
 
     params, name = task.shard.params, task.shard.name
     contents: dict[str, bytes] = {}
-    for what, file in params["files"].items():
+    for role, file in params["files"].items():
         path = task.published(file)
-        if file_digest(path) != params["digests"][what]:
+        if file_digest(path) != params["digests"][role]:
             raise ShardFailed(f"{path} has changed since the run began")
-        contents[what] = path.read_bytes()
+        contents[role] = path.read_bytes()
     with task.output(f"{name}.weights.safetensors") as stream:
         stream.write(contents["weights"])
     kit = input_kit(task, params["kit"])
@@ -93,14 +96,14 @@ def run_source(task: Task) -> Outcome:
         raise Rejected(str(error)) from error
     _check_grammar(kit, model.header["patterns"])
     alphabet = make_alphabet(kit.labels)
-    strings = [each for each in contents["corpus"].decode().splitlines() if model.is_valid(each)]
+    strings = [line for line in contents["corpus"].decode().splitlines() if model.is_valid(line)]
     known: set[bytes] = set()
-    for done, each in enumerate(strings):
-        decoded = decode(each, alphabet)
+    for done, string in enumerate(strings):
+        decoded = decode(string, alphabet)
         known.add(bytes.fromhex(graph_digest(decoded.types, decoded.edges)))
         task.progress(done + 1, len(strings))
     with task.output(f"{name}.strings.txt") as stream:
-        stream.write("".join(f"{each}\n" for each in strings).encode())
+        stream.write("".join(f"{string}\n" for string in strings).encode())
     with task.output(f"{name}.known.npy") as stream:
         stream.write(array_bytes(np.frombuffer(b"".join(sorted(known)), dtype=np.uint8).reshape(-1, 32)))
     edges = json.loads(contents["vocabulary"])[kit.name]["edges"]
@@ -110,14 +113,14 @@ def run_source(task: Task) -> Outcome:
 
 
 def read_source(task: Task, shard: str, kit: Kit) -> ModelSource:
-    """What `run_source` wrote in `shard`, one of the inputs."""
+    """Read the result of `run_source`, one of the inputs."""
     from stages.training.string_vae.trained import load_string_vae
 
     path: Path = task.input("string_sampling", f"{shard}.weights.safetensors")
     model = load_string_vae(path, _expected(kit))
     strings = task.input("string_sampling", f"{shard}.strings.txt").read_text().splitlines()
     known = np.load(task.input("string_sampling", f"{shard}.known.npy"), allow_pickle=False)
-    digests = frozenset(bytes(each) for each in known)
+    digests = frozenset(bytes(digest) for digest in known)
     edges = json.loads(task.input("string_sampling", f"{shard}.json").read_bytes())["edges"]
     return ModelSource(model, strings, digests, edges, file_digest(path))
 
@@ -127,7 +130,9 @@ def _expected(kit: Kit) -> dict[str, Any]:
 
 
 def _check_grammar(kit: Kit, patterns: Mapping[str, Any]) -> None:
-    """Raises Rejected for a model whose strings follow another grammar than that of the kit."""
+    """Raise Rejected for a model trained on another grammar than that of the kit."""
     own = patterns_json(compile_grammar(kit.grammar, len(kit.labels), 0, bool(patterns["partial"])))
     if own != {key: patterns[key] for key in own}:
-        raise Rejected(f"the model has learnt another grammar than kit {kit.name} has here: give it the same exemplars")
+        raise Rejected(
+            f"the model was trained on another grammar than that of kit {kit.name}: give the kit the same exemplars"
+        )

@@ -1,7 +1,7 @@
-"""Stage `string_sampling`: shapes that they dreamt out, as the shards `<dataset>-<split>-<index>.tar`.
+"""Stage `string_sampling`: from trained string models to generated shapes, `<dataset>-<split>-<index>.tar`.
 
-Its shards are the models brought in, the lanes and pools of each model's rounds, the assignment of shapes to splits,
-and the collection.
+Its shards are the models, the search workers and pools of each model's rounds, the assignment of shapes to splits, and
+the collection.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from stages.string_sampling.source import run_source
 from stages.string_sampling.worker import run_worker
 from stages.variations.settings import VariationsConfig
 
-BYTES_A_SAMPLE = 40_000
-BYTES_A_MODEL = 8_000_000
+BYTES_PER_SAMPLE = 40_000
+BYTES_PER_MODEL = 8_000_000
 
 _JOBS = {
     "source": run_source,
-    "lane": run_worker,
+    "worker": run_worker,
     "pool": run_pool,
     "assignment": run_assignment,
     "collection": run_collection,
@@ -33,44 +33,44 @@ _JOBS = {
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """The rounds of every model as far as they are known, then the assignment and the collection."""
+    """Plan the rounds of every model as far as they are known, then the assignment and the collection."""
     sources = plan.config.section(StringSamplingConfig).sources
     models = [model_rounds(plan, number, source) for number, source in enumerate(sources)]
-    shards = [shard for each in models for shard in each.shards]
-    if not models or not all(each.ended for each in models):
+    shards = [shard for model in models for shard in model.shards]
+    if not models or not all(model.ended for model in models):
         return shards
     assignment = assignment_shard(plan, models)
     return [*shards, assignment, *planned_collection(plan, assignment)]
 
 
 def run_shard(task: Task) -> Outcome:
-    """One shard of the plan."""
+    """Make one shard of the plan."""
     return _JOBS[task.shard.params["job"]](task)
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """How far each model is, and what became of what it drew."""
+    """Report the progress of each model, and the reasons of rejected draws."""
     config = plan.config.section(StringSamplingConfig)
     lines = []
     for number, source in enumerate(config.sources):
         model = model_rounds(plan, number, source)
         if model.pools:
-            refused: Counter[str] = Counter()
-            for lane in model.lanes:
-                refused.update(plan.rejects("string_sampling", lane))
-            found = sum(each["new"] for each in model.pools)
-            drawn = len(model.pools) * config.lanes * config.draws
-            why = ", ".join(f"{count:,} {reason}" for reason, count in refused.most_common())
+            rejected: Counter[str] = Counter()
+            for worker in model.workers:
+                rejected.update(plan.rejects("string_sampling", worker))
+            found = sum(pool["new"] for pool in model.pools)
+            drawn = len(model.pools) * config.parallel_searches * config.draws
+            why = ", ".join(f"{count:,} {reason}" for reason, count in rejected.most_common())
             ended = f"; {model.ended}" if model.ended else ""
             lines.append(
                 f"{source.dataset}/{source.model}-{source.kit}-{source.seed}: {found:,} shapes for {source.samples:,} "
-                f"of {drawn:,} draws{ended}; refused: {why or 'none'}"
+                f"of {drawn:,} draws{ended}; rejected: {why or 'none'}"
             )
     return lines
 
 
 def check(config: Config) -> None:
-    """Raises ConfigError for models of kits that the config has not, and for variations beside them."""
+    """Raise ConfigError for models of unknown kits, and for variations in the same dataset."""
     sources = config.section(StringSamplingConfig).sources
     kits = [kit.name for kit in config.section(ExemplarsConfig).kits]
     for number, source in enumerate(sources):
@@ -82,30 +82,30 @@ def check(config: Config) -> None:
     if sources and config.section(VariationsConfig).samples_per_kit:
         raise ConfigError(
             f"{config.path}: string_sampling.sources asks for"
-            f" dreamt shapes, and variations.samples_per_kit for variations of the "
+            f" generated shapes, and variations.samples_per_kit for variations of the "
             "same kits: a dataset is made in one way; set variations.samples_per_kit: 0"
         )
 
 
 def asked(config: Config) -> Sequence[int]:
-    """The shapes of each shard, if every model finds as many as are wanted."""
+    """Return the shapes of each shard, if every model finds enough."""
     section = config.section(StringSamplingConfig)
     return section.splits.shard_sizes(sum(source.samples for source in section.sources))
 
 
 def trial(config: Config) -> StringSamplingConfig:
-    """A few shapes of each model."""
+    """Return a config with a few shapes of each model."""
     section = config.section(StringSamplingConfig)
     few = max(32 // max(len(section.sources), 1), 4)
     sources = tuple(source.model_copy(update={"samples": few}) for source in section.sources)
-    update = {"sources": sources, "splits": section.splits.for_trial(), "lanes": 1, "draws": 2 * few}
+    update = {"sources": sources, "splits": section.splits.for_trial(), "parallel_searches": 1, "draws": 2 * few}
     return section.model_copy(update=update)
 
 
 def estimate_bytes(plan: Plan) -> int:
-    """All models, and each shape in its lane and in the collection."""
+    """Return the bytes of all models, and of each shape by its worker and in the collection."""
     sources = plan.config.section(StringSamplingConfig).sources
-    return len(sources) * BYTES_A_MODEL + 2 * BYTES_A_SAMPLE * sum(source.samples for source in sources)
+    return len(sources) * BYTES_PER_MODEL + 2 * BYTES_PER_SAMPLE * sum(source.samples for source in sources)
 
 
 STAGE = Stage(

@@ -13,27 +13,27 @@ LETTERS = string.ascii_uppercase + string.ascii_lowercase
 
 @dataclass(frozen=True)
 class Alphabet:
-    """tokens: the text that stands for each type in strings, by type index; names: the types' names."""
+    """The tokens of a kit's types, by type index."""
 
     tokens: tuple[str, ...]
     names: tuple[str, ...]
+    """Of the types."""
 
     @cached_property
     def types(self) -> dict[str, int]:
-        """Type index of each token."""
+        """The type index of each token."""
         return {token: index for index, token in enumerate(self.tokens)}
 
     def vocabulary(self) -> dict[str, str]:
-        """Name of the type that each token stands for."""
+        """Return the type name of each token."""
         return dict(zip(self.tokens, self.names, strict=True))
 
 
 def make_alphabet(names: Sequence[str]) -> Alphabet:
-    """The alphabet of a kit whose types have `names`, in order.
+    """Make the alphabet of a kit whose types have `names`, in order.
 
-    The first 26 types are the letters A to Z, the next a to z. A kit with more than these writes every type as its
-    name in brackets, `[tower_wall]`, with `_` for each character but letters, digits, `_`, `-` and `.`, and with a
-    number behind names that would be equal.
+    The tokens are A to Z, then a to z. With more types, every token is its name in brackets, `[tower_wall]`, with `_`
+    for characters other than letters, digits, `_`, `-` and `.`, and a number after names that would be equal.
     """
     if len(names) <= len(LETTERS):
         return Alphabet(tuple(LETTERS[: len(names)]), tuple(names))

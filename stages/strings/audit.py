@@ -1,4 +1,4 @@
-"""Do the strings of a sample stand for its shape graph, or for the part of it that they are to tell of?"""
+"""Checks that the strings of a sample encode its shape graph, or the part of it that they should contain."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from stages.strings.tokens import StringError
 
 
 def string_faults(sample: PackagedSample) -> Iterator[str]:
-    """A sentence for a shape graph that is not the record's, and for strings that stand for another graph."""
+    """Yield a sentence for a shape graph other than the record's, and for strings of another graph."""
     if not languages()[sample.record["language"]].graphs:
         return
     types = sample.shape.part_labels
@@ -39,21 +39,21 @@ def string_faults(sample: PackagedSample) -> Iterator[str]:
         except StringError as error:
             yield f"line {number + 1} of its txt is no string: {error}"
             return
-    for number, each in enumerate(decoded):
-        if not _may_stand_for(each, types, sample.contacts, edges):
-            yield f"line {number + 1} of its txt stands for another graph"
+    for number, graph in enumerate(decoded):
+        if not _can_encode(graph, types, sample.contacts, edges):
+            yield f"line {number + 1} of its txt encodes another graph"
             return
     first = decoded[0]
     if edges == "all" and graph_digest(first.types, first.edges) != sample.record["graph"]:
-        yield "the first line of its txt stands for another graph"
-    if edges == "faces" and len({graph_digest(each.types, each.edges) for each in decoded}) > 1:
-        yield "the lines of its txt stand for different graphs"
+        yield "the first line of its txt encodes another graph"
+    if edges == "faces" and len({graph_digest(graph.types, graph.edges) for graph in decoded}) > 1:
+        yield "the lines of its txt encode different graphs"
     if edges == "tree" and lines[0] != canonical_string(types, sample.contacts, alphabet, cycles=False).string:
         yield "the first line of its txt is not the canonical spanning tree"
 
 
 def _anew(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
-    """Which contacts are faces is asked of the kit again, but of stretched parts it does not know."""
+    """Check face contacts with the kit; it does not know those of stretched parts."""
     if not languages()[sample.record["language"]].graphs or _edges(sample) != "faces" or sample.shape.is_stretched:
         return
     path = places.stage("exemplars").root / f"{sample.record['kit']}.json"
@@ -61,40 +61,42 @@ def _anew(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
     graph = kit.graph(sample.shape.assembly)
     first = decode(sample.members["txt"].decode().split("\n", 1)[0], kit.alphabet)
     if graph_digest(first.types, first.edges) != graph_digest(graph.types, graph.edges):
-        yield "its txt does not tell of its face contacts"
+        yield "its txt does not contain its face contacts"
 
 
 def _edges(sample: PackagedSample) -> Edges:
-    """What the strings of the dataset tell of."""
+    """Return which contacts the strings of the dataset contain."""
     return StringsConfig.model_validate(sample.sections.get("strings", {})).edges
 
 
-def _may_stand_for(decoded: Decoded, types: TypeArray, contacts: IntArray, edges: Edges) -> bool:
-    """Whether a decoded string has the nodes of the graph, as many edges as it should, and around no node what stands
-    around none of its type: of a graph without some edges no more is told without a search."""
+def _can_encode(decoded: Decoded, types: TypeArray, contacts: IntArray, edges: Edges) -> bool:
+    """Return whether a decoded string can encode a graph: equal nodes, the right number of edges, possible neighbours.
+
+    Without some of the edges, more would need a search.
+    """
     if sorted(decoded.types.tolist()) != sorted(types.tolist()):
         return False
     if edges != "all" and not all(
-        any(around <= whole for whole in _around(types, contacts)[kind])
-        for kind, arounds in _around(decoded.types, decoded.edges).items()
-        for around in arounds
+        any(neighbours <= full for full in _neighbourhoods(types, contacts)[kind])
+        for kind, of_kind in _neighbourhoods(decoded.types, decoded.edges).items()
+        for neighbours in of_kind
     ):
         return False
     wanted = {"all": len(contacts), "faces": len(decoded.edges), "tree": len(types) - 1}[edges]
     return len(decoded.edges) == wanted <= len(contacts)
 
 
-def _around(types: TypeArray, edges: Sequence[Sequence[int]] | IntArray) -> dict[int, list[Counter[int]]]:
-    """By type, what stands around the nodes of that type: each different multiset once."""
+def _neighbourhoods(types: TypeArray, edges: Sequence[Sequence[int]] | IntArray) -> dict[int, list[Counter[int]]]:
+    """Return the distinct neighbourhoods of the nodes of each type."""
     kinds = types.tolist()
     neighbours: list[list[int]] = [[] for _ in kinds]
     for i, j in np.asarray(edges).tolist():
         neighbours[i].append(kinds[j])
         neighbours[j].append(kinds[i])
-    found: dict[int, dict[tuple[int, ...], Counter[int]]] = {}
-    for kind, each in zip(kinds, neighbours, strict=True):
-        found.setdefault(kind, {})[tuple(sorted(each))] = Counter(each)
-    return {kind: list(each.values()) for kind, each in found.items()}
+    distinct: dict[int, dict[tuple[int, ...], Counter[int]]] = {}
+    for kind, of_node in zip(kinds, neighbours, strict=True):
+        distinct.setdefault(kind, {})[tuple(sorted(of_node))] = Counter(of_node)
+    return {kind: list(multisets.values()) for kind, multisets in distinct.items()}
 
 
 AUDIT = Audit(faults=string_faults, recheck=_anew)

@@ -1,13 +1,12 @@
-"""A shape as a string and the category of each of its edges, and back, exactly (strings §6, §7).
+"""Exact compression of a shape to a string and the category of each of its edges (strings §6, §7).
 
-Walking a string, each part after the first stands at one of the poses in which parts of its label were seen to dock to
-its parent: that pose is the edge's category. A category is chosen beside the parent as it has been put back, so that
-errors do not add up, and a part that none places within the kit's tolerance brings a pose of its own: whatever the
-shape, each part is put back where it stood. Geometry is borrowed from the kit. The paper's categories are clusters over
-many variations; ours are the kit's dockings with all their images under the symmetries of parts, which are exact.
+Along a string, each part after the first is at a pose in which parts of its label dock to its parent: the edge's
+category. Categories are chosen relative to the decoded parent, so that errors do not add up. A part that no category
+places within the kit's tolerance has a pose of its own, so every part is restored. Geometry comes from the kit. The
+paper's categories are clusters over many variations; ours are the kit's dockings and their images under symmetries.
 
-Brackets and cycle numbers have the dummy category: the tree says where all parts stand. Of strings that leave out
-contacts these are found again, as the pairs of parts that stand in a docking of the kit.
+Brackets and cycle numbers have no category: the tree determines all poses. Contacts that strings leave out are found as
+the pairs of parts in a docking of the kit.
 """
 
 from __future__ import annotations
@@ -27,23 +26,24 @@ from stages.strings.settings import Edges
 from stages.strings.tokens import number_text, number_value, split_tokens
 
 NO_CATEGORY = -1
-"""The category of what is no part."""
+"""Of brackets and cycle numbers."""
 MAX_TOKENS = 1_000_000
-"""No shape has more: bytes that say so are not of one."""
+"""Bytes with more tokens are refused."""
 
 
 @dataclass(frozen=True)
 class ShapeCode:
-    """One shape. categories: one for each token of the string; poses: float32 (s, 6), rotation vector and translation
-    of the first part and of those that no category places, in order."""
+    """The code of one shape."""
 
     string: str
     categories: tuple[int, ...]
+    """Of each token."""
     poses: Float32Array
+    """Rotation vector and translation of the first part and of parts without a category, in order, float32 (s, 6)."""
 
 
 class Codebook:
-    """What both sides of the way know: a kit, and which contacts its strings tell of."""
+    """The shared knowledge of encoder and decoder: a kit, and which contacts its strings contain."""
 
     def __init__(self, kit: Kit, edges: Edges) -> None:
         self.kit, self.edges = kit, edges
@@ -53,27 +53,29 @@ class Codebook:
             np.flatnonzero(kit.label_of == label).tolist() for label in range(len(kit.labels))
         ]
         """The types of each label."""
-        self._places: dict[tuple[int, int], tuple[TypeArray, FloatArray]] = {}
+        self._dockings: dict[tuple[int, int], tuple[TypeArray, FloatArray]] = {}
 
-    def places(self, parent: int, label: int) -> tuple[TypeArray, FloatArray]:
-        """How parts of a label dock to a part of type `parent`: their types int16 (k,) and poses (k, 4, 4). A category
-        below k is one of these; from k on it is a type of the label, at a pose of its own."""
-        if (parent, label) not in self._places:
+    def dockings(self, parent: int, label: int) -> tuple[TypeArray, FloatArray]:
+        """Return types int16 (k,) and poses (k, 4, 4) of parts of a label docked to a part of type `parent`.
+
+        A category below k is one of these; from k on it is a type of the label with a pose of its own.
+        """
+        if (parent, label) not in self._dockings:
             poses = [self.writer.table.poses(parent, kind) for kind in self.kinds[label]]
-            types = np.repeat(np.array(self.kinds[label], dtype=np.int16), [len(each) for each in poses])
-            self._places[parent, label] = types, np.concatenate(poses)
-        return self._places[parent, label]
+            types = np.repeat(np.array(self.kinds[label], dtype=np.int16), [len(of_type) for of_type in poses])
+            self._dockings[parent, label] = types, np.concatenate(poses)
+        return self._dockings[parent, label]
 
     def radix(self, parent: int | None, label: int) -> int:
-        """How many categories a part of a label may have beside a part of type `parent`, or as the first."""
-        return len(self.kinds[label]) + (0 if parent is None else len(self.places(parent, label)[0]))
+        """Return the number of categories of a part of a label with a parent of some type, or as the first part."""
+        return len(self.kinds[label]) + (0 if parent is None else len(self.dockings(parent, label)[0]))
 
 
 def encode_shape(book: Codebook, assembly: Assembly, encoded: Encoded) -> ShapeCode:
-    """The description of an assembly along one of its strings. Raises ValueError for a part that is mirrored."""
+    """Encode an assembly along one of its strings. Raises ValueError for a mirrored part."""
     decoded = decode(encoded.string, book.alphabet)
     types, poses = assembly.types[encoded.nodes], assembly.poses[encoded.nodes]
-    back = np.empty_like(poses)
+    decoded_poses = np.empty_like(poses)
     categories: list[int] = []
     stored: list[Float32Array] = []
     for token in decoded.tokens:
@@ -84,64 +86,60 @@ def encode_shape(book: Codebook, assembly: Assembly, encoded: Encoded) -> ShapeC
         label = int(decoded.types[node])
         category, first = None, 0
         if token.edge >= 0:
-            parent = int(decoded.edges[token.edge][0])  # a parent stands before its child
-            kinds, places = book.places(int(types[parent]), label)
+            parent = int(decoded.edges[token.edge][0])  # a parent precedes its child
+            kinds, docked = book.dockings(int(types[parent]), label)
             first = len(kinds)
-            category = _nearest(book.kit, kinds, places, kind, invert(back[parent]) @ poses[node])
+            category = _nearest(book.kit, kinds, docked, kind, invert(decoded_poses[parent]) @ poses[node])
         if category is None:
             stored.append(_stored(poses[node]))
-            back[node] = _pose(stored[-1])
+            decoded_poses[node] = _pose(stored[-1])
             category = first + book.kinds[label].index(kind)
         else:
-            back[node] = back[parent] @ places[category]
+            decoded_poses[node] = decoded_poses[parent] @ docked[category]
         categories.append(category)
     return ShapeCode(encoded.string, tuple(categories), np.array(stored, dtype=np.float32))
 
 
-def decode_shape(book: Codebook, described: ShapeCode) -> Assembly:
-    """The assembly of a description, its parts in the order of the string.
-
-    Raises ValueError (StringError) for what is no description of a shape of the kit.
-    """
-    decoded = decode(described.string, book.alphabet)
-    if len(described.categories) != len(decoded.tokens):
-        raise ValueError(f"{len(decoded.tokens)} tokens have {len(described.categories)} categories")
+def decode_shape(book: Codebook, code: ShapeCode) -> Assembly:
+    """Decode an assembly, its parts in the order of the string. Raises ValueError for a code of no shape of the kit."""
+    decoded = decode(code.string, book.alphabet)
+    if len(code.categories) != len(decoded.tokens):
+        raise ValueError(f"{len(decoded.tokens)} tokens have {len(code.categories)} categories")
     types = np.empty(len(decoded.types), dtype=np.int16)
     poses = np.empty((len(types), 4, 4))
-    stored = iter(described.poses)
-    for token, category in zip(decoded.tokens, described.categories, strict=True):
+    stored = iter(code.poses)
+    for token, category in zip(decoded.tokens, code.categories, strict=True):
         if token.kind != "node":
             continue
         node, label = token.node, int(decoded.types[token.node])
         parent = int(decoded.edges[token.edge][0]) if token.edge >= 0 else None
         if not 0 <= category < book.radix(None if parent is None else int(types[parent]), label):
-            raise ValueError(f"part {node} has category {category}, which is none of the kit")
-        kinds, places = book.places(int(types[parent]), label) if parent is not None else ((), ())
+            raise ValueError(f"part {node} has category {category}, which the kit does not have")
+        kinds, docked = book.dockings(int(types[parent]), label) if parent is not None else ((), ())
         if category < len(kinds):
-            types[node], poses[node] = kinds[category], poses[parent] @ places[category]
+            types[node], poses[node] = kinds[category], poses[parent] @ docked[category]
             continue
         own = next(stored, None)
         if own is None:
             raise ValueError(f"part {node} has no pose")
         types[node], poses[node] = book.kinds[label][category - len(kinds)], _pose(own)
     if next(stored, None) is not None:
-        raise ValueError("there are more poses than parts that have one of their own")
+        raise ValueError("there are more poses than parts without a category")
     placed = Assembly(types, poses, decoded.edges)
     return placed if book.edges == "all" else Assembly(types, poses, _docked(book, placed))
 
 
-def pack(book: Codebook, described: ShapeCode) -> bytes:
-    """A description as few bytes: its tokens and categories as digits of one number, each in the base of what may stand
-    there, then its poses."""
-    texts = split_tokens(described.string)
+def pack(book: Codebook, code: ShapeCode) -> bytes:
+    """Pack a code to bytes: tokens and categories as mixed-radix digits of one number, then the poses."""
+    texts = split_tokens(code.string)
     numbers = 1 + max((number_value(text) or 0 for text in texts if number_value(text) is not None), default=-1)
     labels = len(book.kit.labels)
     bases = labels + 2 + numbers
-    code = {**book.alphabet.types, "(": labels, ")": labels + 1}
+    values = {**book.alphabet.types, "(": labels, ")": labels + 1}
     digits: list[tuple[int, int]] = []
     walk = _Walk(book)
-    for text, category in zip(texts, described.categories, strict=True):
-        value = code[text] if text in code else labels + 2 + _number(text)
+    for text, category in zip(texts, code.categories, strict=True):
+        value = values[text] if text in values else labels + 2 + _number(text)
         digits.append((value, bases))
         radix = walk.step(value)
         if radix is not None:
@@ -152,17 +150,17 @@ def pack(book: Codebook, described: ShapeCode) -> bytes:
         whole = whole * base + digit
     content = whole.to_bytes((whole.bit_length() + 7) // 8, "little")
     header = b"".join(map(_varint, (len(texts), numbers, len(content))))
-    return header + content + described.poses.astype("<f4").tobytes()
+    return header + content + code.poses.astype("<f4").tobytes()
 
 
 def unpack(book: Codebook, content: bytes) -> ShapeCode:
-    """The description that `pack` has written. Raises ValueError for bytes that it has not."""
-    place, header = 0, []
+    """Unpack a code. Raises ValueError for bytes that `pack` does not write."""
+    offset, header = 0, []
     for _ in range(3):
-        value, place = _read_varint(content, place)
+        value, offset = _read_varint(content, offset)
         header.append(value)
     count, numbers, size = header
-    body, rest = content[place : place + size], content[place + size :]
+    body, rest = content[offset : offset + size], content[offset + size :]
     if len(body) < size or len(rest) % 24:
         raise ValueError("the bytes of a shape end early")
     whole, labels = int.from_bytes(body, "little"), len(book.kit.labels)
@@ -187,7 +185,7 @@ def unpack(book: Codebook, content: bytes) -> ShapeCode:
 
 
 class _Walk:
-    """Which part a token hangs on, token by token, for those who know types only as they come."""
+    """Tracks the parent of each token, token by token, since types are known only as they come."""
 
     def __init__(self, book: Codebook) -> None:
         self._book = book
@@ -196,7 +194,7 @@ class _Walk:
         self._label = 0
 
     def step(self, value: int) -> int | None:
-        """Take one token; of a part the number of its categories, which `put` then gives."""
+        """Take one token; return the number of categories of a part, for `put`, or None."""
         labels = len(self._book.kit.labels)
         if value < labels:
             self._label = value
@@ -210,23 +208,23 @@ class _Walk:
         return None
 
     def put(self, category: int) -> None:
-        """The category of the part that was taken: its type is known by it."""
-        kinds = self._book.places(self._here, self._label)[0].tolist() if self._here is not None else []
+        """Set the category, and thereby the type, of the part just taken."""
+        kinds = self._book.dockings(self._here, self._label)[0].tolist() if self._here is not None else []
         self._here = [*kinds, *self._book.kinds[self._label]][category]
 
 
-def _nearest(kit: Kit, kinds: TypeArray, places: FloatArray, kind: int, pose: FloatArray) -> int | None:
-    """The category that puts a part of type `kind` nearest to `pose` (4, 4), if that is within tolerance."""
+def _nearest(kit: Kit, kinds: TypeArray, docked: FloatArray, kind: int, pose: FloatArray) -> int | None:
+    """Return the category that places a part of type `kind` nearest to `pose` (4, 4), if within tolerance."""
     own = np.flatnonzero(kinds == kind)
     if not len(own):
         return None
     length = kit.types[kind].diagonal / 2
-    gaps = np.linalg.norm(pose_vectors(places[own], length) - pose_vectors(pose[None], length), axis=1)
+    gaps = np.linalg.norm(pose_vectors(docked[own], length) - pose_vectors(pose[None], length), axis=1)
     return int(own[gaps.argmin()]) if gaps.min() <= kit.pose_tolerance else None
 
 
 def _docked(book: Codebook, assembly: Assembly) -> IntArray:
-    """The pairs of parts that stand in a docking of the kit, int32 (m, 2)."""
+    """Return the pairs of parts in a docking of the kit, int32 (m, 2)."""
     boxes = world_boxes(book.kit.types, assembly.types, assembly.poses)
     pairs = overlapping_boxes(boxes, book.kit.contact_tolerance + 2 * book.kit.pose_tolerance)
     labels = book.writer.table.label_edges(assembly.types, assembly.poses, pairs)[:, 0]
@@ -235,12 +233,12 @@ def _docked(book: Codebook, assembly: Assembly) -> IntArray:
     ):
         a, b = (int(assembly.types[part]) for part in pairs[row])
         labels[row] = 0 if book.writer.table.fit(a, b, pose) is not None else -1
-    found: IntArray = pairs[labels >= 0]
-    return found
+    docked: IntArray = pairs[labels >= 0]
+    return docked
 
 
 def _stored(pose: FloatArray) -> Float32Array:
-    """A pose (4, 4) as six numbers."""
+    """Return a pose (4, 4) as rotation vector and translation, float32 (6,)."""
     from scipy.spatial.transform import Rotation
 
     if np.linalg.det(pose[:3, :3]) < 0:
@@ -271,7 +269,7 @@ def _number(text: str) -> int:
 
 
 def _varint(value: int) -> bytes:
-    """Seven bits a byte, the low ones first; the top bit says that more follow."""
+    """Encode seven bits a byte, low ones first; the top bit marks that more follow."""
     written = bytearray()
     while value > 127:
         written.append(value & 127 | 128)
@@ -279,13 +277,13 @@ def _varint(value: int) -> bytes:
     return bytes([*written, value])
 
 
-def _read_varint(content: bytes, place: int) -> tuple[int, int]:
-    """The number at `place`, and where it ends."""
+def _read_varint(content: bytes, offset: int) -> tuple[int, int]:
+    """Return the number at an offset, and the offset after it."""
     value = shift = 0
     while True:
-        if place >= len(content) or shift > 28:
+        if offset >= len(content) or shift > 28:
             raise ValueError("the bytes of a shape end early")
-        value |= (content[place] & 127) << shift
-        place, shift = place + 1, shift + 7
-        if content[place - 1] < 128:
-            return value, place
+        value |= (content[offset] & 127) << shift
+        offset, shift = offset + 1, shift + 7
+        if content[offset - 1] < 128:
+            return value, offset

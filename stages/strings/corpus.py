@@ -1,4 +1,4 @@
-"""The text corpus of a dataset: the strings of all shapes, a file for each kit and split, without duplicates."""
+"""The text corpus of a dataset: distinct strings of all shapes, one file for each kit and split."""
 
 from __future__ import annotations
 
@@ -22,22 +22,23 @@ __all__ = ["CORPUS", "compose_corpus"]
 
 
 def compose_corpus(task: Task) -> Outcome:
-    """Files of the shard: `<kit>-<split>.txt`, one string a line; `vocabulary.json`, for each kit the name of the type
-    behind each token, all tokens of its strings, and what a string stands for; `statistics.json`, for each kit and
-    split what its file holds.
+    """Write the corpus.
 
-    Where strings tell of all contacts, only a digest of each shape's graph is kept in memory, and the strings of graphs
-    that several shapes share: equal strings stand for equal graphs, so duplicates are among these. Where they tell of
-    less, shapes of different graphs may share strings, and a digest of every string is kept: one that train has is not
-    written in val, nor what val has in test. Raises ShardFailed where shapes of one graph stand in different splits.
+    `<kit>-<split>.txt`: one string a line; `vocabulary.json`: for each kit its tokens, their type names, and what a
+    string encodes; `statistics.json`: for each kit and split the statistics of its file.
+
+    With all contacts, equal strings encode equal graphs. Memory then holds a digest of each graph, and the strings of
+    graphs that several shapes share. With fewer contacts, shapes of different graphs may share strings, and memory
+    holds a digest of every string: a training string is left out of val, and one of val out of test. Raises ShardFailed
+    for shapes of one graph in different splits.
     """
-    splits = dict(sorted(task.shard.params["splits"].items(), key=lambda each: SPLITS.index(each[1])))
+    splits = dict(sorted(task.shard.params["splits"].items(), key=lambda pair: SPLITS.index(pair[1])))
     edges = task.config.section(StringsConfig).edges
     shared = _shared_graphs(task, splits)
     known: dict[tuple[str, str], set[bytes]] = {}
     statistics: dict[str, dict[str, StringStatistics]] = {}
     files: dict[str, BinaryIO] = {}
-    for place, (shard, split) in enumerate(splits.items()):
+    for done, (shard, split) in enumerate(splits.items(), 1):
         for row, strings in _rows_and_strings(task, shard):
             kit, graph = row["kit"], _graph_key(row)
             name = f"{kit}-{split}.txt"
@@ -48,15 +49,15 @@ def compose_corpus(task: Task) -> Outcome:
             counted.graphs += not shared.get(graph)
             kept = strings
             if graph in shared:
-                kept = [each for each in strings if each not in shared[graph]]
+                kept = [string for string in strings if string not in shared[graph]]
                 shared[graph].update(kept)
             counted.duplicates += len(strings) - len(kept)
             if edges != "all":
-                kept = _new(kept, kit, split, known, counted)
-            for each in kept:
-                counted.add(each)
-            files[name].write("".join(f"{each}\n" for each in kept).encode())
-        task.progress(place + 1, len(splits))
+                kept = _without_known(kept, kit, split, known, counted)
+            for string in kept:
+                counted.add(string)
+            files[name].write("".join(f"{string}\n" for string in kept).encode())
+        task.progress(done, len(splits))
     described = {
         kit: {split: counted.describe() for split, counted in sorted(of_splits.items())}
         for kit, of_splits in sorted(statistics.items())
@@ -67,37 +68,37 @@ def compose_corpus(task: Task) -> Outcome:
     counts = [counted for of_splits in statistics.values() for counted in of_splits.values()]
     summary = {
         "files": sorted(files),
-        "strings": sum(each.strings for each in counts),
-        "duplicates": sum(each.duplicates for each in counts),
-        "elsewhere": sum(each.elsewhere for each in counts),
-        "graphs": sum(each.graphs for each in counts),
+        "strings": sum(counted.strings for counted in counts),
+        "duplicates": sum(counted.duplicates for counted in counts),
+        "in_other_splits": sum(counted.in_other_splits for counted in counts),
+        "graphs": sum(counted.graphs for counted in counts),
         "edges": edges,
         "kits": {kit: summarize(of_splits.values()) for kit, of_splits in sorted(statistics.items())},
     }
     return Outcome(samples=0, summary=summary)
 
 
-def _new(
+def _without_known(
     strings: Sequence[str], kit: str, split: str, known: dict[tuple[str, str], set[bytes]], counted: StringStatistics
 ) -> list[str]:
-    """Those of `strings` that no file of the kit has yet; `known` holds digests of the strings of each file."""
+    """Return the strings that no file of the kit has; `known` holds digests of the strings of each file."""
     own = known.setdefault((kit, split), set())
     others = [digests for (other, where), digests in known.items() if other == kit and where != split]
     kept = []
-    for each in strings:
-        digest = blake2b(each.encode(), digest_size=16).digest()
+    for string in strings:
+        digest = blake2b(string.encode(), digest_size=16).digest()
         if digest in own:
             counted.duplicates += 1
         elif any(digest in digests for digests in others):
-            counted.elsewhere += 1
+            counted.in_other_splits += 1
         else:
             own.add(digest)
-            kept.append(each)
+            kept.append(string)
     return kept
 
 
 def _shared_graphs(task: Task, splits: dict[str, str]) -> dict[bytes, set[str]]:
-    """The graphs of more than one shape, each with room for the strings that are there already."""
+    """Return the graphs of more than one shape, each with an empty set for its strings."""
     first: dict[bytes, tuple[str, str]] = {}
     shared: dict[bytes, set[str]] = {}
     for shard, split in splits.items():
@@ -132,8 +133,7 @@ def _rows_and_strings(task: Task, shard: str) -> Iterator[tuple[dict[str, Any], 
 
 
 def _vocabulary(task: Task, statistics: dict[str, dict[str, StringStatistics]], edges: Edges) -> dict[str, Any]:
-    """For each kit with strings: `types`, type name by token; `tokens`, types first, then parentheses and numbers;
-    `edges`, what strings tell of, and `meaning`, what that is in words."""
+    """Return, by kit: `types`, type name by token; `tokens`, all in order; `edges`, and their `meaning`."""
     described = {}
     for name, kit in sorted(input_kits(task).items()):
         if name in statistics:
@@ -148,10 +148,10 @@ def _vocabulary(task: Task, statistics: dict[str, dict[str, StringStatistics]], 
 def _number(token: str) -> int:
     number = number_value(token)
     if number is None:
-        raise ShardFailed(f"the corpus has a token {token!r} that is no cycle number and no type of its kit")
+        raise ShardFailed(f"the corpus has a token {token!r} that is neither a cycle number nor a type of its kit")
     return number
 
 
 def _readable(value: Any) -> bytes:
-    """JSON, one entry a line."""
+    """Return JSON with one entry a line."""
     return (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()

@@ -1,4 +1,4 @@
-"""Strings to shape graphs. Reads everything that is written like SMILES, not only what the encoder writes."""
+"""From strings to shape graphs; any SMILES-like string is read, not only those of the encoder."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ from stages.strings.tokens import StringError, Token, TokenKind, number_value, s
 
 @dataclass(frozen=True)
 class Decoded:
-    """The graph of a string.
-
-    types: int16 (n,), in the order of the string; edges: int32 (m, 2), pairs i < j in lexicographic order.
-    texts: the tokens' texts; token_nodes, token_edges: `Token.node` and `Token.edge` of each.
-    """
+    """The graph of a string."""
 
     types: TypeArray
+    """int16 (n,), in the order of the string."""
     edges: IntArray
+    """int32 (m, 2), pairs i < j in lexicographic order."""
     texts: tuple[str, ...]
+    """Of the tokens."""
     token_nodes: tuple[int, ...]
+    """`Token.node` of each."""
     token_edges: tuple[int, ...]
+    """`Token.edge` of each."""
 
     @cached_property
     def tokens(self) -> tuple[Token, ...]:
-        """The tokens with what each stands for."""
+        """The tokens, with their nodes and edges."""
         tokens, index, nodes = [], 0, 0
         for text, node, edge in zip(self.texts, self.token_nodes, self.token_edges, strict=True):
             kind: TokenKind = "open" if text == "(" else "close" if text == ")" else "cycle"
@@ -41,12 +42,11 @@ class Decoded:
 
 
 def decode(string: str, alphabet: Alphabet) -> Decoded:
-    """The graph that `string` stands for.
+    """Decode a string.
 
-    A branch may be the last of its node, a number may be used again once both its nodes are there, and `%` may stand
-    before small numbers. Raises StringError for an unknown token, parentheses that do not match, an empty branch, a
-    branch or a number without a node before it, a number that stands once, an edge from a node to itself and two
-    edges between the same nodes.
+    A branch may be the last of its node, a number may be reused after both its nodes, and `%` may precede small
+    numbers. Raises StringError for unknown tokens, unmatched parentheses, empty branches, branches and numbers without
+    a node, numbers without a partner, loops and double edges.
     """
     texts = split_tokens(string)
     type_of = alphabet.types
@@ -54,11 +54,11 @@ def decode(string: str, alphabet: Alphabet) -> Decoded:
     ends: list[tuple[int, int]] = []
     token_nodes: list[int] = []
     token_edges: list[int] = []
-    branches: list[tuple[int, int]] = []  # the node that each open branch hangs on, and the token that opened it
-    numbers: dict[int, tuple[int, int]] = {}  # the node and the token where each open number began
+    branches: list[tuple[int, int]] = []  # parent node and opening token of each open branch
+    numbers: dict[int, tuple[int, int]] = {}  # node and token of each open number
     node = -1  # what the next token attaches to
-    previous = ""  # what the last token was: "node" (or a number behind it), "(", ")"
-    for place, text in enumerate(texts):
+    previous = ""  # the last token: "node" (or a number after it), "(" or ")"
+    for index, text in enumerate(texts):
         kind = type_of.get(text)
         if kind is not None:
             fresh = len(types)
@@ -73,9 +73,9 @@ def decode(string: str, alphabet: Alphabet) -> Decoded:
         if text == "(" or text == ")":
             fault = _branch_fault(text, previous, bool(branches))
             if fault:
-                raise _error(string, texts, place, fault)
+                raise _error(string, texts, index, fault)
             if text == "(":
-                branches.append((node, place))
+                branches.append((node, index))
             else:
                 node, _ = branches.pop()
             token_nodes.append(-1)
@@ -84,18 +84,18 @@ def decode(string: str, alphabet: Alphabet) -> Decoded:
             continue
         number = number_value(text)
         if number is None:
-            raise _error(string, texts, place, _unknown(text, alphabet))
+            raise _error(string, texts, index, _unknown(text, alphabet))
         if previous != "node":
-            raise _error(string, texts, place, "a cycle number must stand right behind its node")
+            raise _error(string, texts, index, "a cycle number must follow its node")
         token_nodes.append(node)
         if number not in numbers:
-            numbers[number] = (node, place)
+            numbers[number] = (node, index)
             token_edges.append(-1)
             continue
-        other, begun = numbers.pop(number)
+        other, start = numbers.pop(number)
         if other == node:
-            raise _error(string, texts, place, f"cycle number {number} leads from a node to itself")
-        token_edges[begun] = len(ends)
+            raise _error(string, texts, index, f"cycle number {number} leads from a node to itself")
+        token_edges[start] = len(ends)
         token_edges.append(len(ends))
         ends.append((other, node))
     if not types:
@@ -103,17 +103,17 @@ def decode(string: str, alphabet: Alphabet) -> Decoded:
     if branches:
         raise _error(string, texts, branches[-1][1], "the branch is not closed")
     if numbers:
-        number, (_, begun) = min(numbers.items(), key=lambda each: each[1][1])
-        raise _error(string, texts, begun, f"cycle number {number} stands only once")
+        number, (_, start) = min(numbers.items(), key=lambda item: item[1][1])
+        raise _error(string, texts, start, f"cycle number {number} occurs only once")
     return _graph(string, types, ends, texts, token_nodes, token_edges)
 
 
 def equivalent(first: str, second: str, alphabet: Alphabet) -> bool:
-    """Whether two strings stand for the same shape graph, up to isomorphism. Raises StringError if one is wrong."""
-    one, other = decode(first, alphabet), decode(second, alphabet)
-    if len(one.edges) != len(other.edges) or sorted(one.types.tolist()) != sorted(other.types.tolist()):
+    """Return whether two strings encode isomorphic shape graphs. Raises StringError for an invalid one."""
+    graphs = [decode(string, alphabet) for string in (first, second)]
+    if len({(len(graph.edges), *sorted(graph.types.tolist())) for graph in graphs}) > 1:
         return False
-    return graph_digest(one.types, one.edges) == graph_digest(other.types, other.edges)
+    return len({graph_digest(graph.types, graph.edges) for graph in graphs}) == 1
 
 
 def _graph(
@@ -124,15 +124,15 @@ def _graph(
     token_nodes: list[int],
     token_edges: list[int],
 ) -> Decoded:
-    """The graph with its edges in order; the tokens name edges as they stand in `ends`, lower node first."""
+    """Return the graph with sorted edges. The tokens name edges by their rows in `ends`, lower node first."""
     pairs = np.array(ends, dtype=np.int64).reshape(-1, 2)
     keys = pairs[:, 0] * len(types) + pairs[:, 1]
     order = np.argsort(keys, kind="stable")
     is_double = np.diff(keys[order]) == 0
     if is_double.any():
         later = int(order[1:][is_double].min())
-        place = len(token_edges) - 1 - token_edges[::-1].index(later)
-        raise _error(string, texts, place, "two edges join the same two nodes")
+        index = len(token_edges) - 1 - token_edges[::-1].index(later)
+        raise _error(string, texts, index, "two edges join the same two nodes")
     row = np.append(np.argsort(order), -1)  # a token without an edge keeps its -1
     return Decoded(
         types=np.array(types, dtype=np.int16),
@@ -144,7 +144,7 @@ def _graph(
 
 
 def _branch_fault(text: str, previous: str, is_inside: bool) -> str:
-    """What is wrong with a parenthesis after a `previous` token, or nothing."""
+    """Return what is wrong with a parenthesis after a `previous` token, or an empty text."""
     if text == "(":
         return {"": "a string cannot begin with a branch", "(": "a branch must begin with a node"}.get(previous, "")
     if not is_inside:
@@ -154,10 +154,10 @@ def _branch_fault(text: str, previous: str, is_inside: bool) -> str:
 
 def _unknown(text: str, alphabet: Alphabet) -> str:
     if text == "%":
-        return "% must stand before two digits, or before a number in parentheses"
+        return "% must precede two digits, or a number in parentheses"
     known = ", ".join(alphabet.tokens[:3]) + (f" to {alphabet.tokens[-1]}" if len(alphabet.tokens) > 3 else "")
     return f"unknown token {text!r}; the alphabet is {known}"
 
 
-def _error(string: str, texts: list[str], place: int, reason: str) -> StringError:
-    return StringError(string, sum(map(len, texts[:place])), reason)
+def _error(string: str, texts: list[str], index: int, reason: str) -> StringError:
+    return StringError(string, sum(map(len, texts[:index])), reason)

@@ -1,4 +1,4 @@
-"""Shape graphs to strings: random spanning trees, random walks, and the canonical string (strings §5.1)."""
+"""From shape graphs to strings: random spanning trees and walks, and the canonical string (strings §5.1)."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ from stages.strings.tokens import number_text
 Indices = npt.NDArray[np.int64]
 
 REPEATS_PER_KNOWN_STRING = 5
-"""A graph counts as having no more strings after so many random walks in a row, for each string it is known to have
-and four besides, that brought nothing new."""
+"""Random walks without a new string, per known string and four more, after which a graph counts as exhausted."""
 
 
 class NotConnectedError(ValueError):
-    """The graph falls into pieces, so no string can walk it."""
+    """The graph is not connected, so it has no string."""
 
 
 @dataclass(frozen=True)
 class Encoded:
-    """string: the graph as text; nodes: int64 (n,), the graph's node at each node of the string, in order."""
+    """A string of a graph."""
 
     string: str
     nodes: npt.NDArray[np.int64]
+    """The graph's node at each node of the string, int64 (n,)."""
 
 
 def encode(
     types: TypeArray, edges: IntArray, alphabet: Alphabet, rng: np.random.Generator, cycles: bool = True
 ) -> Encoded:
-    """A random string of a graph: random spanning tree, random root, random order of the children.
+    """Encode a graph as a random string: random spanning tree, random root, random order of the children.
 
-    All cycles are broken at random edges; the tree that is left is written depth first, each subtree of a node in
-    parentheses except the last; the broken edges come back as numbers behind both of their nodes. Without `cycles` they
-    do not come back: the string is that of a random spanning tree (strings §7, brick buildings).
+    All cycles are broken at random edges. The tree is written depth first, each subtree of a node in parentheses except
+    the last; broken edges are numbers after both of their nodes. Without `cycles` they are left out, and the string is
+    that of a random spanning tree (strings §7, brick buildings).
 
     types: int16 (n,), at least one node; edges: int32 (m, 2), a simple graph. Raises NotConnectedError, and ValueError
-    if the graph is empty or an edge or a type names what is not there.
+    for an empty graph and for indices out of range.
     """
     from stages.strings.traversal import first_edges_tree
 
@@ -61,32 +61,32 @@ def random_strings(
     alphabet: Alphabet,
     count: int,
     rng: np.random.Generator,
-    besides: Collection[str] = (),
+    excluded: Collection[str] = (),
     cycles: bool = True,
 ) -> list[Encoded]:
-    """`count` distinct random strings of a graph, none of them in `besides`.
+    """Return `count` distinct random strings of a graph, none of them `excluded`; small graphs may have fewer.
 
-    Fewer if `REPEATS_PER_KNOWN_STRING`: small graphs have few strings. Arguments and errors as for `encode`.
+    Arguments and errors as for `encode`.
     """
-    seen = set(besides)
-    found: list[Encoded] = []
-    in_vain = 0
-    while len(found) < count and in_vain < REPEATS_PER_KNOWN_STRING * (4 + len(seen)):
+    seen = set(excluded)
+    strings: list[Encoded] = []
+    repeats = 0
+    while len(strings) < count and repeats < REPEATS_PER_KNOWN_STRING * (4 + len(seen)):
         encoded = encode(types, edges, alphabet, rng, cycles)
         if encoded.string in seen:
-            in_vain += 1
+            repeats += 1
         else:
-            in_vain = 0
+            repeats = 0
             seen.add(encoded.string)
-            found.append(encoded)
-    return found
+            strings.append(encoded)
+    return strings
 
 
 def canonical_string(types: TypeArray, edges: IntArray, alphabet: Alphabet, cycles: bool = True) -> Encoded:
-    """The canonical string of a graph, the same for all isomorphic graphs: depth first in canonical order. Without
-    `cycles`, that of the spanning tree which such a walk goes along.
+    """Return the canonical string of a graph, equal for isomorphic graphs: depth first in canonical order.
 
-    Arguments and errors as for `encode`, and ValueError if the graph is not simple.
+    Without `cycles` it is that of the spanning tree of this walk. Arguments and errors as for `encode`, and ValueError
+    for a graph that is not simple.
     """
     from stages.strings.traversal import depth_first_tree
 
@@ -105,7 +105,7 @@ def canonical_string(types: TypeArray, edges: IntArray, alphabet: Alphabet, cycl
 
 
 def _checked(types: TypeArray, edges: IntArray, alphabet: Alphabet) -> tuple[Indices, Indices]:
-    """Types and edges as the compiled code takes them, which does not look whether an index is in range."""
+    """Return types and edges for compiled code, which does not check the range of indices."""
     letters = np.ascontiguousarray(types, dtype=np.int64)
     pairs = np.ascontiguousarray(edges, dtype=np.int64).reshape(-1, 2)
     if not len(letters):
@@ -113,7 +113,7 @@ def _checked(types: TypeArray, edges: IntArray, alphabet: Alphabet) -> tuple[Ind
     if letters.min() < 0 or letters.max() >= len(alphabet.tokens):
         raise ValueError(f"type {letters.max()} is not in the alphabet, which has {len(alphabet.tokens)} types")
     if len(pairs) and (pairs.min() < 0 or pairs.max() >= len(letters)):
-        raise ValueError(f"an edge names a node that is not there; the graph has {len(letters)} nodes")
+        raise ValueError(f"an edge has a node out of range; the graph has {len(letters)} nodes")
     return letters, pairs
 
 
@@ -125,12 +125,12 @@ def _write(
     letters = len(alphabet.tokens)
     codes, nodes = walk(types, pairs, tree, edge_order, root, letters)
     if len(nodes) < len(types):
-        raise NotConnectedError(f"{len(nodes)} of {len(types)} nodes are in reach of node {root}")
+        raise NotConnectedError(f"{len(nodes)} of {len(types)} nodes are reachable from node {root}")
     texts = _texts(alphabet, max(int(codes.max()) - letters, 0) // 64)
     return Encoded("".join([texts[code] for code in codes.tolist()]), nodes)
 
 
 @lru_cache(maxsize=64)
 def _texts(alphabet: Alphabet, blocks: int) -> list[str]:
-    """The text of each code; 64 cycle numbers a block, and one block more."""
+    """Return the text of each code, with `blocks` + 1 blocks of 64 cycle numbers."""
     return [*alphabet.tokens, "(", ")", *(number_text(number) for number in range(64 * (blocks + 1)))]

@@ -1,4 +1,4 @@
-"""The tiling grammar on strings: is this string a shape graph that the kit's exemplars allow? (strings §3, §5.1)"""
+"""Checks strings against the tiling grammar of a kit (strings §3, §5.1)."""
 
 from __future__ import annotations
 
@@ -13,11 +13,10 @@ from stages.strings.tokens import StringError
 
 
 def check_string(string: str, alphabet: Alphabet, grammar: Grammar, edges: Edges = "all") -> Decoded:
-    """The graph of `string`, if the grammar admits the neighbours of every node: just these, or, where strings do not
-    tell of all contacts (`edges`), these and others besides.
+    """Decode a string whose nodes all have neighbourhoods that the grammar admits.
 
-    Raises StringError where the string cannot be decoded; at the first edge whose two types were never neighbours;
-    else at the first node whose neighbours the grammar does not admit.
+    If strings have some contacts only (`edges`), a node may have others. Raises StringError for a string that cannot be
+    decoded, at the first edge of two types that are never neighbours, or at the first refused neighbourhood.
     """
     decoded = decode(string, alphabet)
     types = decoded.types.tolist()

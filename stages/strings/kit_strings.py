@@ -1,7 +1,7 @@
-"""The strings of a kit's shapes: which of their contacts are edges of the strings, and the strings themselves.
+"""The strings of a kit's shapes, and which of their contacts are edges of the strings.
 
-All contacts, as published; or less, where strings with hundreds of cycles cannot be learnt: face contacts alone, or a
-spanning tree (strings §7, brick buildings).
+They are all contacts, as published; or face contacts, or a spanning tree (strings §7, brick buildings), since strings
+with hundreds of cycles cannot be learned.
 """
 
 from __future__ import annotations
@@ -21,28 +21,30 @@ from stages.strings.decoder import decode
 from stages.strings.encoder import Encoded, canonical_string, random_strings
 from stages.strings.settings import Edges
 
-_STRENGTH: dict[ContactKind | None, int] = {"face": 0, "line": 1, "point": 2, None: 2}
+_KIND_RANK: dict[ContactKind | None, int] = {"face": 0, "line": 1, "point": 2, None: 2}
 
 
 class KitStrings:
-    """Strings of shapes of one kit, their graphs being made of `edges`."""
+    """Strings of shapes of one kit, with the contacts of `edges`."""
 
     def __init__(self, kit: Kit, edges: Edges) -> None:
         self.kit, self.edges = kit, edges
         self.alphabet: Alphabet = make_alphabet(kit.labels)
 
     def graph(self, assembly: Assembly) -> Assembly:
-        """The labels of an assembly's parts, with those of its contacts that its strings tell of; for `tree`, which of
-        them are told is drawn anew for each string, and all stay."""
+        """Return an assembly of part labels, with the contacts that its strings contain.
+
+        For `tree` it has all contacts: each string draws its own spanning tree.
+        """
         labelled = self.kit.labelled(assembly)
         if self.edges != "faces":
             return labelled
-        return Assembly(labelled.types, labelled.poses, self._held_by_faces(assembly))
+        return Assembly(labelled.types, labelled.poses, self._connecting_contacts(assembly))
 
     def strings(self, graph: Assembly, count: int, rng: np.random.Generator) -> list[Encoded]:
-        """The canonical string of what `graph` has answered, and at most `count` random ones, all distinct.
+        """Return the canonical string of a `graph` result, and at most `count` distinct random ones.
 
-        Raises NotConnectedError where its edges do not hold it in one piece.
+        Raises NotConnectedError for a graph that is not connected.
         """
         cycles = self.edges != "tree"
         first = canonical_string(graph.types, graph.edges, self.alphabet, cycles)
@@ -50,27 +52,31 @@ class KitStrings:
         return [first, *others]
 
     def represents(self, encoded: Encoded, graph: Assembly) -> bool:
-        """Whether a string, decoded, is what `graph` answered, under the encoder's own matching of their nodes; for
-        `tree`, a spanning tree of it."""
+        """Return whether a string decodes to a `graph` result, by the encoder's matching of nodes.
+
+        For `tree` it must be a spanning tree.
+        """
         decoded, size = decode(encoded.string, self.alphabet), len(graph)
         if sorted(encoded.nodes.tolist()) != list(range(size)):
             return False
         if not np.array_equal(decoded.types, graph.types[encoded.nodes]):
             return False
-        found = np.sort(encoded.nodes[decoded.edges], axis=1) @ (size, 1)
+        edges = np.sort(encoded.nodes[decoded.edges], axis=1) @ (size, 1)
         expected = np.sort(graph.edges, axis=1) @ (size, 1)
         if self.edges == "tree":
-            # a string is in one piece, so that as many edges as a tree has are a tree
-            return len(found) == size - 1 and bool(np.isin(found, expected).all())
-        return np.array_equal(np.sort(found), np.sort(expected))
+            # a string is connected, so with n - 1 edges it is a tree
+            return len(edges) == size - 1 and bool(np.isin(edges, expected).all())
+        return np.array_equal(np.sort(edges), np.sort(expected))
 
-    def _held_by_faces(self, assembly: Assembly) -> IntArray:
-        """The face contacts of an assembly, and of its lines, then its points, those that first join what is apart, in
-        the order of the canonical graph."""
+    def _connecting_contacts(self, assembly: Assembly) -> IntArray:
+        """Return the face contacts of an assembly, and the line, then point contacts that first join its components.
+
+        Ties follow the order of the canonical graph.
+        """
         from stages.strings.traversal import first_edges_tree
 
         edges = assembly.edges
-        strength = np.array([_STRENGTH[kind] for kind in self._kinds(assembly)], dtype=np.int64)
+        strength = np.array([_KIND_RANK[kind] for kind in self._kinds(assembly)], dtype=np.int64)
         labels = np.stack([strength, strength], axis=1).astype(np.int32)
         rank = np.argsort(canonical_order(self.kit.label_of[assembly.types], edges, labels))
         ends = np.sort(rank[edges], axis=1)
@@ -80,8 +86,10 @@ class KitStrings:
         return kept
 
     def _kinds(self, assembly: Assembly) -> list[ContactKind | None]:
-        """The kind of each contact: that of its docking; where the kit has not seen it, as with parts that were put
-        back behind a shape, that of the contact itself."""
+        """Return the kind of each contact: that of its docking, or of the contact itself if the kit has none.
+
+        The kit has no docking for some contacts of restored hubs.
+        """
         dockings = self.kit.grammar.dockings
         labels = self.table.label_edges(assembly.types, assembly.poses, assembly.edges)[:, 0].tolist()
         poses = relative_poses(assembly.poses, assembly.edges)

@@ -1,4 +1,4 @@
-"""What stage `strings` adds to every sample that is a shape graph, its text, and what the card says of the corpus."""
+"""The text member that stage `strings` adds to samples with shape graphs, and the corpus on the card."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from stages.shape.collection.members import TEXT, Member, Members
 from stages.strings.settings import EDGE_DESCRIPTIONS, StringsConfig
 
 CORPUS = "corpus"
-"""Name of the shard that makes the corpus, and stem of its files."""
+"""Name of the shard of the corpus, and stem of its files."""
 
 COLUMNS = (
     ("tokens", "tokens a string"),
@@ -21,12 +21,12 @@ COLUMNS = (
 
 def _text(config: Config) -> tuple[Member, ...]:
     edges = config.section(StringsConfig).edges
-    told = {"all": "", "faces": " by its face contacts", "tree": " without the contacts that close cycles"}[edges]
-    return (Member(TEXT, f"Its shape graph{told} as strings, SMILES-like, one a line, the first canonical."),)
+    kind = {"all": "", "faces": " by its face contacts", "tree": " without the contacts that close cycles"}[edges]
+    return (Member(TEXT, f"Its shape graph{kind} as strings, SMILES-like, one a line, the first canonical."),)
 
 
 def _card(plan: Plan) -> Sequence[str]:
-    """What a string stands for, and how long strings are."""
+    """Return what a string encodes, and how long strings are."""
     summary = plan.summary("strings", CORPUS)
     if summary is None:
         return []

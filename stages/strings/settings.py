@@ -1,4 +1,4 @@
-"""The config of stage `strings`."""
+"""The `strings` section of a config."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ Edges = Literal["all", "faces", "tree"]
 
 EDGE_DESCRIPTIONS: dict[Edges, str] = {
     "all": "A string is a shape graph: every contact is an edge.",
-    "faces": "A string is a shape graph of face contacts, and of as many lines and points besides as hold the shape in "
-    "one piece; the other contacts are not in it.",
-    "tree": "A string is a spanning tree of a shape graph: parts stand as they did, and every edge is a contact, but "
-    "contacts that close cycles are not in it. Random strings of a shape are of random spanning trees.",
+    "faces": "A string is a shape graph of face contacts, with the line and point contacts that connect it; the other "
+    "contacts are left out.",
+    "tree": "A string is a spanning tree of a shape graph: every edge is a contact, but contacts that close cycles are "
+    "left out. Random strings of a shape have random spanning trees.",
 }
-"""What a string of each kind stands for once it is decoded."""
+"""What a string of each kind encodes."""
 
 
 class StringsConfig(StrictModel):
@@ -25,9 +25,9 @@ class StringsConfig(StrictModel):
 
     edges: Edges = Field(
         "all",
-        description="which contacts a string tells of: all; faces, with as many lines and points besides as hold the "
-        "shape in one piece; or tree, a spanning tree alone, without the contacts that close cycles. Strings of large "
-        "shapes with many cycles are hard to learn, and faces and trees are shorter",
+        description="contacts in a string: all; faces, with the line and point contacts that connect the shape; or "
+        "tree, a spanning tree without contacts that close cycles. Strings of large shapes with many cycles are hard "
+        "to learn; those of faces and trees are shorter",
     )
 
     strings_per_shape: int = Field(

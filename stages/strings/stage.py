@@ -1,4 +1,4 @@
-"""Stage `strings`: each sample of the collection gets its strings; then they become the text corpus."""
+"""Stage `strings`: the strings of each sample of the collection, and the text corpus."""
 
 from __future__ import annotations
 
@@ -21,13 +21,15 @@ from stages.strings.kit_strings import KitStrings
 from stages.strings.members import CORPUS
 from stages.strings.settings import StringsConfig
 
-BYTES_A_STRING = 3000
-"""About as long as the string of a shape of two hundred parts with six hundred contacts is."""
+BYTES_PER_STRING = 3000
+"""About that of a shape of two hundred parts with six hundred contacts."""
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """One shard for each shard of the collection; when all are done, the corpus, which reads them all. None for
-    samples that are no shape graphs: they come with a text of their own."""
+    """Plan one shard for each shard of the collection and, when all are done, the corpus.
+
+    Samples without shape graphs have a text of their own, and no shard here.
+    """
     shards = _graph_shards(plan)
     if not shards or any(plan.summary("strings", shard.name) is None for shard in shards):
         return shards
@@ -43,11 +45,11 @@ def run_shard(task: Task) -> Outcome:
 
 
 def write_strings(task: Task) -> Outcome:
-    """Files of the shard: `.tar` with the member `txt` of each sample, one string a line, the canonical one first;
-    and `.jsonl` with the sample's key, kit, graph and cycle rank for the corpus, in the same order.
+    """Write the strings of a shard.
 
-    Every string is decoded again before it is written. A sample whose graph is not connected has no string and is
-    refused. Raises ShardFailed where a string does not stand for its graph, or a sample is filed under a wrong graph.
+    `.tar`: the member `txt` of each sample, one string a line, the canonical one first; `.jsonl`: key, kit, graph and
+    cycle rank of each sample, for the corpus. Every string is decoded before it is written. A sample whose graph is not
+    connected is rejected. Raises ShardFailed for a string that does not encode its graph, and for a wrong graph.
     """
     config = task.config.section(StringsConfig)
     kits = {name: KitStrings(kit, config.edges) for name, kit in input_kits(task).items()}
@@ -71,7 +73,7 @@ def write_strings(task: Task) -> Outcome:
 
 
 def publish(plan: Plan) -> Mapping[str, str]:
-    """The corpus, in a folder beside the dataset's: text files, vocabulary, statistics."""
+    """Publish the corpus in a folder next to the dataset: text files, vocabulary, statistics."""
     summary = plan.summary("strings", CORPUS)
     if summary is None:
         return {}
@@ -79,42 +81,42 @@ def publish(plan: Plan) -> Mapping[str, str]:
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """What the corpus holds, once it is there, and how long its strings are."""
+    """Report the contents of the finished corpus, and the length of its strings."""
     summary = plan.summary("strings", CORPUS)
     if summary is None:
         return ()
     counts = f"{summary['strings']} strings of {summary['graphs']} graphs"
-    elsewhere = f" and {summary['elsewhere']} that stand in another split" if summary["elsewhere"] else ""
+    others = f" and {summary['in_other_splits']} of other splits" if summary["in_other_splits"] else ""
     lengths = [
-        f"{kit}: {each['tokens']['median']:,} tokens a string in the median, {each['tokens']['most']:,} at most; cycle "
-        f"rank of the shapes {each['cycle_rank']['median']:,} in the median, {each['cycle_rank']['most']:,} at most"
-        for kit, each in summary["kits"].items()
+        f"{kit}: {measures['tokens']['median']:,} tokens per string (median), {measures['tokens']['most']:,} at most; "
+        f"cycle rank {measures['cycle_rank']['median']:,} (median), {measures['cycle_rank']['most']:,} at most"
+        for kit, measures in summary["kits"].items()
     ]
-    return (f"corpus: {counts}, {summary['duplicates']} duplicates{elsewhere} dropped", *lengths)
+    return (f"corpus: {counts}, {summary['duplicates']} duplicates{others} dropped", *lengths)
 
 
 def estimate_bytes(plan: Plan) -> int:
-    """Bytes of all strings, in the shards and once more in the corpus."""
+    """Return the bytes of all strings, in the shards and in the corpus."""
     strings = plan.config.section(StringsConfig).strings_per_shape + 1
     samples = sum(int(shard.params["samples"]) for shard in _graph_shards(plan))
-    return samples * (2 * strings * BYTES_A_STRING + 2048)
+    return samples * (2 * strings * BYTES_PER_STRING + 2048)
 
 
 def _graph_shards(plan: Plan) -> list[Shard]:
-    return [each for each in collection_shards(plan) if language_of(each.params["producer"]).graphs]
+    return [shard for shard in collection_shards(plan) if language_of(shard.params["producer"]).graphs]
 
 
 def _strings(sample: Sample, kit: KitStrings, count: int, rng: np.random.Generator) -> list[str]:
-    """The canonical string of a sample and `count` random ones, proved to stand for its graph."""
+    """Return the canonical string of a sample and `count` random ones, checked against its graph."""
     labelled = kit.kit.labelled(sample.assembly)
     if graph_digest(labelled.types, labelled.edges) != sample.graph:
         raise ShardFailed(f"sample {sample.key} is filed under graph {sample.graph}, which is not its own")
     graph = kit.graph(sample.assembly)
     encoded = kit.strings(graph, count, rng)
-    for each in encoded:
-        if not kit.represents(each, graph):
-            raise ShardFailed(f"a string of sample {sample.key} does not stand for its graph: {each.string}")
-    return [each.string for each in encoded]
+    for string in encoded:
+        if not kit.represents(string, graph):
+            raise ShardFailed(f"a string of sample {sample.key} does not encode its graph: {string.string}")
+    return [string.string for string in encoded]
 
 
 STAGE = Stage(

@@ -1,4 +1,4 @@
-"""Figures about a corpus: cycle rank of its shapes; of its strings length, cycles, depth of branches, and tokens."""
+"""Statistics of a corpus: cycle rank of its shapes; length, cycles, branch depth and tokens of its strings."""
 
 from __future__ import annotations
 
@@ -12,30 +12,34 @@ from stages.strings.tokens import number_value, split_tokens
 
 @dataclass(frozen=True)
 class StringFigures:
-    """One string: its characters, tokens, nodes, cycle edges, and parentheses open at once at most."""
+    """Measures of one string."""
 
     characters: int
     tokens: int
     nodes: int
     cycles: int
     branch_depth: int
+    """Most branches open at once."""
 
 
 @dataclass
 class StringStatistics:
-    """What a corpus file holds, counted string by string; memory stays flat. duplicates, elsewhere: strings left out
-    because the file, or that of another split, has them already."""
+    """Counts of a corpus file, string by string, in constant memory."""
 
     shapes: int = 0
     graphs: int = 0
     strings: int = 0
     duplicates: int = 0
-    elsewhere: int = 0
+    """Strings left out as duplicates in the file."""
+    in_other_splits: int = 0
+    """Strings left out because another split has them."""
     seen: Counter[str] = field(default_factory=Counter)
+    """Tokens."""
     figures: dict[str, Counter[int]] = field(default_factory=dict)
+    """Values of each measure."""
 
     def add_shape(self, cycle_rank: int) -> None:
-        """Count one shape: contacts of its graph that close cycles, told by its strings or not."""
+        """Count one shape by the cycle rank of its graph, whatever its strings contain."""
         self.shapes += 1
         self.figures.setdefault("cycle_rank", Counter())[cycle_rank] += 1
 
@@ -46,14 +50,13 @@ class StringStatistics:
             self.figures.setdefault(name, Counter())[value] += 1
 
     def describe(self) -> dict[str, Any]:
-        """As JSON: counts, and for each figure its least, median, mean and greatest value, and strings by value (of the
-        cycle rank: shapes by value)."""
+        """Return counts as JSON, and of each measure least, median, mean, greatest and a histogram."""
         described: dict[str, Any] = {
             "shapes": self.shapes,
             "graphs": self.graphs,
             "strings": self.strings,
             "duplicates_dropped": self.duplicates,
-            "elsewhere_dropped": self.elsewhere,
+            "in_other_splits_dropped": self.in_other_splits,
             "tokens_seen": dict(sorted(self.seen.items())),
         }
         for name, counts in self.figures.items():
@@ -68,26 +71,26 @@ class StringStatistics:
 
 
 def summarize(splits: Iterable[StringStatistics]) -> dict[str, dict[str, int]]:
-    """Median and greatest value of each figure over several files together, as JSON."""
+    """Return median and greatest value of each measure over several files, as JSON."""
     joined: dict[str, Counter[int]] = {}
-    for each in splits:
-        for name, counts in each.figures.items():
+    for statistics in splits:
+        for name, counts in statistics.figures.items():
             joined.setdefault(name, Counter()).update(counts)
     return {name: {"median": _median(counts), "most": max(counts)} for name, counts in joined.items()}
 
 
 def _median(counts: Mapping[int, int]) -> int:
-    """The least value that at least half do not exceed."""
-    half, passed = sum(counts.values()) / 2, 0
+    """Return the least value that at least half do not exceed."""
+    half, cumulative = sum(counts.values()) / 2, 0
     for value in sorted(counts):
-        passed += counts[value]
-        if passed >= half:
+        cumulative += counts[value]
+        if cumulative >= half:
             return value
     raise ValueError("nothing was counted")
 
 
 def measure_string(string: str, seen: Counter[str] | None = None) -> StringFigures:
-    """The figures of a well-formed string; its tokens are counted into `seen` as well."""
+    """Measure a well-formed string, and count its tokens in `seen`."""
     texts = split_tokens(string)
     counts = Counter(texts)
     if seen is not None:

@@ -10,35 +10,31 @@ from typing import Literal
 TokenKind = Literal["node", "cycle", "open", "close"]
 
 _TOKEN = re.compile(r"%\([0-9]{1,6}\)|%[0-9][0-9]|\[[^\[\]]*\]|.", re.DOTALL)
-_SHOWN = 60
-"""An error shows so many characters on each side of its place."""
+_CONTEXT_CHARACTERS = 60
+"""Characters that an error shows on each side of its position."""
 
 
 @dataclass(frozen=True)
 class Token:
-    """One token of a string.
-
-    index: where it begins in the string; kind: `node` for a node, `cycle` for the number of a cycle edge, `open` and
-    `close` for the parentheses of a branch.
-    node: for `node` the node itself, for `cycle` the node that the number stands behind, else -1; nodes are counted in
-    the order in which they stand in the string.
-    edge: row of the decoded edges: for `node` the edge to its parent in the spanning tree (-1 for the root), for
-    `cycle` the cycle edge (two tokens name the same), else -1. So each edge belongs to characters (strings §6).
-    """
+    """One token of a string. Each edge belongs to tokens (strings §6)."""
 
     index: int
+    """Where it begins in the string."""
     text: str
     kind: TokenKind
+    """`node`, `cycle` for the number of a cycle edge, or `open` and `close` for the parentheses of a branch."""
     node: int
+    """The node, or the one before a cycle number, in the order of the string; else -1."""
     edge: int
+    """Row of the decoded edges: the edge to the parent, or the cycle edge (in two tokens); else -1."""
 
 
 class StringError(ValueError):
-    """A string that is no shape graph, or none of the kit. Its message shows the string with a caret at `index`."""
+    """A string that is no shape graph of the kit. The message shows the string with a caret at `index`."""
 
     def __init__(self, string: str, index: int, reason: str) -> None:
-        first, last = max(0, index - _SHOWN), min(len(string), index + _SHOWN)
-        shown = "".join(each if each.isprintable() else "\N{REPLACEMENT CHARACTER}" for each in string[first:last])
+        first, last = max(0, index - _CONTEXT_CHARACTERS), min(len(string), index + _CONTEXT_CHARACTERS)
+        shown = "".join(char if char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in string[first:last])
         before, after = "…" * (first > 0), "…" * (last < len(string))
         caret = " " * (len(before) + index - first) + "^"
         super().__init__(f"{reason}, at character {index} of {len(string)}:\n  {before}{shown}{after}\n  {caret}")
@@ -51,12 +47,12 @@ class StringError(ValueError):
 
 
 def split_tokens(string: str) -> list[str]:
-    """The texts of the tokens: node names in brackets, numbers with their `%`, every other character alone."""
+    """Split a string into tokens: names in brackets, numbers with their `%`, and single characters."""
     return _TOKEN.findall(string)
 
 
 def number_text(number: int) -> str:
-    """The suffix for the cycle number `number`: one digit, `%nn` from 10, `%(nnn)` from 100."""
+    """Return the token of a cycle number: one digit, `%nn` from 10, `%(nnn)` from 100."""
     if number < 10:
         return str(number)
     return f"%{number}" if number < 100 else f"%({number})"
@@ -64,7 +60,7 @@ def number_text(number: int) -> str:
 
 @lru_cache(maxsize=2048)
 def number_value(token: str) -> int | None:
-    """The cycle number that a token stands for, or None if it is no number."""
+    """Return the cycle number of a token, or None if it is no number."""
     if len(token) == 1:
         return int(token) if token in "0123456789" else None
     return int(token.strip("%()")) if token[0] == "%" else None

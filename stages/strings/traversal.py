@@ -11,7 +11,7 @@ import numpy as np
 
 @numba.njit(cache=True)
 def _arcs(n, edges, edge_order):
-    """The arcs out of each node, those of edges that come first in `edge_order` first: `(first, target, edge)`."""
+    """Return the arcs out of each node, in `edge_order`: `(first, target, edge)`."""
     first = np.zeros(n + 1, dtype=np.int64)
     for k in range(len(edges)):
         first[edges[k, 0] + 1] += 1
@@ -31,7 +31,7 @@ def _arcs(n, edges, edge_order):
 
 @numba.njit(cache=True)
 def first_edges_tree(n, edges, edge_order):
-    """The spanning forest of the edges that close no cycle when taken in the order `edge_order`, bool (m,)."""
+    """Return the spanning forest of edges that close no cycle in `edge_order`, bool (m,)."""
     leader = np.arange(n)
     tree = np.zeros(len(edges), dtype=np.bool_)
     for k in edge_order:
@@ -50,7 +50,7 @@ def first_edges_tree(n, edges, edge_order):
 
 @numba.njit(cache=True)
 def depth_first_tree(n, edges, edge_order, root):
-    """The spanning tree of a depth-first search from `root` that tries edges in the order `edge_order`, bool (m,)."""
+    """Return the spanning tree of a depth-first search from `root` in `edge_order`, bool (m,)."""
     first, target, edge = _arcs(n, edges, edge_order)
     following = first[:n].copy()
     seen = np.zeros(n, dtype=np.bool_)
@@ -75,14 +75,14 @@ def depth_first_tree(n, edges, edge_order, root):
 
 @numba.njit(cache=True)
 def walk(types, edges, tree, edge_order, root, letters):
-    """The tokens of a graph, walked along `tree` from `root`: `(codes, nodes)`, both int64.
+    """Return the tokens of a walk along `tree` from `root`: `(codes, nodes)`, both int64.
 
     codes: a type below `letters`, `letters` for `(`, `letters` + 1 for `)`, `letters` + 2 + k for cycle number k.
     nodes: the nodes in the order of their codes; fewer than there are if the graph is not connected.
 
-    Children come in the order of their edges in `edge_order`. Behind a node stand the numbers that end there,
-    ascending, then those that begin there, the one that ends soonest first. A number that begins is the lowest that is
-    free, counting as free what ended at an earlier node.
+    Children come in `edge_order`. After a node come the numbers that end there, ascending, then those that start there,
+    in the order of their ends. A number that starts is the lowest that is free; numbers are free after the node where
+    they end.
     """
     first, target, edge = _arcs(len(types), edges, edge_order)
     events, nodes = _tree_walk(first, target, edge, tree, root)
@@ -91,8 +91,7 @@ def walk(types, edges, tree, edge_order, root, letters):
 
 @numba.njit(cache=True)
 def _tree_walk(first, target, edge, tree, root):
-    """The nodes in the order of a walk along `tree`; and the same with -1 and -2 for the parentheses around every
-    subtree but a node's last."""
+    """Return a walk along `tree`, with -1 and -2 for parentheses around all but the last subtrees, and its nodes."""
     n = len(first) - 1
     events = np.empty(3 * n, dtype=np.int64)
     nodes = np.empty(n, dtype=np.int64)
@@ -124,7 +123,7 @@ def _tree_walk(first, target, edge, tree, root):
 
 @numba.njit(cache=True)
 def _written(types, events, nodes, first, target, edge, tree, letters):
-    """The codes of a walk: types, parentheses, and the numbers of the edges that are not in `tree`."""
+    """Return the codes of a walk: types, parentheses, and the numbers of the edges that are not in `tree`."""
     m = len(tree)
     rank = np.full(len(types), -1, dtype=np.int64)
     for k in range(len(nodes)):
@@ -154,18 +153,18 @@ def _written(types, events, nodes, first, target, edge, tree, letters):
                 partner[begins] = rank[target[arc]] * m + k
                 begins += 1
         ending[:ends].sort()
-        for each in ending[:ends]:
-            codes[length] = letters + 2 + each
+        for code in ending[:ends]:
+            codes[length] = letters + 2 + code
             length += 1
         partner[:begins].sort()
         lowest = 0
-        for each in partner[:begins]:
+        for key in partner[:begins]:
             while taken[lowest]:
                 lowest += 1
             taken[lowest] = True
-            number[each % m] = lowest
+            number[key % m] = lowest
             codes[length] = letters + 2 + lowest
             length += 1
-        for each in ending[:ends]:
-            taken[each] = False
+        for code in ending[:ends]:
+            taken[code] = False
     return codes[:length]

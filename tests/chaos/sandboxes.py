@@ -88,7 +88,7 @@ ARENAS: dict[str, Datasets] = {
     ),
     "dreams": Datasets(
         {
-            "learnt": (
+            "parent": (
                 ("exemplars", "variations", "strings", "training"),
                 {
                     "exemplars": {"kits": [stated(_CASTLE)]},
@@ -96,22 +96,22 @@ ARENAS: dict[str, Datasets] = {
                     "training": {"models": [{"name": "tiny", "kind": "string_vae", "embedding": 4, **_TINY}]},
                 },
             ),
-            "dreamt": (
+            "sampled": (
                 ("exemplars", "string_sampling", "validity"),
                 {
                     "exemplars": {"kits": [stated(_CASTLE)]},
                     "variations": {"samples_per_kit": 0},
                     "string_sampling": {
-                        "sources": [{"dataset": "learnt", "model": "tiny", "kit": "castle", "samples": 4}],
+                        "sources": [{"dataset": "parent", "model": "tiny", "kit": "castle", "samples": 4}],
                         "draws": 8,
-                        "lanes": 2,
-                        "rounds": 3,
+                        "parallel_searches": 2,
+                        "max_rounds": 3,
                         "splits": {"shards": 1},
                     },
                 },
             ),
         },
-        [{"dreamt": {"string_sampling": {"draws": 7}}}],
+        [{"sampled": {"string_sampling": {"draws": 7}}}],
     ),
     "scribes": Datasets(
         {
@@ -122,7 +122,7 @@ ARENAS: dict[str, Datasets] = {
                     "training": {"models": [{"name": "tiny", "kind": "program_vae", **_TINY}]},
                 },
             ),
-            "written": (
+            "programs": (
                 ("program_sampling", "shapeassembly", "validity"),
                 {
                     "program_sampling": {"programs_per_shard": 4},
@@ -136,7 +136,7 @@ ARENAS: dict[str, Datasets] = {
                 },
             ),
         },
-        [{"written": {"program_sampling": {"programs_per_shard": 5}}}],
+        [{"programs": {"program_sampling": {"programs_per_shard": 5}}}],
     ),
     "texts": Datasets(
         {"texts": (("shapeassembly", "validity"), {"shapeassembly": _PROGRAMS})},

@@ -1,8 +1,8 @@
-"""How parts may stand beside each other: the dockings of a kit with their images, as tables for the solver.
+"""Placements of parts next to each other: the dockings of a kit with their images, as tables for the solver.
 
-A *stance* is a part type with what is up in its coordinates, modulo its symmetries: a part stands only as parts of its
-type stood in the exemplars. Where shapes need not be upright a type has one stance. A *candidate* is a place for a part
-of some label beside a part in some stance.
+An *orientation* is a part type with its up axis in part coordinates, modulo symmetry: parts are oriented as their types
+are in the exemplars. If shapes need not be upright, a type has one orientation. A *placement* is a pose of a part
+relative to a part in some orientation.
 """
 
 from __future__ import annotations
@@ -19,68 +19,60 @@ from stages.shape.kit import Kit, PartType
 
 
 class DockedPlacements(NamedTuple):
-    """Stances, those of one label beside each other, and candidates, those of a stance and a label beside each other.
+    """s orientations, grouped by label, and c placements, grouped by orientation and label."""
 
-    stance_starts int64 (labels + 1,): where the stances of a label begin; stance_types int64 (s,); rests float64
-    (s, 3, 3): how one of them stood in an exemplar.
-    starts int64 (s * labels + 1,): where the candidates of a stance and a label begin; stances int64 (c,); rotations
-    float64 (c, 3, 3), translations float64 (c, 3): in coordinates of the part that they stand beside.
-    """
-
-    stance_starts: np.ndarray
-    stance_types: np.ndarray
-    rests: np.ndarray
-    starts: np.ndarray
-    stances: np.ndarray
-    rotations: np.ndarray
-    translations: np.ndarray
+    orientation_starts: np.ndarray  # int64 (labels + 1,): first orientation of each label
+    orientation_types: np.ndarray  # int64 (s,): part type
+    rests: np.ndarray  # float64 (s, 3, 3): rotation of such a part in an exemplar
+    starts: np.ndarray  # int64 (s * labels + 1,): first placement of each orientation and label
+    orientations: np.ndarray  # int64 (c,): of the placed part
+    rotations: np.ndarray  # float64 (c, 3, 3), in coordinates of the part that it docks to
+    translations: np.ndarray  # float64 (c, 3)
 
 
 class _Orientation(NamedTuple):
-    """up: float64 (3,) in part coordinates; rest: float64 (3, 3); turns: float64 (k, 4, 4), symmetries that keep up."""
-
     part_type: int
-    up: FloatArray
-    rest: FloatArray
-    turns: FloatArray
+    up: FloatArray  # float64 (3,), in part coordinates
+    rest: FloatArray  # float64 (3, 3)
+    turns: FloatArray  # float64 (k, 4, 4): symmetries that keep up
 
 
 def find_placements(kit: Kit, upright: bool) -> DockedPlacements:
-    """The stances and candidates of a kit. With `upright` parts stand as they stood in the exemplars, else however
-    dockings turn them."""
-    stances = [
-        stance
+    """Find the orientations and placements of a kit; with `upright`, orientations are those of the exemplars."""
+    orientations = [
+        orientation
         for label in range(len(kit.labels))
         for part_type in np.flatnonzero(kit.label_of == label).tolist()
-        for stance in _orientations(kit, part_type, upright)
+        for orientation in _orientations(kit, part_type, upright)
     ]
     of_type: dict[int, list[int]] = {}
-    for number, stance in enumerate(stances):
-        of_type.setdefault(stance.part_type, []).append(number)
-    labels = np.array([kit.label_of[each.part_type] for each in stances], dtype=np.int64)
-    found: list[list[tuple[int, FloatArray]]] = [[] for _ in range(len(stances) * len(kit.labels))]
-    for number, stance in enumerate(stances):
-        for other, poses in _beside(kit, stance.part_type):
-            others = [(each, stances[each]) for each in of_type.get(other, [])]
-            for place, pose in _standing(kit, stance, others, poses, upright):
-                row = found[number * len(kit.labels) + labels[place]]
-                if not any(at == place and _same_place(kit, stances[at], known, pose) for at, known in row):
-                    row.append((place, pose))
-    flat = [each for row in found for each in row]
+    for number, orientation in enumerate(orientations):
+        of_type.setdefault(orientation.part_type, []).append(number)
+    labels = np.array([kit.label_of[orientation.part_type] for orientation in orientations], dtype=np.int64)
+    rows: list[list[tuple[int, FloatArray]]] = [[] for _ in range(len(orientations) * len(kit.labels))]
+    for number, orientation in enumerate(orientations):
+        for other, poses in _docked_types(kit, orientation.part_type):
+            others = [(index, orientations[index]) for index in of_type.get(other, [])]
+            for index, pose in _oriented(kit, orientation, others, poses, upright):
+                row = rows[number * len(kit.labels) + labels[index]]
+                same = (known for other_index, known in row if other_index == index)
+                if not any(_same_pose(kit, orientations[index], known, pose) for known in same):
+                    row.append((index, pose))
+    flat = [placement for row in rows for placement in row]
     poses = np.array([pose for _, pose in flat]).reshape(-1, 4, 4)
     return DockedPlacements(
-        stance_starts=np.searchsorted(labels, np.arange(len(kit.labels) + 1)),
-        stance_types=np.array([each.part_type for each in stances], dtype=np.int64),
-        rests=np.ascontiguousarray([each.rest for each in stances]),
-        starts=np.cumsum([0, *map(len, found)]),
-        stances=np.array([place for place, _ in flat], dtype=np.int64),
+        orientation_starts=np.searchsorted(labels, np.arange(len(kit.labels) + 1)),
+        orientation_types=np.array([orientation.part_type for orientation in orientations], dtype=np.int64),
+        rests=np.ascontiguousarray([orientation.rest for orientation in orientations]),
+        starts=np.cumsum([0, *map(len, rows)]),
+        orientations=np.array([index for index, _ in flat], dtype=np.int64),
         rotations=np.ascontiguousarray(poses[:, :3, :3]),
         translations=np.ascontiguousarray(poses[:, :3, 3]),
     )
 
 
 def _orientations(kit: Kit, part_type: int, upright: bool) -> list[_Orientation]:
-    """How parts of a type stood in the exemplars, hubs behind them too, modulo symmetry."""
+    """Return the orientations of a type in the exemplars, also of hubs, modulo symmetry."""
     axis, turns = {"y": 1, "z": 2}[kit.up], kit.types[part_type].symmetries
     found: list[_Orientation] = []
     for exemplar in kit.exemplars:
@@ -89,21 +81,21 @@ def _orientations(kit: Kit, part_type: int, upright: bool) -> list[_Orientation]
             up = np.ascontiguousarray(pose[axis, :3])
             if not upright:
                 return [_Orientation(part_type, up, pose[:3, :3], turns)]
-            if not any(_keeping(kit.types[part_type], up, known.up).any() for known in found):
-                kept = turns[_keeping(kit.types[part_type], up, up)]
+            if not any(_maps_up(kit.types[part_type], up, known.up).any() for known in found):
+                kept = turns[_maps_up(kit.types[part_type], up, up)]
                 found.append(_Orientation(part_type, up, pose[:3, :3], kept))
     return found
 
 
-def _keeping(part_type: PartType, up: FloatArray, other: FloatArray) -> np.ndarray:
-    """Which symmetries bring one way up to another, bool (k,)."""
+def _maps_up(part_type: PartType, up: FloatArray, other: FloatArray) -> np.ndarray:
+    """Return which symmetries map one up axis to another, bool (k,)."""
     gaps = np.linalg.norm(part_type.symmetries[:, :3, :3] @ up - other, axis=1)
     near: np.ndarray = gaps < MAX_UP_DIFFERENCE
     return near
 
 
-def _beside(kit: Kit, part_type: int) -> Iterator[tuple[int, FloatArray]]:
-    """By docking the other's type, and its poses (k, 4, 4) in all images under the symmetries of the part."""
+def _docked_types(kit: Kit, part_type: int) -> Iterator[tuple[int, FloatArray]]:
+    """Yield, by docking, the other type and its poses (k, 4, 4), all images under the symmetries of the part."""
     turns = kit.types[part_type].symmetries
     for docking in kit.grammar.dockings:
         if docking.a == part_type:
@@ -112,26 +104,29 @@ def _beside(kit: Kit, part_type: int) -> Iterator[tuple[int, FloatArray]]:
             yield docking.a, turns @ invert(docking.pose)
 
 
-def _standing(
-    kit: Kit, stance: _Orientation, others: list[tuple[int, _Orientation]], poses: FloatArray, upright: bool
+def _oriented(
+    kit: Kit, orientation: _Orientation, others: list[tuple[int, _Orientation]], poses: FloatArray, upright: bool
 ) -> Iterator[tuple[int, FloatArray]]:
-    """The stance, one of `others`, and the pose of a part at each of `poses` (k, 4, 4) beside one that stands as
-    `stance`, turned by a symmetry so that up is where its stance has it; nothing where no part of its type stood so."""
+    """Yield orientation and pose of a part at each of `poses` (k, 4, 4) next to one in `orientation`.
+
+    The orientation is one of `others`; the pose is turned by a symmetry that maps up to its up axis. Poses without such
+    an orientation are left out.
+    """
     for pose in poses:
         if not upright:
             yield others[0][0], pose
             continue
-        up = pose[:3, :3].T @ stance.up
+        up = pose[:3, :3].T @ orientation.up
         for number, other in others:
-            keeping = np.flatnonzero(_keeping(kit.types[other.part_type], up, other.up))
-            if len(keeping):
-                # x = S x' for the part's own coordinates: up becomes S up, and the pose R S^-1
-                yield number, pose @ invert(kit.types[other.part_type].symmetries[keeping[0]])
+            turns = np.flatnonzero(_maps_up(kit.types[other.part_type], up, other.up))
+            if len(turns):
+                # with part coordinates x = S x', up becomes S up, and the pose R S^-1
+                yield number, pose @ invert(kit.types[other.part_type].symmetries[turns[0]])
                 break
 
 
-def _same_place(kit: Kit, stance: _Orientation, pose: FloatArray, other: FloatArray) -> bool:
-    """Whether a part looks the same at two poses."""
-    length = kit.types[stance.part_type].diagonal / 2
-    gaps = pose_vectors(pose @ stance.turns, length) - pose_vectors(other[None], length)
+def _same_pose(kit: Kit, orientation: _Orientation, pose: FloatArray, other: FloatArray) -> bool:
+    """Return whether a part is the same at two poses, modulo symmetry."""
+    length = kit.types[orientation.part_type].diagonal / 2
+    gaps = pose_vectors(pose @ orientation.turns, length) - pose_vectors(other[None], length)
     return bool(np.linalg.norm(gaps, axis=1).min() <= kit.pose_tolerance)

@@ -1,155 +1,204 @@
-"""Putting a graph together: part after part at a docking beside one that stands, with ways back (strings §6)."""
+"""Instantiates a graph: backtracking search with forward checking over the placements of its parts (strings §6).
+
+variable   a node of the graph
+value      a placement of a node: an oriented part type with a pose, a row of `types` to `in_domain` in SolverState
+domain     the rows domain_start[node] to domain_end[node]; domain_size[node] of them are `in_domain`; it exists once a
+           neighbour is placed
+assigned   assigned[node] is the value of a placed node, or -1
+trail      what to undo, newest last: PRUNED value, PLACED node, OPENED domain of a node; encoded by the push functions
+invariant  after `_undo` to a length of the trail, domains, assignments and neighbour counts are as they were then
+restarts   after a number of conflicts per node, which grows by each restart; weights of nodes remember conflicts
+outcomes   SOLVED; IMPOSSIBLE, the search space is exhausted; BUDGET, the placements are used up; NO_ROOM, an array is
+           full. Steps end with OK, CONFLICT or NO_ROOM.
+
+A walk-through of a row A-B-C: `_attempt` opens the domain of A, and places A at a value. `_place` pushes PLACED A,
+prunes the values of open domains against it, and opens the domain of B (OPENED B) with the placements next to A that
+contradict no placed part. B is placed; no placement of C is left: a conflict. `_undo` pops OPENED C, PLACED B and
+what B pruned; the value of B is pruned, and the next one is tried.
+
+Numba compiles this module when it is imported: import it inside functions.
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numba
 import numpy as np
 
 from stages.shape.geometry.contact_lookup import NO_CONTACT, UNKNOWN_CONTACT, call_oracle, contact_key, quantize_pose
 from stages.shape.geometry.hash_tables import look_up
-from stages.string_sampling.instantiation.guidance import drop_frames, propagate_frames, score_by_category
-from stages.string_sampling.instantiation.reach import LONGEST, can_reach
-from stages.string_sampling.instantiation.state import FAILS, PLACED, TRAIL, TRIES, VALUES
+from stages.string_sampling.instantiation.guidance import Guide, drop_frames, propagate_frames, score_by_category
+from stages.string_sampling.instantiation.placements import DockedPlacements
+from stages.string_sampling.instantiation.reach import MAX_CHAIN_LENGTH, ChainReach, can_reach
+from stages.string_sampling.instantiation.state import (
+    N_CONFLICTS,
+    N_PLACED,
+    N_PLACEMENTS,
+    N_VALUES,
+    TRAIL_LENGTH,
+    GraphTables,
+    SolverMethod,
+)
 from stages.string_sampling.instantiation.transforms import compose, relative_transform
+from stages.strings.grammar_arrays import CompiledGrammar
+from stages.variations.growth.state import KnownContacts
+from stages.variations.kernels.outcomes import Outcome
+from stages.variations.kernels.structs import KitTables
 
-SOLVED, IMPOSSIBLE, BUDGET, NO_ROOM = 0, 1, 2, 3
-"""How it ended; IMPOSSIBLE: every way has been tried."""
-FINE, CONFLICT = 4, 5
-FAILS_A_NODE, MORE_FAILS = 4.0, 1.5
-"""A shape is begun anew after so many dead ends for each node, and after more of them each time."""
+NO_NODE = -1
+CONFLICTS_PER_NODE, RESTART_GROWTH = 4.0, 1.5
+"""Conflicts per node before a restart, and their growth at each restart."""
+LEAF_PENALTY = 1e6
+"""Added to domain sizes off all cycles, so that cycles come first."""
+
+
+class Problem(NamedTuple):
+    """What never changes during a search."""
+
+    kit: KitTables
+    placements: DockedPlacements
+    grammar: CompiledGrammar
+    contacts: KnownContacts
+    graph: GraphTables
+    guide: Guide
+    method: SolverMethod
+    reach: ChainReach
 
 
 @numba.njit(cache=True)
-def solve(rng, kit, candidates, rules, contacts, graph, guide, method, reach, s):
-    """Find a place for every node so that edges are contacts and nothing else touches. Where it stands is in `s`."""
-    s.counts[TRIES] = 0
-    s.weights[: len(graph.labels)] = 1.0
-    fails = FAILS_A_NODE * len(graph.labels)
+def solve(rng, problem, s):
+    """Place every node so that edges are contacts and nothing else touches. The placements are in `s.assigned`."""
+    s.counts[N_PLACEMENTS] = 0
+    s.weights[: len(problem.graph.labels)] = 1.0
+    max_conflicts = CONFLICTS_PER_NODE * len(problem.graph.labels)
     while True:
-        outcome = _attempt(rng, kit, candidates, rules, contacts, graph, guide, method, reach, s, np.int64(fails))
-        if outcome != CONFLICT:
+        outcome = _attempt(rng, problem, s, np.int64(max_conflicts))
+        if outcome != Outcome.CONFLICT:
             return outcome
-        fails *= MORE_FAILS
+        max_conflicts *= RESTART_GROWTH
 
 
 @numba.njit(cache=True)
-def _attempt(rng, kit, candidates, rules, contacts, graph, guide, method, reach, s, fails):
-    """One beginning. CONFLICT where it is given up."""
+def _attempt(rng, problem, s, max_conflicts):
+    """Search from one start. CONFLICT for a restart."""
+    graph, guide, method = problem.graph, problem.guide, problem.method
     n = len(graph.labels)
-    s.counts[VALUES] = 0
-    s.counts[PLACED] = 0
-    s.counts[TRAIL] = 0
-    s.counts[FAILS] = 0
-    s.first[:n] = -1
-    s.at[:n] = -1
-    s.near[:n] = 0
-    s.touch[:n] = False
+    s.counts[N_VALUES] = 0
+    s.counts[N_PLACED] = 0
+    s.counts[TRAIL_LENGTH] = 0
+    s.counts[N_CONFLICTS] = 0
+    s.domain_start[:n] = -1
+    s.assigned[:n] = -1
+    s.neighbours[:n] = 0
+    s.touches[:n] = False
     s.framed[:n] = False
     depth = 0
-    if not _seed(candidates, kit, graph, s, _root(rng, graph, guide, method, s)):
-        return NO_ROOM
-    outcome = FINE
+    if not _open_root(problem, s, _root(rng, problem, s)):
+        return Outcome.NO_ROOM
+    outcome = Outcome.OK
     while True:
-        if outcome == FINE:
-            if s.counts[PLACED] == n:
-                if method.whole or not method.checked or not method.ended or _all_complete(rules, graph, s):
-                    return SOLVED
-                outcome = CONFLICT
+        if outcome == Outcome.OK:
+            if s.counts[N_PLACED] == n:
+                if method.whole or not method.checked or not method.ended or _all_complete(problem, s):
+                    return Outcome.SOLVED
+                outcome = Outcome.CONFLICT
                 continue
-            node = _next(rng, kit, candidates, contacts, graph, method, reach, s)
-            if node == -1:
-                outcome = CONFLICT
+            outcome, node = _next(rng, problem, s)
+            if outcome == Outcome.NO_ROOM:
+                return Outcome.NO_ROOM
+            if outcome == Outcome.CONFLICT:
                 continue
-            if node == -2:
-                return NO_ROOM
             if method.checked and not method.whole:
-                _weigh(kit, rules, contacts, graph, s, node)
-                if s.left[node] == 0:
+                _score_by_contacts(problem, s, node)
+                if s.domain_size[node] == 0:
                     s.weights[node] += 1.0
-                    outcome = CONFLICT
+                    outcome = Outcome.CONFLICT
                     continue
             if len(guide.parents) > 0:
-                score_by_category(kit, guide, graph, s, node)
-            if s.counts[TRIES] == method.budget:
-                return BUDGET
-            s.counts[TRIES] += 1
-            value = _choose(rng, method, s, node)
-            s.decisions[depth, 0] = s.counts[TRAIL]
+                score_by_category(problem.kit, guide, graph, s, node)
+            if s.counts[N_PLACEMENTS] == method.budget:
+                return Outcome.BUDGET
+            s.counts[N_PLACEMENTS] += 1
+            value = _choose(rng, s, node)
+            s.decisions[depth, 0] = s.counts[TRAIL_LENGTH]
             s.decisions[depth, 1] = value
             depth += 1
-            outcome = _place(kit, candidates, contacts, graph, method, s, value)
+            outcome = _place(problem, s, value)
             if len(guide.parents) > 0:
-                propagate_frames(kit, guide, graph, s, value)
-            if outcome == NO_ROOM:
-                return NO_ROOM
+                propagate_frames(problem.kit, guide, graph, s, value)
+            if outcome == Outcome.NO_ROOM:
+                return Outcome.NO_ROOM
         else:
-            s.counts[FAILS] += 1
+            s.counts[N_CONFLICTS] += 1
             if depth == 0:
-                return IMPOSSIBLE if method.checked and method.constrained else CONFLICT
-            if not method.backtracks or s.counts[FAILS] > fails:
-                return CONFLICT
+                return Outcome.IMPOSSIBLE if method.checked and method.constrained else Outcome.CONFLICT
+            if not method.backtracks or s.counts[N_CONFLICTS] > max_conflicts:
+                return Outcome.CONFLICT
             depth -= 1
             _undo(graph, s, s.decisions[depth, 0])
             drop_frames(guide, s)
             value = s.decisions[depth, 1]
-            _strike(s, value)
-            outcome = FINE
-            if s.left[s.nodes[value]] == 0:
+            _prune(s, value)
+            outcome = Outcome.OK
+            if s.domain_size[s.nodes[value]] == 0:
                 s.weights[s.nodes[value]] += 1.0
-                outcome = CONFLICT
+                outcome = Outcome.CONFLICT
 
 
 @numba.njit(cache=True)
-def _root(rng, graph, guide, method, s):
-    """Where to begin: with a guide at the first node, else at random, or where it went wrong most often, on a cycle if
-    there is one."""
+def _root(rng, problem, s):
+    """Return the start: the first node with a guide; else random, or that with most conflicts, on a cycle if any."""
+    graph = problem.graph
     n = len(graph.labels)
-    if len(guide.parents) > 0:
+    if len(problem.guide.parents) > 0:
         return 0
-    if not method.constrained:
+    if not problem.method.constrained:
         return min(np.int64(rng.random() * n), n - 1)
     cyclic = graph.core.any()
-    best, most = -1, -1.0
+    best, best_weight = NO_NODE, -1.0
     for node in range(n):
         weight = s.weights[node] + rng.random()
-        if weight > most and (graph.core[node] or not cyclic):
-            best, most = node, weight
+        if weight > best_weight and (graph.core[node] or not cyclic):
+            best, best_weight = node, weight
     return best
 
 
 @numba.njit(cache=True)
-def _seed(candidates, kit, graph, s, node):
-    """The domain of the first node: a part of its label in any stance."""
-    label = graph.labels[node]
-    s.first[node] = 0
-    s.left[node] = 0
-    for stance in range(candidates.stance_starts[label], candidates.stance_starts[label + 1]):
-        if not _add_value(kit, candidates, s, node, stance, candidates.rests[stance], np.zeros(3)):
+def _open_root(problem, s, node):
+    """Open the domain of the first node: a part of its label in any orientation. False if there is no room."""
+    placements = problem.placements
+    label = problem.graph.labels[node]
+    s.domain_start[node] = 0
+    s.domain_size[node] = 0
+    for orientation in range(placements.orientation_starts[label], placements.orientation_starts[label + 1]):
+        if not _add_value(problem, s, node, orientation, placements.rests[orientation], np.zeros(3)):
             return False
-        s.left[node] += 1
-    s.last[node] = s.counts[VALUES]
+        s.domain_size[node] += 1
+    s.domain_end[node] = s.counts[N_VALUES]
     return True
 
 
 @numba.njit(cache=True)
-def _add_value(kit, candidates, s, node, stance, rotation, translation):
-    """A value at the end of all; False where there is no room."""
-    value = s.counts[VALUES]
+def _add_value(problem, s, node, orientation, rotation, translation):
+    """Append a value. False if there is no room."""
+    boxes = problem.kit.boxes
+    value = s.counts[N_VALUES]
     if value == len(s.types):
         return False
-    s.counts[VALUES] += 1
-    kind = candidates.stance_types[stance]
+    s.counts[N_VALUES] += 1
+    kind = problem.placements.orientation_types[orientation]
     s.types[value] = kind
-    s.stances[value] = stance
+    s.orientations[value] = orientation
     s.nodes[value] = node
     s.scores[value] = 0.0
-    s.alive[value] = True
+    s.in_domain[value] = True
     for i in range(3):
         centre, half = translation[i], 0.0
         for j in range(3):
             s.rotations[value, i, j] = rotation[i, j]
-            centre += rotation[i, j] * kit.boxes[kind, 0, j]
-            half += abs(rotation[i, j]) * kit.boxes[kind, 1, j]
+            centre += rotation[i, j] * boxes[kind, 0, j]
+            half += abs(rotation[i, j]) * boxes[kind, 1, j]
         s.translations[value, i] = translation[i]
         s.boxes[value, 0, i] = centre
         s.boxes[value, 1, i] = half
@@ -157,63 +206,65 @@ def _add_value(kit, candidates, s, node, stance, rotation, translation):
 
 
 @numba.njit(cache=True)
-def _next(rng, kit, candidates, contacts, graph, method, reach, s):
-    """The node that is put down next, its domain made; -1 where a domain is empty, -2 where there is no room."""
+def _next(rng, problem, s):
+    """Return OK and the next node to place, its domain open; or CONFLICT or NO_ROOM."""
+    graph, method = problem.graph, problem.method
     if not method.constrained:
-        return _random_next(rng, kit, candidates, contacts, graph, method, reach, s)
+        return _random_next(rng, problem, s)
     while True:
-        best, least = -1, np.inf
+        best, least = NO_NODE, np.inf
         for node in range(len(graph.labels)):
-            if s.first[node] >= 0 and s.at[node] < 0:
-                size = s.left[node] / s.weights[node]
-                if s.left[node] == 1:
+            if s.domain_start[node] >= 0 and s.assigned[node] < 0:
+                size = s.domain_size[node] / s.weights[node]
+                if s.domain_size[node] == 1:
                     size = 0.0
                 elif not graph.core[node]:
-                    size += 1e6
+                    size += LEAF_PENALTY
                 if size < least:
                     best, least = node, size
-        before = s.left[best]
+        before = s.domain_size[best]
         if method.closes and before > 1 and graph.core[best]:
-            _close(kit, candidates, graph, reach, s, best)
-            if s.left[best] == 0:
+            _prune_unclosable(problem, s, best)
+            if s.domain_size[best] == 0:
                 s.weights[best] += 1.0
-                return -1
-            if s.left[best] < before:
+                return Outcome.CONFLICT, best
+            if s.domain_size[best] < before:
                 continue
-        return best
+        return Outcome.OK, best
 
 
 @numba.njit(cache=True)
-def _random_next(rng, kit, candidates, contacts, graph, method, reach, s):
-    """A random node beside one that stands, with the domain that one of these gives it."""
-    n, found = len(graph.labels), 0
-    for each in range(n):
-        if s.first[each] >= 0 and s.at[each] < 0:
-            return each if s.left[each] > 0 else -1
-    node, parent = -1, -1
-    for each in range(n):
-        if s.at[each] >= 0:
-            for k in range(graph.starts[each], graph.starts[each + 1]):
-                if s.at[graph.ends[k]] < 0:
-                    found += 1
-                    if rng.random() * found < 1.0:
-                        node, parent = graph.ends[k], each
-    if not _make_domain(kit, candidates, contacts, graph, method, s, node, parent):
-        return -2
-    if method.closes and graph.core[node]:
-        _close(kit, candidates, graph, reach, s, node)
-    return node if s.left[node] > 0 else -1
+def _random_next(rng, problem, s):
+    """Return the same for a random node next to a placed one, which alone determines its domain."""
+    graph, method = problem.graph, problem.method
+    n, count = len(graph.labels), 0
+    for node in range(n):
+        if s.domain_start[node] >= 0 and s.assigned[node] < 0:
+            return (Outcome.OK if s.domain_size[node] > 0 else Outcome.CONFLICT), node
+    chosen, parent = NO_NODE, NO_NODE
+    for node in range(n):
+        if s.assigned[node] >= 0:
+            for k in range(graph.starts[node], graph.starts[node + 1]):
+                if s.assigned[graph.ends[k]] < 0:
+                    count += 1
+                    if rng.random() * count < 1.0:
+                        chosen, parent = graph.ends[k], node
+    if not _open_domain(problem, s, chosen, parent):
+        return Outcome.NO_ROOM, chosen
+    if method.closes and graph.core[chosen]:
+        _prune_unclosable(problem, s, chosen)
+    return (Outcome.OK if s.domain_size[chosen] > 0 else Outcome.CONFLICT), chosen
 
 
 @numba.njit(cache=True)
-def _choose(rng, method, s, node):
-    """The living value with the highest score, one at random of equals."""
-    best, most, ties = -1, -np.inf, 0
-    for value in range(s.first[node], s.last[node]):
-        if s.alive[value]:
-            if s.scores[value] > most:
-                best, most, ties = value, s.scores[value], 1
-            elif s.scores[value] == most:
+def _choose(rng, s, node):
+    """Return the value with the highest score, a random one of equals."""
+    best, best_score, ties = -1, -np.inf, 0
+    for value in range(s.domain_start[node], s.domain_end[node]):
+        if s.in_domain[value]:
+            if s.scores[value] > best_score:
+                best, best_score, ties = value, s.scores[value], 1
+            elif s.scores[value] == best_score:
                 ties += 1
                 if rng.random() * ties < 1.0:
                     best = value
@@ -221,53 +272,55 @@ def _choose(rng, method, s, node):
 
 
 @numba.njit(cache=True)
-def _make_domain(kit, candidates, contacts, graph, method, s, node, parent):
-    """The values of a node beside one that stands: those that no part is against. False where there is no room."""
-    s.trail[s.counts[TRAIL]] = -1 - len(s.at) - node
-    s.counts[TRAIL] += 1
-    s.first[node] = s.counts[VALUES]
-    s.last[node] = s.first[node]
-    s.left[node] = 0
-    base = s.at[parent]
-    labels = len(candidates.stance_starts) - 1
-    row = s.stances[base] * labels + graph.labels[node]
+def _open_domain(problem, s, node, parent):
+    """Open the domain of a node: placements docked to its parent that agree with all placed parts.
+
+    False if there is no room.
+    """
+    placements = problem.placements
+    _push_opened(s, node)
+    s.domain_start[node] = s.counts[N_VALUES]
+    s.domain_end[node] = s.domain_start[node]
+    s.domain_size[node] = 0
+    base = s.assigned[parent]
+    labels = len(placements.orientation_starts) - 1
+    row = s.orientations[base] * labels + problem.graph.labels[node]
     rotation, translation = np.empty((3, 3)), np.empty(3)
-    for candidate in range(candidates.starts[row], candidates.starts[row + 1]):
+    for placement in range(placements.starts[row], placements.starts[row + 1]):
         compose(
             s.rotations[base], s.translations[base],
-            candidates.rotations[candidate], candidates.translations[candidate], rotation, translation,
+            placements.rotations[placement], placements.translations[placement], rotation, translation,
         )  # fmt: skip
-        if not _add_value(kit, candidates, s, node, candidates.stances[candidate], rotation, translation):
+        if not _add_value(problem, s, node, placements.orientations[placement], rotation, translation):
             return False
-        value = s.counts[VALUES] - 1
-        good = True
-        if method.checked:
-            for k in range(s.counts[PLACED]):
-                if not _agrees(kit, contacts, graph, method, s, s.at[s.order[k]], value):
-                    good = False
+        value = s.counts[N_VALUES] - 1
+        agrees = True
+        if problem.method.checked:
+            for k in range(s.counts[N_PLACED]):
+                if not _agree(problem, s, s.assigned[s.order[k]], value):
+                    agrees = False
                     break
-        if good:
-            s.left[node] += 1
+        if agrees:
+            s.domain_size[node] += 1
         else:
-            s.counts[VALUES] -= 1
-    s.last[node] = s.counts[VALUES]
+            s.counts[N_VALUES] -= 1
+    s.domain_end[node] = s.counts[N_VALUES]
     return True
 
 
 @numba.njit(cache=True)
-def _agrees(kit, contacts, graph, method, s, placed, value):
-    """Whether a value goes with a part that stands."""
-    a, b = s.nodes[placed], s.nodes[value]
-    is_edge = graph.rows[a, b] >= 0
-    answer = _relation(kit, contacts, s, placed, value)
-    if answer < 0:
-        return answer == NO_CONTACT and not is_edge
-    return is_edge or not method.whole
+def _agree(problem, s, placed, value):
+    """Return whether a value agrees with a placed part: joined parts touch, and with all contacts no others."""
+    is_edge = problem.graph.rows[s.nodes[placed], s.nodes[value]] >= 0
+    relation = _relation(problem.kit, problem.contacts, s, placed, value)
+    if relation < 0:
+        return relation == NO_CONTACT and not is_edge
+    return is_edge or not problem.method.whole
 
 
 @numba.njit(cache=True)
 def _relation(kit, contacts, s, a, b):
-    """Return the contact of two values: NO_CONTACT, FORBIDDEN_CONTACT or, where they dock, a number from 0."""
+    """Return the contact of two values: NO_CONTACT, FORBIDDEN_CONTACT or, if they dock, a number from 0."""
     slack = 1.1 * kit.limits[1]
     for i in range(3):
         if abs(s.boxes[a, 0, i] - s.boxes[b, 0, i]) > s.boxes[a, 1, i] + s.boxes[b, 1, i] + slack:
@@ -279,120 +332,125 @@ def _relation(kit, contacts, s, a, b):
     quantize_pose(
         s.rotations[a], s.translations[a], s.rotations[b], s.translations[b], kit.reach[kind], kit.limits[2], quanta
     )
-    answer = look_up(contacts.keys, contacts.values, contact_key(s.types[a], kind, quanta))
-    if answer == UNKNOWN_CONTACT:
-        answer = call_oracle(contacts.oracle_address, a, b)
-    return answer
+    relation = look_up(contacts.keys, contacts.values, contact_key(s.types[a], kind, quanta))
+    if relation == UNKNOWN_CONTACT:
+        relation = call_oracle(contacts.oracle_address, a, b)
+    return relation
 
 
 @numba.njit(cache=True)
-def _place(kit, candidates, contacts, graph, method, s, value):
-    """Put a part down, hold what may come next against it, and find the domains of its neighbours."""
+def _place(problem, s, value):
+    """Place a part, prune open domains against it, and open the domains of its neighbours."""
+    graph, method = problem.graph, problem.method
     node = s.nodes[value]
-    s.trail[s.counts[TRAIL]] = -1 - node
-    s.counts[TRAIL] += 1
-    s.at[node] = value
-    s.order[s.counts[PLACED]] = node
-    s.counts[PLACED] += 1
+    _push_placed(s, node)
+    s.assigned[node] = value
+    s.order[s.counts[N_PLACED]] = node
+    s.counts[N_PLACED] += 1
     if method.checked and not method.whole:
-        _count_neighbours(kit, contacts, graph, s, value)
+        _count_neighbours(problem, s, value)
     if not method.constrained:
-        return FINE
+        return Outcome.OK
     for other in range(len(graph.labels)):
-        if s.first[other] >= 0 and s.at[other] < 0:
-            for each in range(s.first[other], s.last[other]):
-                if s.alive[each] and method.checked and not _agrees(kit, contacts, graph, method, s, value, each):
-                    _strike(s, each)
-            if s.left[other] == 0:
+        if s.domain_start[other] >= 0 and s.assigned[other] < 0:
+            for candidate in range(s.domain_start[other], s.domain_end[other]):
+                if s.in_domain[candidate] and method.checked and not _agree(problem, s, value, candidate):
+                    _prune(s, candidate)
+            if s.domain_size[other] == 0:
                 s.weights[other] += 1.0
-                return CONFLICT
+                return Outcome.CONFLICT
     for k in range(graph.starts[node], graph.starts[node + 1]):
         other = graph.ends[k]
-        if s.first[other] < 0:
-            if not _make_domain(kit, candidates, contacts, graph, method, s, other, node):
-                return NO_ROOM
-            if s.left[other] == 0:
+        if s.domain_start[other] < 0:
+            if not _open_domain(problem, s, other, node):
+                return Outcome.NO_ROOM
+            if s.domain_size[other] == 0:
                 s.weights[other] += 1.0
-                return CONFLICT
-    return FINE
+                return Outcome.CONFLICT
+    return Outcome.OK
 
 
 @numba.njit(cache=True)
-def _count_neighbours(kit, contacts, graph, s, value):
-    """Count what a part touches that was put down last."""
+def _count_neighbours(problem, s, value):
+    """Count the contacts of the part placed last."""
+    labels = problem.graph.labels
     node = s.nodes[value]
-    for k in range(s.counts[PLACED] - 1):
+    for k in range(s.counts[N_PLACED] - 1):
         other = s.order[k]
-        if _relation(kit, contacts, s, s.at[other], value) >= 0:
-            s.touch[node, other] = True
-            s.near[node, graph.labels[other]] += 1
-            s.near[other, graph.labels[node]] += 1
+        if _relation(problem.kit, problem.contacts, s, s.assigned[other], value) >= 0:
+            s.touches[node, other] = True
+            s.neighbours[node, labels[other]] += 1
+            s.neighbours[other, labels[node]] += 1
 
 
 @numba.njit(cache=True)
-def _weigh(kit, rules, contacts, graph, s, node):
-    """Strike the values of a node that touch parts as the grammar cannot admit; of the others those that touch most are
-    the best."""
-    label, labels = graph.labels[node], len(rules.counted)
+def _score_by_contacts(problem, s, node):
+    """Score the values of a node by their number of contacts; prune those whose contacts the grammar cannot admit."""
+    graph_labels = problem.graph.labels
+    label, labels = graph_labels[node], len(problem.grammar.counted)
     own, around = np.zeros(labels, dtype=np.int64), np.zeros(labels, dtype=np.int64)
-    for value in range(s.first[node], s.last[node]):
-        if not s.alive[value]:
+    for value in range(s.domain_start[node], s.domain_end[node]):
+        if not s.in_domain[value]:
             continue
-        touched, good = 0, True
+        contacts, fits = 0, True
         own[:] = 0
-        for k in range(s.counts[PLACED]):
+        for k in range(s.counts[N_PLACED]):
             other = s.order[k]
-            if _relation(kit, contacts, s, s.at[other], value) >= 0:
-                touched += 1
-                own[graph.labels[other]] += 1
-                for each in range(labels):
-                    around[each] = s.near[other, each]
+            if _relation(problem.kit, problem.contacts, s, s.assigned[other], value) >= 0:
+                contacts += 1
+                own[graph_labels[other]] += 1
+                for kind in range(labels):
+                    around[kind] = s.neighbours[other, kind]
                 around[label] += 1
-                if not _may_be_complete(rules, graph, s, other, node, around):
-                    good = False
+                if not _can_be_complete(problem, s, other, node, around):
+                    fits = False
                     break
-        if good and _may_be_complete(rules, graph, s, node, node, own):
-            s.scores[value] = touched
+        if fits and _can_be_complete(problem, s, node, node, own):
+            s.scores[value] = contacts
         else:
-            _strike(s, value)
+            _prune(s, value)
 
 
 @numba.njit(cache=True)
-def _may_be_complete(rules, graph, s, node, fresh, counts):
-    """Whether the neighbours `counts` by label that a node has, those that it must have yet, but for `fresh`, and any
-    others can be what the grammar asks for. Adds to `counts`."""
+def _can_be_complete(problem, s, node, fresh, counts):
+    """Return whether the grammar admits a neighbourhood with at least the neighbours of a node.
+
+    counts: those placed, by label; those of the graph that are not placed, but for `fresh`, are added to it.
+    """
+    graph = problem.graph
     for k in range(graph.starts[node], graph.starts[node + 1]):
         other = graph.ends[k]
-        if s.at[other] < 0 and other != fresh:
+        if s.assigned[other] < 0 and other != fresh:
             counts[graph.labels[other]] += 1
-    return _fits(rules, graph.labels[node], counts, False)
+    return _fits(problem.grammar, graph.labels[node], counts, False)
 
 
 @numba.njit(cache=True)
-def _all_complete(rules, graph, s):
-    """Whether every part has what the grammar asks for."""
+def _all_complete(problem, s):
+    """Return whether the grammar admits the neighbourhood of every part."""
+    labels = problem.graph.labels
     wrong = 0
-    for node in range(len(graph.labels)):
-        wrong += not _fits(rules, graph.labels[node], s.near[node], True)
+    for node in range(len(labels)):
+        wrong += not _fits(problem.grammar, labels[node], s.neighbours[node], True)
     return wrong == 0
 
 
 @numba.njit(cache=True)
-def _fits(rules, label, counts, complete):
-    """Whether neighbours by label fit a pattern of the rules; unless they are `complete`, with others besides."""
-    labels, total = len(rules.counted), 0
-    for each in range(labels):
-        if rules.counted[each]:
-            total += counts[each]
-    for pattern in range(rules.first[label], rules.first[label + 1]):
-        lacking, good = 0, True
-        for each in range(labels):
-            if counts[each] > rules.high[pattern, each]:
-                good = False
+def _fits(grammar, label, counts, complete):
+    """Return whether neighbours by label fit a pattern; unless `complete`, together with any others."""
+    labels, total = len(grammar.counted), 0
+    for kind in range(labels):
+        if grammar.counted[kind]:
+            total += counts[kind]
+    for pattern in range(grammar.first[label], grammar.first[label + 1]):
+        lacking, fits = 0, True
+        for kind in range(labels):
+            if counts[kind] > grammar.high[pattern, kind]:
+                fits = False
                 break
-            lacking += max(rules.low[pattern, each] - counts[each], 0)
-        size = rules.size[pattern]
-        if not good or (complete and lacking > 0):
+            lacking += max(grammar.low[pattern, kind] - counts[kind], 0)
+        size = grammar.size[pattern]
+        if not fits or (complete and lacking > 0):
             continue
         if size < 0 or total + lacking == size or (not complete and total + lacking < size):
             return True
@@ -400,87 +458,130 @@ def _fits(rules, label, counts, complete):
 
 
 @numba.njit(cache=True)
-def _close(kit, candidates, graph, reach, s, node):
-    """Strike the values of a node from which no chain of parts leads to where the shortest way along nodes that do not
-    stand yet ends."""
+def _prune_unclosable(problem, s, node):
+    """Prune the values of a node from which no chain of parts closes its shortest cycle of unplaced nodes."""
+    graph = problem.graph
     n = len(graph.labels)
     before = s.before
     before[:n] = -1
     before[node] = node
     s.queue[0] = node
-    head, tail, end, link = 0, 1, -1, -1
+    head, tail, end, link = 0, 1, NO_NODE, NO_NODE
     while head < tail and end < 0:
-        each = s.queue[head]
+        reached = s.queue[head]
         head += 1
-        for k in range(graph.starts[each], graph.starts[each + 1]):
+        for k in range(graph.starts[reached], graph.starts[reached + 1]):
             other = graph.ends[k]
-            if s.at[other] >= 0:
-                if each != node:
-                    end, link = other, each
+            if s.assigned[other] >= 0:
+                if reached != node:
+                    end, link = other, reached
                     break
             elif graph.core[other] and before[other] < 0:
-                before[other] = each
+                before[other] = reached
                 s.queue[tail] = other
                 tail += 1
     if end < 0:
         return
-    sequence = np.empty(LONGEST + 1, dtype=np.int64)
+    sequence = np.empty(MAX_CHAIN_LENGTH + 1, dtype=np.int64)
     length = 0
-    while length <= LONGEST:
+    while length <= MAX_CHAIN_LENGTH:
         sequence[length] = graph.labels[link]
         length += 1
         if link == node:
             break
         link = before[link]
-    base = s.at[end]
+    base = s.assigned[end]
     rotation, translation = np.empty((3, 3)), np.empty(3)
-    for value in range(s.first[node], s.last[node]):
-        if not s.alive[value]:
+    for value in range(s.domain_start[node], s.domain_end[node]):
+        if not s.in_domain[value]:
             continue
         relative_transform(
             s.rotations[base], s.translations[base], s.rotations[value], s.translations[value], rotation, translation
         )
         if not can_reach(
-            kit, candidates, reach, s.stances[base], sequence, length, s.stances[value], rotation, translation
-        ):
-            _strike(s, value)
+            problem.kit, problem.placements, problem.reach,
+            s.orientations[base], sequence, length, s.orientations[value], rotation, translation,
+        ):  # fmt: skip
+            _prune(s, value)
 
 
 @numba.njit(cache=True)
-def _strike(s, value):
+def _prune(s, value):
     """Take a value out of its domain."""
-    s.alive[value] = False
-    s.left[s.nodes[value]] -= 1
-    s.trail[s.counts[TRAIL]] = value
-    s.counts[TRAIL] += 1
+    s.in_domain[value] = False
+    s.domain_size[s.nodes[value]] -= 1
+    _push_pruned(s, value)
 
 
 @numba.njit(cache=True)
 def _undo(graph, s, length):
-    """Take back everything since the trail was so long."""
-    most = len(s.at)
-    while s.counts[TRAIL] > length:
-        s.counts[TRAIL] -= 1
-        entry = s.trail[s.counts[TRAIL]]
-        if entry >= 0:
-            s.alive[entry] = True
-            s.left[s.nodes[entry]] += 1
-        elif entry >= -most:
-            _take_off(graph, s, -1 - entry)
+    """Undo everything since the trail had some length."""
+    while s.counts[TRAIL_LENGTH] > length:
+        s.counts[TRAIL_LENGTH] -= 1
+        entry = s.trail[s.counts[TRAIL_LENGTH]]
+        if _is_pruned(entry):
+            s.in_domain[entry] = True
+            s.domain_size[s.nodes[entry]] += 1
+        elif _is_placed(s, entry):
+            _remove(graph, s, _placed_node(entry))
         else:
-            node = -1 - most - entry
-            s.counts[VALUES] = s.first[node]
-            s.first[node] = -1
+            node = _opened_node(s, entry)
+            s.counts[N_VALUES] = s.domain_start[node]
+            s.domain_start[node] = -1
 
 
 @numba.njit(cache=True)
-def _take_off(graph, s, node):
-    """Take the part that was put down last away."""
-    s.at[node] = -1
-    s.counts[PLACED] -= 1
-    for k in range(s.counts[PLACED]):
+def _remove(graph, s, node):
+    """Remove the part placed last."""
+    s.assigned[node] = -1
+    s.counts[N_PLACED] -= 1
+    for k in range(s.counts[N_PLACED]):
         other = s.order[k]
-        if s.touch[node, other]:
-            s.touch[node, other] = False
-            s.near[node, graph.labels[other]] -= 1
-            s.near[other, graph.labels[node]] -= 1
+        if s.touches[node, other]:
+            s.touches[node, other] = False
+            s.neighbours[node, graph.labels[other]] -= 1
+            s.neighbours[other, graph.labels[node]] -= 1
+
+
+# Encoding of the trail: a pruned value is its row, a placed node -1 - node, an opened one -1 - len(assigned) - node.
+
+
+@numba.njit(cache=True)
+def _push(s, entry):
+    s.trail[s.counts[TRAIL_LENGTH]] = entry
+    s.counts[TRAIL_LENGTH] += 1
+
+
+@numba.njit(cache=True)
+def _push_pruned(s, value):
+    _push(s, value)
+
+
+@numba.njit(cache=True)
+def _push_placed(s, node):
+    _push(s, -1 - node)
+
+
+@numba.njit(cache=True)
+def _push_opened(s, node):
+    _push(s, -1 - len(s.assigned) - node)
+
+
+@numba.njit(cache=True)
+def _is_pruned(entry):
+    return entry >= 0
+
+
+@numba.njit(cache=True)
+def _is_placed(s, entry):
+    return -len(s.assigned) <= entry < 0
+
+
+@numba.njit(cache=True)
+def _placed_node(entry):
+    return -1 - entry
+
+
+@numba.njit(cache=True)
+def _opened_node(s, entry):
+    return -1 - len(s.assigned) - entry

@@ -1,7 +1,7 @@
-"""What the solver works on: the graph to be put together, how it is to go about it, and the shape in hand.
+"""The data of the solver: the graph, the method, and the state of the search.
 
-A *value* is a place for a part: a stance with a pose. The values of a node, once one of its neighbours stands, are its
-domain. Values are made and taken back like a stack, and so is everything else, along a trail.
+A value is a placement of a node: an oriented part type with a pose. The values of a node are its domain, which exists
+once a neighbour is placed. Values are appended and removed like a stack, along the trail of `solver`.
 """
 
 from __future__ import annotations
@@ -12,74 +12,68 @@ import numpy as np
 
 from stages.shape.arrays import IntArray
 
-VALUES, PLACED, TRAIL, TRIES, FAILS = range(5)
-"""Places in `Solving.counts`: numbers of values, parts that stand, entries of the trail, parts that were put somewhere,
-and dead ends."""
+N_VALUES, N_PLACED, TRAIL_LENGTH, N_PLACEMENTS, N_CONFLICTS = range(5)
+"""Indices of `SolverState.counts`."""
 
 
 class SolverMethod(NamedTuple):
-    """How to go about it. checked: parts are checked as they are put down; constrained: the node with fewest values is
-    next, and the values of all that may be next are held against every part that stands; else a random one;
-    backtracks: dead ends are taken back, step by step; else the shape is begun anew; closes: values from which a cycle
-    cannot be closed any more are not tried; whole: the graph tells of all contacts; ended: every part has all that the
-    grammar asks for beside it, or else, where the graph is not whole, may still get it; budget: parts put down at most.
-    """
+    """Steps of the solver; those that can be turned off are for comparison."""
 
-    checked: bool = True
-    constrained: bool = True
-    backtracks: bool = True
-    closes: bool = True
-    whole: bool = True
-    ended: bool = True
-    budget: int = 4000
+    checked: bool = True  # parts are checked when placed; else once all are
+    constrained: bool = (
+        True  # the node with the fewest values is next, and all open domains are pruned; else a random one
+    )
+    backtracks: bool = True  # conflicts are undone; else the search restarts
+    closes: bool = True  # values from which a cycle cannot close are pruned
+    whole: bool = True  # the graph has all contacts
+    ended: bool = True  # a part must have a complete neighbourhood, if the graph has only some contacts
+    budget: int = 4000  # placements at most
 
 
 STANDARD_METHOD = SolverMethod()
 
 
 class GraphTables(NamedTuple):
-    """labels int64 (n,); starts int64 (n + 1,), ends int64 (2 m,): neighbours of each node; rows int32 (n, n): the edge
-    between two nodes, or -1; core bool (n,): nodes on cycles or between them.
-    """
+    """A graph of n nodes and m edges."""
 
-    labels: np.ndarray
-    starts: np.ndarray
-    ends: np.ndarray
-    rows: np.ndarray
-    core: np.ndarray
+    labels: np.ndarray  # int64 (n,)
+    starts: np.ndarray  # int64 (n + 1,): neighbours of node i are ends[starts[i] : starts[i + 1]]
+    ends: np.ndarray  # int64 (2 m,)
+    rows: np.ndarray  # int32 (n, n): the edge of two nodes, or -1
+    core: np.ndarray  # bool (n,): nodes on cycles, or between them
 
 
 class SolverState(NamedTuple):
-    """The shape in hand."""
+    """The state of a search over n nodes, with room for v values."""
 
-    types: np.ndarray  # int64 (v,) of the values
-    stances: np.ndarray  # int64 (v,)
+    types: np.ndarray  # int64 (v,): part type of each value
+    orientations: np.ndarray  # int64 (v,)
     rotations: np.ndarray  # float64 (v, 3, 3)
     translations: np.ndarray  # float64 (v, 3)
     boxes: np.ndarray  # float64 (v, 2, 3): centre and half extents
     nodes: np.ndarray  # int64 (v,)
-    scores: np.ndarray  # float64 (v,)
-    alive: np.ndarray  # bool (v,)
-    first: np.ndarray  # int64 (n,): first value of each node's domain, or -1
-    last: np.ndarray  # int64 (n,): end of the domain
-    left: np.ndarray  # int64 (n,): living values
-    at: np.ndarray  # int64 (n,): the value where the node stands, or -1
-    order: np.ndarray  # int64 (n,): nodes that stand, in order
-    weights: np.ndarray  # float64 (n,): how often it went wrong there
-    trail: np.ndarray  # int64 (t,): values struck; -1 - n for nodes put down; -1 - most - n for domains made
-    decisions: np.ndarray  # int64 (d, 2): length of the trail before, and the value chosen
-    near: np.ndarray  # int64 (n, labels): of the parts that stand, neighbours by label
-    touch: np.ndarray  # bool (n, n): a part that stands touches one that stood before
-    framed: np.ndarray  # bool (n,): it has a frame
+    scores: np.ndarray  # float64 (v,): the value with the highest score is tried first
+    in_domain: np.ndarray  # bool (v,): not pruned
+    domain_start: np.ndarray  # int64 (n,): first value of the node, or -1 without a domain
+    domain_end: np.ndarray  # int64 (n,)
+    domain_size: np.ndarray  # int64 (n,): values in the domain
+    assigned: np.ndarray  # int64 (n,): value of the placed node, or -1
+    order: np.ndarray  # int64 (n,): placed nodes, in order
+    weights: np.ndarray  # float64 (n,): 1 + conflicts at the node
+    trail: np.ndarray  # int64 (v + 2 n,)
+    decisions: np.ndarray  # int64 (n, 2): length of the trail before the decision, and its value
+    neighbours: np.ndarray  # int64 (n, labels): placed neighbours by label
+    touches: np.ndarray  # bool (n, n): a placed part touches one placed before
+    framed: np.ndarray  # bool (n,): the node has a frame
     frame_rotations: np.ndarray  # float64 (n, 3, 3)
     frame_translations: np.ndarray  # float64 (n, 3)
-    queue: np.ndarray  # int64 (n,) scratch
-    before: np.ndarray  # int64 (n,) scratch
+    queue: np.ndarray  # int64 (n,), scratch
+    before: np.ndarray  # int64 (n,), scratch
     counts: np.ndarray  # int64 (5,)
 
 
 def graph_tables(labels: np.ndarray, edges: IntArray) -> GraphTables:
-    """A graph of labels (n,) and edges (m, 2), i < j, for the solver."""
+    """Return the tables of a graph with labels (n,) and edges (m, 2), i < j."""
     n, pairs = len(labels), np.asarray(edges, dtype=np.int64).reshape(-1, 2)
     tails, heads = np.concatenate([pairs, pairs[:, ::-1]]).T
     order = np.lexsort((heads, tails))
@@ -95,7 +89,7 @@ def graph_tables(labels: np.ndarray, edges: IntArray) -> GraphTables:
 
 
 def _core(rows: np.ndarray) -> np.ndarray:
-    """The nodes that are left when leaves are taken away again and again, bool (n,)."""
+    """Return the nodes that remain when leaves are removed repeatedly, bool (n,)."""
     joined = rows >= 0
     core = np.ones(len(rows), dtype=np.bool_)
     while True:
@@ -106,26 +100,26 @@ def _core(rows: np.ndarray) -> np.ndarray:
 
 
 def new_state(nodes: int, labels: int, values: int) -> SolverState:
-    """Room for graphs of so many nodes of a kit with so many labels, and for so many values."""
+    """Return a state with room for some number of nodes, labels and values."""
     return SolverState(
         types=np.zeros(values, dtype=np.int64),
-        stances=np.zeros(values, dtype=np.int64),
+        orientations=np.zeros(values, dtype=np.int64),
         rotations=np.zeros((values, 3, 3)),
         translations=np.zeros((values, 3)),
         boxes=np.zeros((values, 2, 3)),
         nodes=np.zeros(values, dtype=np.int64),
         scores=np.zeros(values),
-        alive=np.zeros(values, dtype=np.bool_),
-        first=np.full(nodes, -1, dtype=np.int64),
-        last=np.zeros(nodes, dtype=np.int64),
-        left=np.zeros(nodes, dtype=np.int64),
-        at=np.full(nodes, -1, dtype=np.int64),
+        in_domain=np.zeros(values, dtype=np.bool_),
+        domain_start=np.full(nodes, -1, dtype=np.int64),
+        domain_end=np.zeros(nodes, dtype=np.int64),
+        domain_size=np.zeros(nodes, dtype=np.int64),
+        assigned=np.full(nodes, -1, dtype=np.int64),
         order=np.zeros(nodes, dtype=np.int64),
         weights=np.ones(nodes),
         trail=np.zeros(values + 2 * nodes, dtype=np.int64),
         decisions=np.zeros((nodes, 2), dtype=np.int64),
-        near=np.zeros((nodes, labels), dtype=np.int64),
-        touch=np.zeros((nodes, nodes), dtype=np.bool_),
+        neighbours=np.zeros((nodes, labels), dtype=np.int64),
+        touches=np.zeros((nodes, nodes), dtype=np.bool_),
         framed=np.zeros(nodes, dtype=np.bool_),
         frame_rotations=np.zeros((nodes, 3, 3)),
         frame_translations=np.zeros((nodes, 3)),

@@ -1,4 +1,4 @@
-"""Rigid motions in kernels: one after another, and one seen from another."""
+"""Rigid transforms in kernels."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numba
 
 @numba.njit(cache=True)
 def compose(rotation, translation, then_rotation, then_translation, out_rotation, out_translation):
-    """Put the pose of what stands at a second pose in the coordinates of a first into the last two arguments."""
+    """Write the product of two transforms to the last two arguments."""
     for i in range(3):
         out_translation[i] = translation[i]
         for k in range(3):
@@ -21,7 +21,7 @@ def compose(rotation, translation, then_rotation, then_translation, out_rotation
 
 @numba.njit(cache=True)
 def relative_transform(rotation, translation, other_rotation, other_translation, out_rotation, out_translation):
-    """Put a second pose in the coordinates of a first into the last two arguments."""
+    """Write a second pose in coordinates of a first to the last two arguments."""
     for i in range(3):
         out_translation[i] = 0.0
         for k in range(3):

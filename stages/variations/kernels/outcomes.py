@@ -28,6 +28,12 @@ class _Outcomes(NamedTuple):
     """A domain is empty: the last decision must be undone."""
     NO_ROOM: int = 13
     """An array is full."""
+    SOLVED: int = 14
+    """Every node of a graph is placed."""
+    IMPOSSIBLE: int = 15
+    """The search space is exhausted."""
+    BUDGET: int = 16
+    """The work allowed is used up."""
 
 
 Outcome = _Outcomes()

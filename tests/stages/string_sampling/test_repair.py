@@ -1,4 +1,4 @@
-"""Strings that no shape has are told by their first wrong token, and written anew from there."""
+"""Impossible strings are repaired from their first impossible token."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from stages.training.string_vae.trained import TrainedStringVae, load_string_vae
 from tests.stages.string_sampling.trained_model import publish_model
 from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
-LOOSE = STANDARD_METHOD._replace(whole=False)
+PARTIAL_CONTACTS = STANDARD_METHOD._replace(whole=False)
 
 
 @pytest.fixture(scope="module")
@@ -28,53 +28,56 @@ def roads() -> Instantiator:
 
 @pytest.fixture
 def model(roads: Instantiator, tmp_path: Path) -> TrainedStringVae:
-    return load_string_vae(publish_model(tmp_path, "learnt", roads.kit, ["AA"]))
+    return load_string_vae(publish_model(tmp_path, "parent", roads.kit, ["AA"]))
 
 
-def place_of(roads: Instantiator, names: str) -> int | None:
-    """first_impossible of a string of `c`orners and `s`traight tiles."""
+def first_impossible(roads: Instantiator, names: str) -> int | None:
+    """Return the first impossible token of a string of `c`orners and `s`traight tiles."""
     alphabet = make_alphabet(roads.kit.labels)
-    tokens = {each[0]: token for each, token in zip(roads.kit.labels, alphabet.tokens, strict=True)}
-    string = "".join(tokens.get(each, each) for each in names)
-    return first_impossible_token(roads, decode(string, alphabet), LOOSE, 0)
+    tokens = {label[0]: token for label, token in zip(roads.kit.labels, alphabet.tokens, strict=True)}
+    string = "".join(tokens.get(name, name) for name in names)
+    return first_impossible_token(roads, decode(string, alphabet), PARTIAL_CONTACTS, 0)
 
 
 @pytest.mark.parametrize(
-    ("names", "place"),
+    ("names", "index"),
     [
         ("c0scscscs0", None),
         ("c0scssscscsss0", None),
         ("cscscs", 5),  # has ends
-        ("c", 0),  # stands alone
+        ("c", 0),  # has no neighbour
         ("c0scscs0", 7),  # a triangle
-        ("c0scscscss0", 9),  # where it began
-        ("c0scs0cs", 5),  # closes at once, and goes on
+        ("c0scscscss0", 9),  # back at the start
+        ("c0scs0cs", 5),  # closes at once, and continues
     ],
 )
-def test_the_first_token_that_no_arrangement_allows(roads: Instantiator, names: str, place: int | None) -> None:
-    assert place_of(roads, names) == place
+def test_first_impossible_token_is_found(roads: Instantiator, names: str, index: int | None) -> None:
+    assert first_impossible(roads, names) == index
 
 
-def test_what_goes_wrong_goes_on_otherwise_from_its_first_wrong_token(
-    roads: Instantiator, model: TrainedStringVae
-) -> None:
+def test_repair_changes_a_string_from_its_first_impossible_token(roads: Instantiator, model: TrainedStringVae) -> None:
     found = sample(model, "prior", ["AA"], 12, np.random.default_rng(0), 1.0)
-    drawn = [each.string or "" for each in found]
-    places = [first_impossible_token(roads, decode(each, model.vocabulary.alphabet), LOOSE, 0) for each in drawn]
-    assert sum(place is not None for place in places) > 6
-    once = [each or "" for each in repair_strings(model, found, roads, LOOSE, 1, 0)]
+    sampled = [result.string or "" for result in found]
+    indices = [
+        first_impossible_token(roads, decode(string, model.vocabulary.alphabet), PARTIAL_CONTACTS, 0)
+        for string in sampled
+    ]
+    assert sum(index is not None for index in indices) > 6
+    once = [string or "" for string in repair_strings(model, found, roads, PARTIAL_CONTACTS, 1, 0)]
     kept = 0
-    for before, after, place in zip(drawn, once, places, strict=True):
+    for before, after, index in zip(sampled, once, indices, strict=True):
         assert model.is_valid(after)
-        assert (before == after) == (place is None)
-        if place is not None:
-            one, other = (model.vocabulary.codes(each).tolist() for each in (before, after))
-            kept += one[:place] == other[:place] and one[place : place + 1] != other[place : place + 1]
-    assert kept > 6  # others came to a dead end and went farther back
-    assert repair_strings(model, found, roads, LOOSE, 1, 0) == once
-    assert repair_strings(model, found, roads, LOOSE, 0, 0) == drawn
-    assert repair_strings(model, [LatentSearchResult(None, 1, 0, found[0].point)], roads, LOOSE, 8, 0) == [None]
+        assert (before == after) == (index is None)
+        if index is not None:
+            old, new = (model.vocabulary.codes(string).tolist() for string in (before, after))
+            kept += old[:index] == new[:index] and old[index : index + 1] != new[index : index + 1]
+    assert kept > 6  # others reached a dead end and were cut farther back
+    assert repair_strings(model, found, roads, PARTIAL_CONTACTS, 1, 0) == once
+    assert repair_strings(model, found, roads, PARTIAL_CONTACTS, 0, 0) == sampled
+    assert repair_strings(model, [LatentSearchResult(None, 1, 0, found[0].point)], roads, PARTIAL_CONTACTS, 8, 0) == [
+        None
+    ]
     lone = model.vocabulary.alphabet.tokens[0]
-    (other,) = repair_strings(model, [LatentSearchResult(lone, 1, 1, found[0].point)], roads, LOOSE, 1, 0)
+    (other,) = repair_strings(model, [LatentSearchResult(lone, 1, 1, found[0].point)], roads, PARTIAL_CONTACTS, 1, 0)
     assert other is not None
     assert not other.startswith(lone)

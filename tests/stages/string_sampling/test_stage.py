@@ -1,10 +1,9 @@
-"""Dreaming on the real mill: chains of links that a model wrote, from its weights to a verified dataset."""
+"""String sampling on the real pipeline: chains of links from a model's weights to a verified dataset."""
 
 from __future__ import annotations
 
 import json
 import shutil
-from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
@@ -29,19 +28,19 @@ from tests.toy_kits.chains_and_rings import CHAIN, chain, write_model
 
 pytestmark = pytest.mark.slow
 
-SOURCE = {"dataset": "learnt", "model": "tiny", "kit": "chain", "samples": 8, "way": "prior", "temperature": 1.0}
-"""A model that has learnt one string: where training strings stand there is but a point."""
+SOURCE = {"dataset": "parent", "model": "tiny", "kit": "chain", "samples": 8, "sampling": "prior", "temperature": 1.0}
+"""A model trained on one string, whose Gaussian would be a point."""
 STAGES = ("autoconfig", "exemplars", "variations", "programs", "shapeassembly", "string_sampling")
-SERVED = ("validity", "strings", "points", "sketches", "package")
+FINISHING = ("validity", "strings", "points", "sketches", "package")
 
 
 def write_config(folder: Path, samples_per_kit: int = 0, **string_sampling: Any) -> Path:
-    """The config of a dataset of dreamt chains; the exemplars have two links and three."""
+    """Write the config of a dataset of generated chains; the exemplars have two links and three."""
     paths = [write_model(folder / f"chain{links}.glb", CHAIN, chain(links)) for links in (2, 3)]
     kit = stated({"name": "chain", "shapes": paths, "contact": {"kinds": ["face"]}, "parts": "nodes"})
-    settings = {"sources": [SOURCE], "draws": 24, "lanes": 2, "splits": {"shards": 1}, **string_sampling}
+    settings = {"sources": [SOURCE], "draws": 24, "parallel_searches": 2, "splits": {"shards": 1}, **string_sampling}
     config = {
-        "name": "dreamt",
+        "name": "sampled",
         "seed": 3,
         "license": "MIT",
         "exemplars": {"kits": [kit]},
@@ -51,7 +50,7 @@ def write_config(folder: Path, samples_per_kit: int = 0, **string_sampling: Any)
         "sketches": {"size": 64, "backend": "raster", "views": [{"name": "front"}]},
         "package": {"previewed": 4},
     }
-    path = folder / "dreamt.yaml"
+    path = folder / "sampled.yaml"
     path.write_text(yaml.safe_dump(config))
     return path
 
@@ -87,135 +86,135 @@ def with_kit(bare: Path, folder: Path) -> Path:
 
 
 def kit_in(out: Path) -> Kit:
-    return dataset_kits(DatasetPaths(out, "dreamt"))["chain"]
+    return dataset_kits(DatasetPaths(out, "sampled"))["chain"]
 
 
 def samples(out: Path) -> list[Sample]:
-    root = DatasetPaths(out, "dreamt").stage("string_sampling").root
-    return [each for path in sorted(root.glob("dreamt-*-0*.tar")) for each in read_samples(path)]
+    root = DatasetPaths(out, "sampled").stage("string_sampling").root
+    return [sample for path in sorted(root.glob("sampled-*-0*.tar")) for sample in read_samples(path)]
 
 
 @pytest.fixture(scope="module")
-def dreamt(bare: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """What a model that has learnt from a chain of four links has dreamt, and all that was printed."""
-    folder = with_kit(bare, tmp_path_factory.mktemp("dreamt"))
-    publish_model(folder, "learnt", kit_in(folder), [string_of(4)])
-    code, said = run(bare / "dreamt.yaml", folder, *STAGES[2:])
+def sampled(bare: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """Sample from a model trained on a chain of four links; return the folder and all that was printed."""
+    folder = with_kit(bare, tmp_path_factory.mktemp("sampled"))
+    publish_model(folder, "parent", kit_in(folder), [string_of(4)])
+    code, said = run(bare / "sampled.yaml", folder, *STAGES[2:])
     assert code == 0, said
     return folder, said
 
 
-def test_shapes_are_new_different_and_say_where_they_are_from(dreamt: tuple[Path, str]) -> None:
-    folder, said = dreamt
+def test_shapes_are_new_distinct_and_have_a_lineage(sampled: tuple[Path, str]) -> None:
+    folder, said = sampled
     found, alphabet = samples(folder), make_alphabet(kit_in(folder).labels)
     assert len(found) == 8
-    assert len({each.graph for each in found}) == len({each.key for each in found}) == 8
-    assert not {string_of(links) for links in (2, 3, 4)} & {each.lineage["string"] for each in found}
-    weights = file_digest(folder / "learnt-models/tiny-chain-0/weights.safetensors")
-    for each in found:
-        decoded = decode(each.lineage["string"], alphabet)
-        assert graph_digest(decoded.types, decoded.edges) == each.graph
-        assert each.lineage["known"] == "new"
-        assert each.lineage["weights"] == weights
-        assert each.lineage["model"] == "learnt/tiny-chain-0"
-        assert each.lineage["tries"] >= len(each.assembly)
-    assert "as many as wanted" in said
+    assert len({sample.graph for sample in found}) == len({sample.key for sample in found}) == 8
+    assert not {string_of(links) for links in (2, 3, 4)} & {sample.lineage["string"] for sample in found}
+    weights = file_digest(folder / "parent-models/tiny-chain-0/weights.safetensors")
+    for sample in found:
+        decoded = decode(sample.lineage["string"], alphabet)
+        assert graph_digest(decoded.types, decoded.edges) == sample.graph
+        assert sample.lineage["novelty"] == "new"
+        assert sample.lineage["weights"] == weights
+        assert sample.lineage["model"] == "parent/tiny-chain-0"
+        assert sample.lineage["placements"] >= len(sample.assembly)
+    assert "all shapes found" in said
 
 
-def test_what_is_refused_is_counted_by_its_reason(dreamt: tuple[Path, str]) -> None:
-    records = DatasetPaths(dreamt[0], "dreamt").stage("string_sampling").records
-    lanes = [json.loads(path.read_bytes()) for path in sorted(records.glob("s00-*-lane*.json"))]
-    refused = {reason for lane in lanes for reason in lane["rejects"]}
+def test_rejects_are_counted_by_reason(sampled: tuple[Path, str]) -> None:
+    records = DatasetPaths(sampled[0], "sampled").stage("string_sampling").records
+    workers = [json.loads(path.read_bytes()) for path in sorted(records.glob("s00-*-worker*.json"))]
+    refused = {reason for worker in workers for reason in worker["rejects"]}
     assert {"known: train", "duplicate"} <= refused
-    for lane in lanes:
-        assert lane["summary"]["found"] + sum(lane["rejects"].values()) == lane["summary"]["drawn"]
+    for worker in workers:
+        assert worker["summary"]["found"] + sum(worker["rejects"].values()) == worker["summary"]["drawn"]
 
 
-def test_bytes_are_the_same_with_two_workers(dreamt: tuple[Path, str], bare: Path, tmp_path: Path) -> None:
-    publish_model(with_kit(bare, tmp_path), "learnt", kit_in(tmp_path), [string_of(4)])
-    assert run(bare / "dreamt.yaml", tmp_path, *STAGES[2:], workers=2)[0] == 0
-    one, two = (made(folder / ".work/dreamt/string_sampling") for folder in (dreamt[0], tmp_path))
+def test_bytes_do_not_depend_on_workers(sampled: tuple[Path, str], bare: Path, tmp_path: Path) -> None:
+    publish_model(with_kit(bare, tmp_path), "parent", kit_in(tmp_path), [string_of(4)])
+    assert run(bare / "sampled.yaml", tmp_path, *STAGES[2:], workers=2)[0] == 0
+    one, two = (made(folder / ".work/sampled/string_sampling") for folder in (sampled[0], tmp_path))
     assert one == two
 
 
-def test_known_shapes_are_kept_and_marked_where_they_are_asked_for(bare: Path, tmp_path: Path) -> None:
-    config = write_config(tmp_path, known="keep", rounds=2)
-    kit = dataset_kits(DatasetPaths(bare, "dreamt"))["chain"]
-    publish_model(tmp_path, "learnt", kit, [string_of(4)])
+def test_known_shapes_can_be_kept_and_are_marked(bare: Path, tmp_path: Path) -> None:
+    config = write_config(tmp_path, duplicates="keep", max_rounds=2)
+    kit = dataset_kits(DatasetPaths(bare, "sampled"))["chain"]
+    publish_model(tmp_path, "parent", kit, [string_of(4)])
     assert run(config, tmp_path, *STAGES)[0] == 0
-    marks = {each.lineage["string"]: each.lineage["known"] for each in samples(tmp_path)}
+    marks = {sample.lineage["string"]: sample.lineage["novelty"] for sample in samples(tmp_path)}
     assert marks[string_of(4)] == "train"
     assert {marks.get(string_of(links), "exemplar") for links in (2, 3)} == {"exemplar"}
     assert "new" in marks.values()
 
 
-def test_dreamt_shapes_go_the_whole_way(dreamt: tuple[Path, str], bare: Path) -> None:
-    folder, config = dreamt[0], bare / "dreamt.yaml"
-    code, said = run(config, folder, *SERVED)
+def test_generated_shapes_become_a_verified_dataset(sampled: tuple[Path, str], bare: Path) -> None:
+    folder, config = sampled[0], bare / "sampled.yaml"
+    code, said = run(config, folder, *FINISHING)
     assert code == 0, said
     code, said = shapemill("verify", "--config", config, "--out", folder, "--samples", "all")
     assert code == 0, said
-    card = (folder / "dreamt/README.md").read_text()
-    assert "models that have learnt the strings of other shapes write new ones" in card
-    assert "learnt/tiny-chain-0 prior" in card
+    card = (folder / "sampled/README.md").read_text()
+    assert "models trained on the strings of other shapes generate new strings" in card
+    assert "parent/tiny-chain-0 prior" in card
 
 
-def test_dreams_stand_in_a_table_beside_what_they_were_learnt_from(dreamt: tuple[Path, str], bare: Path) -> None:
-    folder, table = dreamt[0], find_tables()["dreams"]
-    assert run(bare / "dreamt.yaml", folder, *SERVED)[0] == 0
-    subject = load_dataset_run(bare / "dreamt.yaml", folder)
-    assert "no finished dataset learnt" in table.missing(subject)
-    for place in (folder, folder / ".work"):  # as if they had been learnt
-        shutil.copytree(place / "dreamt", place / "learnt")
-    assert table.missing(subject) == ""
-    answer = table.answer(subject, Namespace(dreams=100))
-    rows = [dict(zip(answer.tables[0].columns, row, strict=True)) for row in answer.tables[0].rows]
-    assert [(row["shapes of"], row["shapes"]) for row in rows][1] == ("chain, dreamt", 8)
-    assert rows[0]["shapes of"] == "chain, learnt"
-    assert [strip.title for strip in answer.strips] == ["chain, learnt", "chain, dreamt"]
+def test_table_compares_generated_and_training_shapes(sampled: tuple[Path, str], bare: Path) -> None:
+    folder, table = sampled[0], find_tables()["generated"]
+    assert run(bare / "sampled.yaml", folder, *FINISHING)[0] == 0
+    dataset = load_dataset_run(bare / "sampled.yaml", folder)
+    assert "no finished dataset parent" in table.missing(dataset)
+    for root in (folder, folder / ".work"):  # as if they were the training shapes
+        shutil.copytree(root / "sampled", root / "parent")
+    assert table.missing(dataset) == ""
+    result = table.compute(dataset, table.options.model_validate({"max_shapes": 100}))
+    rows = [dict(zip(result.tables[0].columns, row, strict=True)) for row in result.tables[0].rows]
+    assert [(row["shapes of"], row["shapes"]) for row in rows][1] == ("chain, generated", 8)
+    assert rows[0]["shapes of"] == "chain, training"
+    assert [row.title for row in result.image_rows] == ["chain, training", "chain, generated"]
 
 
-def test_a_model_that_is_not_trained_is_named_with_what_trains_it(bare: Path) -> None:
-    code, said = run(bare / "dreamt.yaml", bare, "string_sampling")
+def test_missing_model_is_reported_with_the_command_that_trains_it(bare: Path) -> None:
+    code, said = run(bare / "sampled.yaml", bare, "string_sampling")
     assert code == 2
     assert "string_sampling.sources.0" in said
-    assert "learnt-models/tiny-chain-0/weights.safetensors" in said
+    assert "parent-models/tiny-chain-0/weights.safetensors" in said
     assert "make train" in said
 
 
-def refused(bare: Path, folder: Path, changed: dict[str, Any], content: bytes = b"") -> str:
-    """What is said of a model with another header, or with other bytes in place of it."""
-    path = publish_model(with_kit(bare, folder), "learnt", kit_in(folder), [string_of(4)], changed)
+def rejected(bare: Path, folder: Path, changed: dict[str, Any], content: bytes = b"") -> str:
+    """Return what is printed for a model with a changed header, or with other bytes."""
+    path = publish_model(with_kit(bare, folder), "parent", kit_in(folder), [string_of(4)], changed)
     if content:
         path.write_bytes(content)
-    code, said = run(bare / "dreamt.yaml", folder, *STAGES[2:])
+    code, said = run(bare / "sampled.yaml", folder, *STAGES[2:])
     assert code != 0
     return said
 
 
-def test_weights_of_another_kit_are_refused(bare: Path, tmp_path: Path) -> None:
-    assert "is of another names" in refused(bare, tmp_path, {"names": ["cap", "wheel"]})
+def test_weights_of_another_kit_are_rejected(bare: Path, tmp_path: Path) -> None:
+    assert "is of another names" in rejected(bare, tmp_path, {"names": ["cap", "wheel"]})
 
 
-def test_weights_of_another_grammar_are_refused(bare: Path, tmp_path: Path) -> None:
+def test_weights_of_another_grammar_are_rejected(bare: Path, tmp_path: Path) -> None:
     kit = kit_in(bare)
     patterns = patterns_json(compile_grammar(kit.grammar, len(kit.labels), 1))
-    other = {**patterns, "size": [each + 1 for each in patterns["size"]]}
-    assert "another grammar" in refused(bare, tmp_path, {"patterns": other})
+    other = {**patterns, "size": [size + 1 for size in patterns["size"]]}
+    assert "another grammar" in rejected(bare, tmp_path, {"patterns": other})
 
 
-def test_a_pickle_in_place_of_weights_is_refused(bare: Path, tmp_path: Path) -> None:
-    assert "is a pickle" in refused(bare, tmp_path, {}, b"\x80\x04K\x01.")
+def test_pickle_instead_of_weights_is_rejected(bare: Path, tmp_path: Path) -> None:
+    assert "is a pickle" in rejected(bare, tmp_path, {}, b"\x80\x04K\x01.")
 
 
-def test_variations_and_dreams_do_not_go_together(tmp_path: Path) -> None:
+def test_variations_and_string_sampling_exclude_each_other(tmp_path: Path) -> None:
     code, said = run(write_config(tmp_path, samples_per_kit=5), tmp_path, "string_sampling")
     assert code == 2
     assert "variations.samples_per_kit: 0" in said
 
 
 @pytest.mark.parametrize("dataset", ["../elsewhere", "/etc", ".work", "a/b"])
-def test_models_outside_the_output_folder_are_refused(tmp_path: Path, dataset: str) -> None:
+def test_models_outside_the_output_folder_are_rejected(tmp_path: Path, dataset: str) -> None:
     code, said = run(write_config(tmp_path, sources=[{**SOURCE, "dataset": dataset}]), tmp_path, "string_sampling")
     assert code == 2
     assert "string_sampling.sources.0.dataset" in said

@@ -1,4 +1,4 @@
-"""A string VAE with random weights that knows the grammar of a kit: what it writes is valid, and seldom the same."""
+"""A string VAE with random weights and the grammar mask of a kit: its strings are valid, and seldom equal."""
 
 from __future__ import annotations
 
@@ -17,18 +17,17 @@ from stages.training.string_vae.settings import StringVaeConfig
 from stages.training.string_vae.training import new_model
 from stages.training.string_vae.vocabulary import Vocabulary
 
-MOST = 40
+MAX_TOKENS = 40
 
 
 def publish_model(
     out: Path, dataset: str, kit: Kit, strings: Sequence[str], changed: Mapping[str, Any] | None = None
 ) -> Path:
-    """Put a model called `tiny`, its header `changed`, and the training strings of a dataset below `out`; the path of
-    the weights."""
+    """Write a model called `tiny`, with a `changed` header, and the training strings of a dataset; return its path."""
     vocabulary = Vocabulary(make_alphabet(kit.labels), 1)
     sizes = {"latent": 4, "embedding": 4, "hidden": 16, "max_rounds": 1, "decoder": "masked", "cycle_attention": False}
     entry = StringVaeConfig.model_validate({"name": "tiny", "kind": "string_vae", **sizes})
-    module = new_model(entry, vocabulary, MOST, 7)
+    module = new_model(entry, vocabulary, MAX_TOKENS, 7)
     header = {
         "kind": "string_vae",
         "name": f"tiny-{kit.name}-0",
@@ -37,7 +36,7 @@ def publish_model(
         "names": list(kit.labels),
         "cycles": vocabulary.cycles,
         "canonical": True,
-        "max_tokens": MOST,
+        "max_tokens": MAX_TOKENS,
         "patterns": patterns_json(compile_grammar(kit.grammar, len(kit.labels), vocabulary.cycles)),
         **(changed or {}),
     }
@@ -48,7 +47,7 @@ def publish_model(
     corpus = out / f"{dataset}-corpus" / f"{kit.name}-train.txt"
     for file, content in (
         (path, checkpoint_bytes(module.state_dict(), header)),
-        (corpus, "".join(f"{each}\n" for each in strings).encode()),
+        (corpus, "".join(f"{string}\n" for string in strings).encode()),
         (corpus.with_name("vocabulary.json"), json_bytes({kit.name: {"edges": "all"}})),
     ):
         file.parent.mkdir(parents=True, exist_ok=True)

@@ -10,13 +10,13 @@ def test_the_first_52_types_are_letters_upper_case_first() -> None:
     assert alphabet.types["z"] == 51
 
 
-def test_a_kit_of_53_types_writes_names_in_brackets() -> None:
+def test_with_53_types_tokens_are_bracketed_names() -> None:
     alphabet = make_alphabet([f"part {index}" for index in range(53)])
     assert alphabet.tokens[0] == "[part_0]"
     assert alphabet.vocabulary()["[part_52]"] == "part 52"
 
 
-def test_names_that_would_be_equal_in_brackets_get_numbers() -> None:
+def test_equal_bracketed_names_get_numbers() -> None:
     names = ["a b", "a_b", "a_b_2", "a]b", "(1)", "ü", *(f"part {index}" for index in range(50))]
     alphabet = make_alphabet(names)
     assert alphabet.tokens[:6] == ("[a_b]", "[a_b_2]", "[a_b_2_2]", "[a_b_3]", "[_1_]", "[_]")

@@ -52,28 +52,26 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> DatasetPaths:
 
 
 @pytest.mark.parametrize(("edges", "said"), [("all", None), ("all", "all"), ("faces", "faces"), ("tree", "tree")])
-def test_strings_of_each_kind_are_good_where_the_config_says_so(
-    edges: Edges, said: Edges | None, places: DatasetPaths
-) -> None:
+def test_strings_of_the_configured_edges_pass_the_audit(edges: Edges, said: Edges | None, places: DatasetPaths) -> None:
     found = sample(written(edges), said)
     assert list(string_faults(found)) == []
     assert list(AUDIT.recheck(found, places)) == []
 
 
 @pytest.mark.parametrize(("edges", "said"), [("all", "tree"), ("tree", "all"), ("faces", "all"), ("faces", "tree")])
-def test_strings_of_another_kind_are_found(edges: Edges, said: Edges) -> None:
-    assert list(string_faults(sample(written(edges), said))) == ["line 1 of its txt stands for another graph"]
+def test_strings_of_other_edges_fail_the_audit(edges: Edges, said: Edges) -> None:
+    assert list(string_faults(sample(written(edges), said))) == ["line 1 of its txt encodes another graph"]
 
 
-def test_strings_that_tell_of_all_contacts_are_no_strings_of_faces(places: DatasetPaths) -> None:
+def test_strings_of_all_contacts_fail_as_strings_of_faces(places: DatasetPaths) -> None:
     found = sample(written("all"), "faces")
-    assert list(AUDIT.recheck(found, places)) == ["its txt does not tell of its face contacts"]
+    assert list(AUDIT.recheck(found, places)) == ["its txt does not contain its face contacts"]
     faces = written("faces")
     mixed = sample([faces[0], written("all")[1]], "faces")
-    assert list(string_faults(mixed)) == ["the lines of its txt stand for different graphs"]
+    assert list(string_faults(mixed)) == ["the lines of its txt encode different graphs"]
 
 
-def test_a_tree_that_is_not_in_the_graph_is_found() -> None:
+def test_a_tree_outside_the_graph_fails_the_audit() -> None:
     first, *others = written("tree")
     letters = [place for place, each in enumerate(first) if each.isalpha()]
     for place in letters[1:]:
@@ -82,7 +80,7 @@ def test_a_tree_that_is_not_in_the_graph_is_found() -> None:
         swapped[place], swapped[other] = first[other], first[place]
         faults = list(string_faults(sample(["".join(swapped), *others], "tree")))
         assert faults[0] in {
-            "line 1 of its txt stands for another graph",
+            "line 1 of its txt encodes another graph",
             "the first line of its txt is not the canonical spanning tree",
         }
     assert list(string_faults(sample([others[0], first], "tree"))) == [

@@ -91,7 +91,7 @@ def assert_comes_back(space: CategorySpace, assembly: Assembly, encoded: Encoded
     return categories
 
 
-def test_each_token_has_the_edge_that_it_stands_for() -> None:
+def test_tokens_have_their_edges() -> None:
     decoded = decode("A0(B1)(C)D(B)C01", space_of("castle").alphabet)
     assert token_edges(decoded).tolist() == [
         [-1, 0], [0, 5], [-1, -1], [0, 1], [1, 5], [-1, -1], [-1, -1], [0, 2], [-1, -1],
@@ -99,7 +99,7 @@ def test_each_token_has_the_edge_that_it_stands_for() -> None:
     ]  # fmt: skip
 
 
-def test_beyond_a_post_the_next_rod_goes_straight_on_or_turns_wherever_the_shape_stands() -> None:
+def test_categories_after_a_post_do_not_depend_on_the_pose_of_the_shape() -> None:
     space = roads()
     assert {pair: len(each.poses) for pair, each in space.pairs.items()} == {(0, 1): 4, (1, 0): 2}
     straight, corner = (each.assembly for each in space.kit.exemplars)
@@ -120,7 +120,7 @@ def test_beyond_a_post_the_next_rod_goes_straight_on_or_turns_wherever_the_shape
 
 @pytest.mark.parametrize("edges", EDGES)
 @pytest.mark.parametrize("name", ["castle", "playground", "space-base", "temple", "cubes"])
-def test_every_exemplar_comes_back_by_whatever_string(name: str, edges: Edges) -> None:
+def test_exemplars_are_rebuilt_from_any_string(name: str, edges: Edges) -> None:
     space = space_of(name)
     for seed, exemplar in enumerate(space.kit.exemplars):
         for encoded in strings_of(space, exemplar.assembly, edges, 2, seed):
@@ -131,7 +131,7 @@ def test_every_exemplar_comes_back_by_whatever_string(name: str, edges: Edges) -
 
 @settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["castle", "playground", "cubes"]))
-def test_neither_the_place_of_a_shape_nor_the_symmetries_in_its_poses_change_a_category(seed: int, name: str) -> None:
+def test_categories_do_not_depend_on_the_pose_of_the_shape_or_on_symmetries(seed: int, name: str) -> None:
     space, rng = space_of(name), np.random.default_rng(seed)
     assembly = space.kit.exemplars[seed % 2].assembly
     encoded = strings_of(space, assembly, "all", 1, seed)[-1]
@@ -144,7 +144,7 @@ def test_neither_the_place_of_a_shape_nor_the_symmetries_in_its_poses_change_a_c
 
 
 @pytest.mark.parametrize("name", ["castle", "playground"])
-def test_categories_are_the_least_of_walks_from_every_frame_of_the_first_part(name: str) -> None:
+def test_categories_are_the_least_over_all_frames_of_the_first_part(name: str) -> None:
     """By geometry alone: each child is held against every category and every one of its own symmetries."""
     space = space_of(name)
     kit, assembly = space.kit, space.kit.exemplars[0].assembly
@@ -172,7 +172,7 @@ def test_categories_are_the_least_of_walks_from_every_frame_of_the_first_part(na
     assert min(walks) == labelled(space, assembly, encoded)
 
 
-def test_cycle_numbers_lead_to_where_the_other_end_stands() -> None:
+def test_cycle_numbers_have_the_category_of_the_other_part() -> None:
     space = space_of("castle")
     assembly = space.kit.exemplars[1].assembly
     for encoded in strings_of(space, assembly, "all", 3, 1):
@@ -190,7 +190,7 @@ def test_cycle_numbers_lead_to_where_the_other_end_stands() -> None:
         assert cycles == 2 * (len(assembly.edges) - len(assembly) + 1) > 0
 
 
-def test_a_part_and_its_mirror_image_are_one_type_where_the_kit_says_so() -> None:
+def test_mirrored_parts_are_one_type_in_kits_that_merge_them() -> None:
     mirror = np.diag([-1.0, 1, 1, 1])
     meshes = {"plain": box(1, 1, 1), "arrow": with_arrow(box(1, 1, 1))}
     parts: list[Placed] = [*cubes((0, 0, 0), (1, 0, 0), (1, 1, 0)), ("arrow", pose(0, 1, 0) @ mirror)]
@@ -202,37 +202,37 @@ def test_a_part_and_its_mirror_image_are_one_type_where_the_kit_says_so() -> Non
             assert_comes_back(space, exemplar.assembly, encoded)
 
 
-def test_one_part_has_the_category_of_its_type() -> None:
+def test_a_single_part_has_the_category_of_its_type() -> None:
     space = space_of("cubes")
     assembly = space.kit.exemplars[0].assembly
     for kind in range(2):
         part = int(np.flatnonzero(assembly.types == kind)[0])
         (encoded,) = strings_of(space, assembly.select(np.array([part])), "all", 0, 0)
         assert assert_comes_back(space, assembly.select(np.array([part])), encoded) == [1 + kind]
-        assert list(space.beside(None, kind)) == [1 + kind]
+        assert list(space.categories_between(None, kind)) == [1 + kind]
 
 
-def test_categories_beside_a_part_are_those_of_its_type_and_the_label() -> None:
+def test_categories_of_a_neighbor_depend_on_type_and_label() -> None:
     space = space_of("castle")
     for (a, b), pair in space.pairs.items():
-        beside = space.beside(a, b)  # each type of this kit has a label of its own
+        beside = space.categories_between(a, b)  # each type of this kit has a label of its own
         assert beside == range(pair.first, pair.first + len(pair.poses))
         assert all(space.types[each].tolist() == [a, b] for each in beside)
-    assert space.beside(0, 0) == range(0), "a tower's base does not stand on another"
+    assert space.categories_between(0, 0) == range(0), "a tower's base does not stand on another"
     assert sum(len(pair.poses) for pair in space.pairs.values()) == len(space) - 1 - len(space.kit.types)
 
 
-def test_parts_that_stand_as_none_was_seen_have_no_category() -> None:
+def test_unseen_relative_poses_have_no_category() -> None:
     space = roads()
     assembly = space.kit.exemplars[0].assembly
     (encoded,) = strings_of(space, assembly, "all", 0, 0)
     poses = assembly.poses.copy()
     poses[0, 1, 3] += 5 * space.kit.pose_tolerance
-    with pytest.raises(NoCategoryError, match=r"(post and rod|rod and post) stand as"):
+    with pytest.raises(NoCategoryError, match=r"(post and rod|rod and post) have a relative pose"):
         space.label(Assembly(assembly.types, poses, assembly.edges), [encoded])
 
 
-def test_categories_of_other_tokens_are_refused() -> None:
+def test_categories_of_other_tokens_are_rejected() -> None:
     space = roads()
     right = labelled(space, space.kit.exemplars[0].assembly, Encoded("ABABA", np.array([0, 3, 1, 4, 2])))
     for changed, said in (
@@ -247,7 +247,7 @@ def test_categories_of_other_tokens_are_refused() -> None:
 
 
 @pytest.mark.slow
-def test_parts_of_one_label_come_back_with_the_surface_that_they_have(tmp_path: Path) -> None:
+def test_parts_with_equal_labels_are_rebuilt_with_their_own_surface(tmp_path: Path) -> None:
     shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path, 4))
     kit = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").resolve(STRICTEST))
     space = CategorySpace(kit)
@@ -259,4 +259,4 @@ def test_parts_of_one_label_come_back_with_the_surface_that_they_have(tmp_path: 
             for each, (here, there) in zip(categories, token_edges(decoded).tolist(), strict=True):
                 if here >= 0:
                     parent = int(exemplar.assembly.types[encoded.nodes[here]])
-                    assert each in space.beside(parent, int(decoded.types[there]))
+                    assert each in space.categories_between(parent, int(decoded.types[there]))

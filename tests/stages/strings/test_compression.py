@@ -61,7 +61,7 @@ def assert_comes_back(book: Codebook, assembly: Assembly, encoded: Encoded) -> S
 
 @pytest.mark.parametrize("edges", EDGES)
 @pytest.mark.parametrize("name", ["castle", "playground", "space-base", "temple", "cubes"])
-def test_every_exemplar_comes_back_by_whatever_string(name: str, edges: Edges) -> None:
+def test_exemplars_are_rebuilt_from_any_string(name: str, edges: Edges) -> None:
     book = book_of(name, edges)
     for seed, exemplar in enumerate(book.kit.exemplars):
         for encoded in strings_of(book, exemplar.assembly, 2, seed):
@@ -74,7 +74,7 @@ def test_every_exemplar_comes_back_by_whatever_string(name: str, edges: Edges) -
 
 @pytest.mark.slow
 @pytest.mark.parametrize("edges", EDGES)
-def test_parts_of_one_label_keep_the_surface_that_they_have(edges: Edges, tmp_path: Path) -> None:
+def test_parts_with_equal_labels_keep_their_own_surface(edges: Edges, tmp_path: Path) -> None:
     """Also where they dock as parts of their labels do, though these two were never seen to."""
     shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path, 4))
     kit = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").resolve(STRICTEST))
@@ -90,7 +90,7 @@ def test_parts_of_one_label_keep_the_surface_that_they_have(edges: Edges, tmp_pa
 
 @settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(EDGES))
-def test_a_shape_comes_back_wherever_it_stands_and_whatever_part_of_it_was_moved(seed: int, edges: Edges) -> None:
+def test_shapes_are_restored_at_any_pose_with_one_part_moved(seed: int, edges: Edges) -> None:
     book, rng = book_of("cubes", edges), np.random.default_rng(seed)
     assembly = book.kit.exemplars[seed % 2].assembly
     motion = np.eye(4)
@@ -108,7 +108,7 @@ def test_a_shape_comes_back_wherever_it_stands_and_whatever_part_of_it_was_moved
     assert 1 <= len(described.poses) <= 1 + 1 + len(assembly.neighbours()[moved])
 
 
-def test_errors_of_a_long_chain_do_not_add_up() -> None:
+def test_errors_do_not_accumulate_along_a_chain() -> None:
     """Each cube stands a little further from the one before than it should: in the end by ten tolerances and more."""
     book = book_of("cubes", "tree")
     stairs = book.kit.exemplars[1].assembly
@@ -129,7 +129,7 @@ def test_errors_of_a_long_chain_do_not_add_up() -> None:
     assert 2 <= len(described.poses) <= count // 2, "now and then a part brings a pose of its own, and most do not"
 
 
-def test_one_part_takes_three_bytes_of_header_and_its_pose() -> None:
+def test_a_single_part_takes_a_header_of_three_bytes_and_a_pose() -> None:
     book = book_of("cubes", "all")
     exemplar = book.kit.exemplars[0].assembly
     alone = exemplar.select(np.array([0]))
@@ -141,7 +141,7 @@ def test_one_part_takes_three_bytes_of_header_and_its_pose() -> None:
 
 @settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1))
-def test_spoiled_bytes_are_another_shape_or_refused(seed: int) -> None:
+def test_corrupted_bytes_decode_to_another_shape_or_are_rejected(seed: int) -> None:
     book, rng = book_of("cubes", "all"), np.random.default_rng(seed)
     (encoded, *_) = strings_of(book, book.kit.exemplars[0].assembly, 0, 0)
     packed = bytearray(pack(book, encode_shape(book, book.kit.exemplars[0].assembly, encoded)))
@@ -156,7 +156,7 @@ def test_spoiled_bytes_are_another_shape_or_refused(seed: int) -> None:
 
 
 @pytest.mark.parametrize("cut", [0, 1, 2, 5, -1, -24])
-def test_bytes_that_end_early_are_refused(cut: int) -> None:
+def test_truncated_bytes_are_rejected(cut: int) -> None:
     book = book_of("cubes", "all")
     assembly = book.kit.exemplars[0].assembly
     packed = pack(book, encode_shape(book, assembly, strings_of(book, assembly, 0, 0)[0]))
@@ -164,7 +164,7 @@ def test_bytes_that_end_early_are_refused(cut: int) -> None:
         decode_shape(book, unpack(book, packed[:cut]))
 
 
-def test_categories_that_the_kit_does_not_have_are_refused() -> None:
+def test_categories_that_the_kit_does_not_have_are_rejected() -> None:
     book = book_of("cubes", "all")
     assembly = book.kit.exemplars[0].assembly
     described = encode_shape(book, assembly, strings_of(book, assembly, 0, 0)[0])
@@ -179,7 +179,7 @@ def test_categories_that_the_kit_does_not_have_are_refused() -> None:
 
 
 @pytest.mark.skipif(not (Path(__file__).resolve().parents[4] / "shared").is_dir(), reason="no public models here")
-def test_shapes_with_hundreds_of_cycles_come_back() -> None:
+def test_shapes_with_hundreds_of_cycles_are_restored() -> None:
     shared = Path(__file__).resolve().parents[4] / "shared" / "exemplars"
     paths = tuple(shared / name / "model.glb" for name in ("a12_dungeon_room_large", "a13_dungeon_junction"))
     kit = read_kit(KitConfig(name="dungeon", shapes=paths).resolve(STRICTEST))

@@ -25,7 +25,7 @@ def edges(string: str) -> list[list[int]]:
     return [[i, j] for i, j in decode(string, ALPHABET).edges.tolist()]
 
 
-def test_a_chain_joins_neighbours() -> None:
+def test_a_chain_connects_consecutive_nodes() -> None:
     decoded = decode("ABCA", ALPHABET)
     assert decoded.types.tolist() == [0, 1, 2, 0]
     assert decoded.types.dtype == np.int16
@@ -39,7 +39,7 @@ def test_one_node_is_a_graph() -> None:
     assert decoded.edges.shape == (0, 2)
 
 
-def test_branches_hang_on_the_node_before_them() -> None:
+def test_branches_connect_to_the_preceding_node() -> None:
     assert edges("A(B)(C(A)B)C") == [[0, 1], [0, 2], [0, 5], [2, 3], [2, 4]]
 
 
@@ -51,22 +51,22 @@ def test_edges_are_in_lexicographic_order_with_the_lower_node_first() -> None:
     assert edges("A01B(C2)D0E2F1") == [[0, 1], [0, 3], [0, 5], [1, 2], [1, 3], [2, 4], [3, 4], [4, 5]]
 
 
-def test_a_branch_may_be_the_last_of_its_node() -> None:
+def test_a_branch_may_be_the_last_child_of_its_node() -> None:
     assert edges("A(B)(C)") == edges("A(B)C")
 
 
 @pytest.mark.parametrize("string", ["A0BC0", "A7BC7", "A%00BC0", "A%(0)BC%00", "A%10BC%(010)", "A%(123456)BC%(123456)"])
-def test_every_way_to_write_a_number_is_read(string: str) -> None:
+def test_all_notations_of_a_number_are_read(string: str) -> None:
     assert edges(string) == [[0, 1], [0, 2], [1, 2]]
 
 
-def test_a_number_is_free_again_once_both_its_nodes_are_there() -> None:
+def test_a_number_is_reused_after_its_cycle_closes() -> None:
     triangles = [[0, 1], [0, 2], [1, 2], [2, 3], [3, 4], [3, 5], [4, 5]]
     assert edges("A0AA0A0AA0") == triangles == edges("A0AA0A1AA1")
     assert edges("A0AA00AA0") == [[0, 1], [0, 2], [1, 2], [2, 3], [2, 4], [3, 4]]
 
 
-def test_digits_behind_a_percent_sign_are_two() -> None:
+def test_a_percent_sign_precedes_two_digits() -> None:
     assert edges("A%123BC%12D3") == [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]]
 
 
@@ -98,13 +98,13 @@ def test_figure_9_has_one_cycle_of_towers() -> None:
     assert sorted(decoded.types[decoded.edges[cycle]].tolist()) == [0, 2]  # the numbers stand behind a C and an A
 
 
-def test_strings_of_equal_counts_and_other_graphs_are_not_equivalent() -> None:
+def test_strings_with_equal_counts_of_different_graphs_are_not_equivalent() -> None:
     assert not equivalent("A(B)AAA(B)A", "A(B)AA(B)AA", ALPHABET)
     assert equivalent("ABC", "CBA", ALPHABET)
     assert not equivalent("ABC", "ACB", ALPHABET)
 
 
-def test_tokens_name_the_nodes_and_edges_that_they_stand_for() -> None:
+def test_tokens_have_their_nodes_and_edges() -> None:
     decoded = decode("A%10(BC)DE%10", ALPHABET)
     assert decoded.edges.tolist() == [[0, 1], [0, 3], [0, 4], [1, 2], [3, 4]]
     assert [(each.index, each.text, each.kind, each.node, each.edge) for each in decoded.tokens] == [
@@ -137,31 +137,31 @@ def test_tokens_name_the_nodes_and_edges_that_they_stand_for() -> None:
         (")", 0, "no branch is open"),
         ("A(B(C)D", 1, "branch is not closed"),
         ("A(", 1, "branch is not closed"),
-        ("0AB0", 0, "right behind its node"),
-        ("A(B)0CD0", 4, "right behind its node"),
-        ("A(0B)C0", 2, "right behind its node"),
-        ("AB0CD1E1", 2, "cycle number 0 stands only once"),
-        ("A1B0C1D3", 3, "cycle number 0 stands only once"),
-        ("AB0", 2, "cycle number 0 stands only once"),
+        ("0AB0", 0, "must follow its node"),
+        ("A(B)0CD0", 4, "must follow its node"),
+        ("A(0B)C0", 2, "must follow its node"),
+        ("AB0CD1E1", 2, "cycle number 0 occurs only once"),
+        ("A1B0C1D3", 3, "cycle number 0 occurs only once"),
+        ("AB0", 2, "cycle number 0 occurs only once"),
         ("A00B", 2, "from a node to itself"),
         ("A0B0C", 3, "two edges join"),
         ("A01BCD01", 7, "two edges join"),
-        ("A%B", 1, "% must stand before two digits"),
-        ("A%1B", 1, "% must stand before two digits"),
-        ("AB%", 2, "% must stand before two digits"),
-        ("A%()B", 1, "% must stand before two digits"),
-        ("A%(12B", 1, "% must stand before two digits"),
-        ("A%(1234567)B", 1, "% must stand before two digits"),
+        ("A%B", 1, "% must precede two digits"),
+        ("A%1B", 1, "% must precede two digits"),
+        ("AB%", 2, "% must precede two digits"),
+        ("A%()B", 1, "% must precede two digits"),
+        ("A%(12B", 1, "% must precede two digits"),
+        ("A%(1234567)B", 1, "% must precede two digits"),
     ],
 )
-def test_what_is_no_string_is_refused_at_its_place(string: str, index: int, reason: str) -> None:
+def test_invalid_strings_are_rejected_at_the_character(string: str, index: int, reason: str) -> None:
     with pytest.raises(StringError, match=reason) as caught:
         decode(string, ALPHABET)
     assert caught.value.index == index
     assert caught.value.string == string
 
 
-def test_an_error_shows_the_string_with_a_caret() -> None:
+def test_errors_show_the_string_with_a_caret() -> None:
     with pytest.raises(StringError) as caught:
         decode("CDA0(DC)X", ALPHABET)
     reason, string, caret = str(caught.value).split("\n")
@@ -170,7 +170,7 @@ def test_an_error_shows_the_string_with_a_caret() -> None:
     assert string.strip() == "CDA0(DC)X"
 
 
-def test_an_error_in_a_long_string_shows_its_surroundings() -> None:
+def test_errors_in_long_strings_show_an_excerpt() -> None:
     string = "A" * 500 + "X" + "A" * 500
     with pytest.raises(StringError) as caught:
         decode(string, ALPHABET)
@@ -180,16 +180,16 @@ def test_an_error_in_a_long_string_shows_its_surroundings() -> None:
     assert shown[caret.index("^")] == "X"
 
 
-def test_an_error_at_the_end_has_its_caret_behind_the_string() -> None:
+def test_errors_at_the_end_have_a_caret_after_the_string() -> None:
     assert str(StringError("A(", 2, "more is missing")).endswith("\n  A(\n    ^")
 
 
-def test_an_error_travels_between_processes() -> None:
+def test_errors_can_be_pickled() -> None:
     error = pickle.loads(pickle.dumps(StringError("A(", 1, "the branch is not closed")))
     assert (error.string, error.index, error.reason) == ("A(", 1, "the branch is not closed")
 
 
-def test_branches_may_nest_deeper_than_python_does() -> None:
+def test_branches_may_nest_deeper_than_the_recursion_limit() -> None:
     depth = 5000
     decoded = decode("A" + "(A" * depth + ")" * depth, ALPHABET)
     assert decoded.edges.tolist() == [[index, index + 1] for index in range(depth)]
@@ -197,7 +197,7 @@ def test_branches_may_nest_deeper_than_python_does() -> None:
 
 @settings(max_examples=300, deadline=None)
 @given(st.text(alphabet="ABCAB0011%()2", max_size=24))
-def test_any_text_is_a_graph_or_an_error_at_a_place_in_it(string: str) -> None:
+def test_arbitrary_text_decodes_or_raises_at_a_character_of_it(string: str) -> None:
     try:
         decoded = decode(string, ALPHABET)
     except StringError as error:

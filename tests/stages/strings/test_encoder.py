@@ -32,7 +32,7 @@ def test_random_strings_decode_to_their_graph(graph: Graph, seed: int) -> None:
 
 @settings(max_examples=100, deadline=None)
 @given(connected_graphs(), st.integers(0, 2**32 - 1))
-def test_the_canonical_string_decodes_to_its_graph_and_knows_no_names(graph: Graph, seed: int) -> None:
+def test_the_canonical_string_decodes_to_its_graph_and_ignores_node_order(graph: Graph, seed: int) -> None:
     encoded = canonical_string(*graph, ALPHABET)
     assert_stands_for(encoded, graph)
     assert canonical_string(*renamed(graph, np.random.default_rng(seed)), ALPHABET).string == encoded.string
@@ -45,14 +45,14 @@ def test_canonical_strings_are_equal_exactly_for_isomorphic_graphs(first: Graph,
     assert same == isomorphic(first, second)
 
 
-def test_all_strings_of_a_small_graph_are_found() -> None:
+def test_all_strings_of_a_small_graph_are_enumerated() -> None:
     """The star with centre A and leaves B, C: from A two orders, from each leaf one walk."""
     graph = (np.array([0, 1, 2], dtype=np.int16), np.array([[0, 1], [0, 2]], dtype=np.int32))
     found = random_strings(*graph, ALPHABET, 50, np.random.default_rng(0))
     assert {each.string for each in found} == {"A(B)C", "A(C)B", "BAC", "CAB"}
 
 
-def test_all_strings_of_a_triangle_are_found() -> None:
+def test_all_strings_of_a_triangle_are_enumerated() -> None:
     """Each broken edge leaves a chain of three, walked from an end or from the middle in two orders."""
     graph = (np.array([0, 1, 2], dtype=np.int16), np.array([[0, 1], [0, 2], [1, 2]], dtype=np.int32))
     found = {each.string for each in random_strings(*graph, ALPHABET, 50, np.random.default_rng(0))}
@@ -61,14 +61,14 @@ def test_all_strings_of_a_triangle_are_found() -> None:
     assert found == chains | forks
 
 
-def test_the_strings_of_figure_1_are_walks_that_the_encoder_makes() -> None:
+def test_the_strings_of_figure_1_are_encoded() -> None:
     decoded = decode("CDA0(DC)DCDBDCDCD0", ALPHABET)
     found = random_strings(decoded.types, decoded.edges, ALPHABET, 4000, np.random.default_rng(0))
     strings = {each.string for each in found}
     assert {"CDA0(DC)DCDBDCDCD0", "A0(DC)(DC)DCDBDCDCD0", "A0(DC)(DCDBDCDCD0)DC"} <= strings
 
 
-def test_random_strings_are_distinct_and_none_of_those_there() -> None:
+def test_random_strings_are_distinct_and_new() -> None:
     graph = arrays(nx.grid_2d_graph(5, 5))
     rng = np.random.default_rng(1)
     first = {each.string for each in random_strings(*graph, ALPHABET, 40, rng)}
@@ -77,12 +77,12 @@ def test_random_strings_are_distinct_and_none_of_those_there() -> None:
     assert {each.string for each in random_strings(*chain, ALPHABET, 9, rng, {"ABC", "CBA"})} == {"B(A)C", "B(C)A"}
 
 
-def test_a_graph_with_one_string_ends_the_search() -> None:
+def test_a_graph_with_a_single_string_yields_no_others() -> None:
     found = random_strings(*arrays(nx.path_graph(2)), ALPHABET, 8, np.random.default_rng(0))
     assert [each.string for each in found] == ["AA"]
 
 
-def test_random_strings_are_all_over_the_graph() -> None:
+def test_random_strings_start_at_all_nodes() -> None:
     """Every node is a root and every edge is broken sometimes."""
     types, edges = arrays(nx.cycle_graph(5), np.arange(5))
     found = random_strings(types, edges, ALPHABET, 200, np.random.default_rng(2))
@@ -95,7 +95,7 @@ def test_random_strings_are_all_over_the_graph() -> None:
     assert len(broken) == 5
 
 
-def test_equal_generators_make_equal_strings() -> None:
+def test_equal_generators_encode_equal_strings() -> None:
     graph = arrays(nx.grid_2d_graph(6, 7))
     one, other = (
         [each.string for each in random_strings(*graph, ALPHABET, 10, np.random.default_rng(5))] for _ in range(2)
@@ -104,7 +104,7 @@ def test_equal_generators_make_equal_strings() -> None:
     assert one != [each.string for each in random_strings(*graph, ALPHABET, 10, np.random.default_rng(6))]
 
 
-def test_numbers_begin_at_0_and_are_used_again() -> None:
+def test_numbers_begin_at_0_and_are_reused() -> None:
     """A chain of triangles needs two numbers, however long it is: one ends where the next begins."""
     graph = nx.Graph()
     for index in range(30):
@@ -115,7 +115,7 @@ def test_numbers_begin_at_0_and_are_used_again() -> None:
     assert set(encoded.string) <= set("A()01")
 
 
-def test_numbers_above_9_and_above_99_are_written_as_smiles_does() -> None:
+def test_numbers_above_9_and_above_99_follow_smiles() -> None:
     types, edges = arrays(nx.complete_graph(24))
     encoded = canonical_string(types, edges, ALPHABET)
     assert_stands_for(encoded, (types, edges))
@@ -125,7 +125,7 @@ def test_numbers_above_9_and_above_99_are_written_as_smiles_does() -> None:
     assert "%09" not in texts
 
 
-def test_a_node_never_begins_a_number_that_ends_there() -> None:
+def test_no_node_opens_a_number_that_closes_there() -> None:
     """`A00` would read like an edge from A to itself to anybody who does not count."""
     types, edges = arrays(nx.complete_graph(9))
     for each in random_strings(types, edges, ALPHABET, 20, np.random.default_rng(0)):
@@ -133,7 +133,7 @@ def test_a_node_never_begins_a_number_that_ends_there() -> None:
         assert len(set(numbers)) == len(numbers)
 
 
-def test_numbers_that_end_come_first_and_those_that_begin_stand_in_the_order_of_their_ends() -> None:
+def test_closing_numbers_come_first_and_opening_ones_follow_in_order_of_their_ends() -> None:
     types, edges = arrays(nx.complete_graph(9))
     for each in random_strings(types, edges, ALPHABET, 20, np.random.default_rng(0)):
         decoded = decode(each.string, ALPHABET)
@@ -155,7 +155,7 @@ def test_the_last_subtree_of_a_node_has_no_parentheses() -> None:
     assert not any("))" in each or each.endswith(")") for each in found)
 
 
-def test_chains_and_rings_of_5000_nodes_have_strings() -> None:
+def test_chains_and_rings_of_5000_nodes_are_encoded() -> None:
     for graph in (nx.path_graph(5000), nx.cycle_graph(5000)):
         types, edges = arrays(graph)
         assert_stands_for(encode(types, edges, ALPHABET, np.random.default_rng(0)), (types, edges))
@@ -175,14 +175,14 @@ def test_bracketed_names_are_written() -> None:
     ("types", "edges", "reason"),
     [
         ([], [], "without nodes"),
-        ([0, 0, 0], [[0, 1]], "of 3 nodes are in reach"),
+        ([0, 0, 0], [[0, 1]], "of 3 nodes are reachable"),
         ([0, 6], [[0, 1]], "not in the alphabet"),
         ([0, -1], [[0, 1]], "not in the alphabet"),
-        ([0, 0], [[0, 2]], "not there"),
-        ([0, 0], [[-1, 0]], "not there"),
+        ([0, 0], [[0, 2]], "out of range"),
+        ([0, 0], [[-1, 0]], "out of range"),
     ],
 )
-def test_what_is_no_connected_graph_of_the_kit_is_refused(
+def test_graphs_that_are_invalid_or_not_connected_are_rejected(
     types: list[int], edges: list[list[int]], reason: str
 ) -> None:
     graph = np.array(types, dtype=np.int16), np.array(edges, dtype=np.int32).reshape(-1, 2)
@@ -225,7 +225,7 @@ def test_a_tree_has_the_same_strings_with_and_without_cycles(graph: Graph, seed:
         assert canonical_string(*tree, ALPHABET, cycles).string == canonical_string(*tree, ALPHABET).string
 
 
-def test_all_trees_of_a_triangle_are_written() -> None:
+def test_all_trees_of_a_triangle_are_encoded() -> None:
     graph = (np.array([0, 1, 2], dtype=np.int16), np.array([[0, 1], [0, 2], [1, 2]], dtype=np.int32))
     found = {each.string for each in random_strings(*graph, ALPHABET, 50, np.random.default_rng(0), (), cycles=False)}
     chains = {"ABC", "ACB", "BAC", "BCA", "CAB", "CBA"}

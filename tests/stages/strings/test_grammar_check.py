@@ -25,7 +25,7 @@ CASTLE = Grammar(
 
 
 @pytest.mark.parametrize("string", ["A0DADAD0", "A0(C)DADAD0", "CA0DADBDAD0"])
-def test_rings_that_the_grammar_allows_pass(string: str) -> None:
+def test_rings_within_the_grammar_pass(string: str) -> None:
     assert len(check_string(string, ALPHABET, CASTLE).types) == sum(each.isalpha() for each in string)
 
 
@@ -41,25 +41,25 @@ def test_rings_that_the_grammar_allows_pass(string: str) -> None:
         ("A0DADBDBD0", 6, "D was never seen with 2 B around it"),
     ],
 )
-def test_the_first_place_that_breaks_the_grammar_is_named(string: str, index: int, reason: str) -> None:
+def test_errors_name_the_first_violation(string: str, index: int, reason: str) -> None:
     with pytest.raises(StringError, match=reason) as caught:
         check_string(string, ALPHABET, CASTLE)
     assert caught.value.index == index
 
 
-def test_a_forbidden_cycle_edge_is_named_at_its_number() -> None:
+def test_errors_name_forbidden_cycle_edges_at_the_number() -> None:
     with pytest.raises(StringError, match="never neighbours") as caught:
         check_string("A0DAD(A0)D", ALPHABET, CASTLE)
     assert caught.value.index == 1
 
 
-def test_a_string_that_cannot_be_read_is_refused_as_such() -> None:
+def test_unreadable_strings_are_rejected() -> None:
     with pytest.raises(StringError, match="not closed"):
         check_string("A(D", ALPHABET, CASTLE)
 
 
 @pytest.mark.parametrize("edges", ["faces", "tree"])
-def test_where_strings_leave_out_contacts_a_part_may_have_fewer_neighbours_than_were_seen(edges: Edges) -> None:
+def test_parts_may_have_fewer_neighbors_in_strings_that_omit_contacts(edges: Edges) -> None:
     for string in ("ADADAD", "CADADBDAD", "D(AD)AC"):
         with pytest.raises(StringError):
             check_string(string, ALPHABET, CASTLE)

@@ -12,18 +12,14 @@ from hypothesis import strategies as st
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS, admits
 from stages.shape.kit import Docking, Grammar, Strictness
 from stages.strings.alphabet import make_alphabet
-from stages.strings.compiled_grammar import NO_COMPLETION, compile_grammar, compile_patterns, patterns_json
+from stages.strings.compiled_grammar import compile_grammar, compile_patterns, patterns_json
+from stages.strings.completion import tokens_to_complete
 from stages.strings.decoder import decode
 from stages.strings.encoder import encode
+from stages.strings.grammar_arrays import NO_COMPLETION
 from stages.strings.grammar_check import check_string
-from stages.strings.grammar_mask import (
-    END_TOKEN,
-    NO_TOKEN,
-    GrammarMask,
-    follows_grammar,
-    masks_along,
-    tokens_to_complete,
-)
+from stages.strings.grammar_mask import NO_TOKEN, GrammarMask, follows_grammar, masks_along
+from stages.strings.mask_state import END_TOKEN
 from stages.strings.tokens import StringError
 from stages.training.string_vae.vocabulary import Vocabulary
 from tests.stages.training import toy_training
@@ -72,20 +68,20 @@ def every_string(vocabulary: Vocabulary, grammar: Grammar, most: int) -> set[tup
 
 @pytest.mark.parametrize("name", GRAMMARS)
 @pytest.mark.parametrize(("cycles", "most"), [(0, 6), (1, 5)])
-def test_allowed_is_what_some_admitted_string_goes_on_with(name: str, cycles: int, most: int) -> None:
+def test_allowed_tokens_are_exactly_those_of_admitted_strings(name: str, cycles: int, most: int) -> None:
     vocabulary, grammar = Vocabulary(AB, cycles), GRAMMARS[name]
     strings = every_string(vocabulary, grammar, most)
     follows: dict[tuple[int, ...], set[int]] = {(): set()}
     for string in strings:
         for place, code in enumerate(string):
             follows.setdefault(string[:place], set()).add(code)
-    rules = compile_grammar(grammar, 3, cycles)
+    compiled = compile_grammar(grammar, 3, cycles)
     for beginning, wanted in follows.items():
         # Cycles make a string shorter than its subtrees would be, so that it needs more room.
-        acceptor = GrammarMask(rules, cycles, 1, most if cycles == 0 else 3 * most)
+        mask = GrammarMask(compiled, cycles, 1, most if cycles == 0 else 3 * most)
         for code in beginning:
-            acceptor.take(np.array([code]))
-        allowed = set(np.flatnonzero(acceptor.allowed()[0]).tolist())
+            mask.take(np.array([code]))
+        allowed = set(np.flatnonzero(mask.allowed()[0]).tolist())
         assert wanted <= allowed, vocabulary.string(beginning)
         if cycles == 0:
             assert allowed == wanted, vocabulary.string(beginning)
@@ -93,21 +89,21 @@ def test_allowed_is_what_some_admitted_string_goes_on_with(name: str, cycles: in
 
 def walk(grammar: Grammar, cycles: int, most: int, rng: np.random.Generator) -> tuple[list[int], bool]:
     """A string of random allowed tokens, and whether it came to its end, not to a dead one."""
-    acceptor = GrammarMask(compile_grammar(grammar, 3, cycles), cycles, 1, most)
+    mask = GrammarMask(compile_grammar(grammar, 3, cycles), cycles, 1, most)
     codes: list[int] = []
     while True:
-        allowed = np.flatnonzero(acceptor.allowed()[0])
+        allowed = np.flatnonzero(mask.allowed()[0])
         if not len(allowed):
             return codes, False
         code = int(rng.choice(allowed))
         if code == END_TOKEN:
             return codes, True
         codes.append(code)
-        acceptor.take(np.array([code]))
+        mask.take(np.array([code]))
 
 
 @given(st.integers(0, 2**32), st.sampled_from(sorted(GRAMMARS)), st.integers(0, 3), st.sampled_from(ALL_LEVELS))
-def test_string_of_allowed_tokens_is_admitted_and_no_longer_than_it_may_be(
+def test_strings_of_allowed_tokens_are_admitted_and_within_the_maximum_length(
     seed: int, name: str, cycles: int, strictness: Strictness
 ) -> None:
     known = GRAMMARS[name]
@@ -121,41 +117,41 @@ def test_string_of_allowed_tokens_is_admitted_and_no_longer_than_it_may_be(
 
 
 @given(st.integers(0, 2**32), st.sampled_from(sorted(GRAMMARS)), st.integers(0, 3))
-def test_chosen_is_the_best_of_what_is_allowed(seed: int, name: str, cycles: int) -> None:
+def test_the_chosen_token_is_the_best_allowed_one(seed: int, name: str, cycles: int) -> None:
     rng = np.random.default_rng(seed)
-    acceptor = GrammarMask(compile_grammar(GRAMMARS[name], 3, cycles), cycles, 4, 12)
+    mask = GrammarMask(compile_grammar(GRAMMARS[name], 3, cycles), cycles, 4, 12)
     for _ in range(12):
-        allowed = acceptor.allowed()
+        allowed = mask.allowed()
         scores = np.where(rng.random(allowed.shape) < 0.2, -np.inf, rng.normal(size=allowed.shape))
         kept = np.array([NO_TOKEN, NO_TOKEN, NO_TOKEN, int(allowed[3].argmax())])
         masked = np.where(allowed, scores, -np.inf)
         wanted = np.where(np.isinf(masked).all(axis=1), NO_TOKEN, masked.argmax(axis=1))
         wanted[3] = kept[3]
-        assert acceptor.choose(scores, kept).tolist() == wanted.tolist()
-        acceptor.take(np.where(wanted == NO_TOKEN, END_TOKEN, wanted))
+        assert mask.choose(scores, kept).tolist() == wanted.tolist()
+        mask.take(np.where(wanted == NO_TOKEN, END_TOKEN, wanted))
 
 
 @given(st.integers(0, 2**32), st.booleans())
-def test_what_is_known_of_open_cycles_changes_no_answer(seed: int, partial: bool) -> None:
+def test_certificates_of_open_cycles_do_not_change_the_mask(seed: int, partial: bool) -> None:
     rng = np.random.default_rng(seed)
-    rules = compile_grammar(grammar_of("A01(A)(AA0)A0(C1)CB0", "A0(C1(C2)(C02CA1)A)C"), 3, 4, partial)
-    knowing, asking = GrammarMask(rules, 4, 1, 40), GrammarMask(rules, 4, 1, 40)
+    compiled = compile_grammar(grammar_of("A01(A)(AA0)A0(C1)CB0", "A0(C1(C2)(C02CA1)A)C"), 3, 4, partial)
+    with_certificates, without_certificates = GrammarMask(compiled, 4, 1, 40), GrammarMask(compiled, 4, 1, 40)
     for _ in range(40):
-        allowed = knowing.allowed()
-        asking._state.witness[:] = NO_TOKEN
-        assert (asking.allowed() == allowed).all()
-        state = knowing._state
+        allowed = with_certificates.allowed()
+        without_certificates.state.certificate[:] = NO_TOKEN
+        assert (without_certificates.allowed() == allowed).all()
+        state = with_certificates.state
         growing = {int(state.current[0]), *state.stack[0, : state.depth[0]].tolist()}
-        for witness in state.witness[0][state.witness[0] != NO_TOKEN].tolist():
-            assert witness in growing
-            assert not state.left[0, witness]
+        for certificate in state.certificate[0][state.certificate[0] != NO_TOKEN].tolist():
+            assert certificate in growing
+            assert not state.finished[0, certificate]
         ways = np.flatnonzero(allowed[0])
         if not len(ways) or ways.tolist() == [END_TOKEN]:
             break
         numbers = ways[ways > 5]  # cycles are what this is about
         token = np.array([rng.choice(numbers if len(numbers) and rng.random() < 0.5 else ways)])
-        knowing.take(token)
-        asking.take(token)
+        with_certificates.take(token)
+        without_certificates.take(token)
 
 
 @given(
@@ -163,7 +159,7 @@ def test_what_is_known_of_open_cycles_changes_no_answer(seed: int, partial: bool
     st.integers(0, toy_training.SHAPES * len(toy_training.SPLITS) - 1),
     st.sampled_from(ALL_LEVELS),
 )
-def test_every_string_of_an_admitted_graph_is_reached(seed: int, number: int, strictness: Strictness) -> None:
+def test_all_strings_of_an_admitted_graph_are_allowed(seed: int, number: int, strictness: Strictness) -> None:
     types, edges = toy_training.graphs()[number]
     grammar = Grammar(toy_training.grammar().neighbourhoods, (), {}, strictness)
     string = encode(types, edges, toy_training.ALPHABET, np.random.default_rng(seed)).string
@@ -174,10 +170,10 @@ def test_every_string_of_an_admitted_graph_is_reached(seed: int, number: int, st
     assert masks[np.arange(len(codes)), codes].all()
     assert follows_grammar(compile_grammar(grammar, 3, 4), 4, codes)
     # With as many tokens as its beginnings need, no token of it is left out for want of room.
-    acceptor = GrammarMask(compile_grammar(grammar, 3, 4), 4, 1, max(most, len(codes) - 1))
+    mask = GrammarMask(compile_grammar(grammar, 3, 4), 4, 1, max(most, len(codes) - 1))
     for code in codes:
-        assert acceptor.allowed()[0, code]
-        acceptor.take(np.array([code]))
+        assert mask.allowed()[0, code]
+        mask.take(np.array([code]))
 
 
 @pytest.mark.parametrize(
@@ -185,31 +181,33 @@ def test_every_string_of_an_admitted_graph_is_reached(seed: int, number: int, st
     [("BCD", 2), ("A", 1), ("B(A)", 3), ("A0B0", 3), ("A00", 2)],
     ids=["no such neighbours", "ends too soon", "branch ends too soon", "edge twice", "edge to itself"],
 )
-def test_what_is_not_admitted_is_refused_at_its_first_wrong_token(string: str, place: int) -> None:
+def test_strings_outside_the_grammar_are_rejected_at_the_first_wrong_token(string: str, place: int) -> None:
     alphabet = make_alphabet(["a", "b", "c", "d"])
     around = {0: {((1, 2),): 1}, 1: {((0, 2),): 1, ((2, 1),): 1}, 2: {((1, 1),): 1}, 3: {((3, 1),): 1}}
-    rules, vocabulary = compile_grammar(Grammar(around, (), {}), 4, 1), Vocabulary(alphabet, 1)
+    compiled, vocabulary = compile_grammar(Grammar(around, (), {}), 4, 1), Vocabulary(alphabet, 1)
     codes = np.append(vocabulary.codes(string), END_TOKEN).astype(np.int64)
     with pytest.raises(ValueError, match=f"token {place} is not allowed"):
-        masks_along(rules, 1, codes)
-    assert not follows_grammar(rules, 1, codes)
+        masks_along(compiled, 1, codes)
+    assert not follows_grammar(compiled, 1, codes)
 
 
 @given(st.integers(0, 2**32), st.sampled_from(sorted(GRAMMARS)), st.sampled_from(ALL_LEVELS))
-def test_partial_rules_admit_what_may_have_more_neighbours(seed: int, name: str, strictness: Strictness) -> None:
+def test_partial_grammars_admit_parts_with_missing_neighbors(seed: int, name: str, strictness: Strictness) -> None:
     known = GRAMMARS[name]
     grammar = Grammar(known.neighbourhoods, known.dockings, {}, strictness, known.hubs)
-    rules = compile_grammar(grammar, 3, 1, partial=True)
+    compiled = compile_grammar(grammar, 3, 1, partial=True)
     counts = np.random.default_rng(seed).integers(0, 3, 3)
     kind = int(np.random.default_rng(seed).integers(3))
     wider = [counts + more for more in np.ndindex(4, 4, 4)]
     whole = [tuple((other, int(count)) for other, count in enumerate(each) if count) for each in wider]
-    docked = all(rules.high[rules.first[kind] : rules.first[kind + 1], other].any() for other in np.flatnonzero(counts))
+    docked = all(
+        compiled.high[compiled.first[kind] : compiled.first[kind + 1], other].any() for other in np.flatnonzero(counts)
+    )
     wanted = docked and any(admits(grammar, kind, each) for each in whole)
-    assert (tokens_to_complete(rules, kind, counts, 0, True) < NO_COMPLETION) == wanted
+    assert (tokens_to_complete(compiled, kind, counts, 0, True) < NO_COMPLETION) == wanted
 
 
-def test_partial_rules_admit_a_spanning_tree() -> None:
+def test_partial_grammars_admit_a_spanning_tree() -> None:
     grammar = grammar_of("A0BAB0")
     vocabulary = Vocabulary(AB, 1)
     tree = np.append(vocabulary.codes("ABAB"), END_TOKEN).astype(np.int64)
@@ -219,7 +217,7 @@ def test_partial_rules_admit_a_spanning_tree() -> None:
 
 
 @pytest.mark.parametrize("name", GRAMMARS)
-def test_rules_come_back_from_their_patterns(name: str) -> None:
-    rules = compile_grammar(GRAMMARS[name], 3, 1)
-    again = compile_patterns(patterns_json(rules), 1)
-    assert all(np.array_equal(one, other) for one, other in zip(rules, again, strict=True))
+def test_compiled_grammars_are_restored_from_their_patterns(name: str) -> None:
+    compiled = compile_grammar(GRAMMARS[name], 3, 1)
+    again = compile_patterns(patterns_json(compiled), 1)
+    assert all(np.array_equal(one, other) for one, other in zip(compiled, again, strict=True))

@@ -67,7 +67,7 @@ def pairs(edges: np.ndarray) -> set[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("name", KITS)
-def test_faces_stay_and_nothing_else_that_does_not_hold_the_shape_together(name: str) -> None:
+def test_faces_stay_and_other_contacts_only_to_connect_the_shape(name: str) -> None:
     kit = kit_of(name)
     for exemplar in kit.exemplars:
         assembly = exemplar.assembly
@@ -81,7 +81,7 @@ def test_faces_stay_and_nothing_else_that_does_not_hold_the_shape_together(name:
         assert nx.is_connected(nx.Graph(list(kept)))
 
 
-def test_cubes_are_held_by_faces_and_where_there_is_none_by_a_line_before_a_point() -> None:
+def test_lines_are_preferred_to_points_where_faces_do_not_connect_cubes() -> None:
     kit = kit_of("cubes")
     block, stairs = (each.assembly for each in kit.exemplars)
     writer = KitStrings(kit, "faces")
@@ -90,7 +90,7 @@ def test_cubes_are_held_by_faces_and_where_there_is_none_by_a_line_before_a_poin
 
 
 @pytest.mark.parametrize("name", KITS)
-def test_order_and_place_of_the_parts_change_no_graph_of_faces(name: str) -> None:
+def test_the_graph_of_faces_does_not_depend_on_order_and_pose_of_the_parts(name: str) -> None:
     kit = kit_of(name)
     writer = KitStrings(kit, "faces")
     for seed, exemplar in enumerate(kit.exemplars):
@@ -101,7 +101,7 @@ def test_order_and_place_of_the_parts_change_no_graph_of_faces(name: str) -> Non
 
 @pytest.mark.parametrize("name", KITS)
 @pytest.mark.parametrize("edges", ["all", "faces", "tree"])
-def test_strings_stand_for_what_they_tell_of(name: str, edges: str) -> None:
+def test_strings_decode_to_the_graph_of_their_edges(name: str, edges: str) -> None:
     kit = kit_of(name)
     writer = KitStrings(kit, edges)  # type: ignore[arg-type]
     assembly = kit.exemplars[0].assembly

@@ -145,7 +145,7 @@ def lines(out: Path, file: str) -> list[str]:
     return (out / "toys-corpus" / file).read_text().splitlines()
 
 
-def test_each_sample_has_its_canonical_string_and_distinct_random_ones(made: Path) -> None:
+def test_samples_have_a_canonical_string_and_distinct_random_strings(made: Path) -> None:
     work = DatasetPaths(made, "toys").work
     for shard in SPLITS:
         samples = {each.key: each for each in read_samples(work / "variations" / f"{shard}.tar")}
@@ -165,7 +165,7 @@ def test_each_sample_has_its_canonical_string_and_distinct_random_ones(made: Pat
                 assert graph_digest(decoded.types, decoded.edges) == sample.graph
 
 
-def test_shapes_of_one_graph_have_one_canonical_string(made: Path) -> None:
+def test_shapes_with_equal_graphs_have_equal_canonical_strings(made: Path) -> None:
     work = DatasetPaths(made, "toys").work / "strings"
     first, again = (
         dict(read_shard(work / f"{shard}.tar"))[f"{shard}-0"]["txt"].decode().splitlines()
@@ -175,7 +175,7 @@ def test_shapes_of_one_graph_have_one_canonical_string(made: Path) -> None:
     assert first[1:] != again[1:]
 
 
-def test_the_corpus_has_every_string_once_in_the_file_of_its_kit_and_split(made: Path) -> None:
+def test_corpora_have_each_string_once_by_kit_and_split(made: Path) -> None:
     files = {each.name for each in (made / "toys-corpus").iterdir()}
     corpus = {f"{kit}-{split}.txt" for kit in KITS for split in ("train", "val")}
     assert files == corpus | {"vocabulary.json", "statistics.json"}
@@ -224,11 +224,11 @@ def test_the_report_counts_the_corpus(made: Path) -> None:
     report = STAGE.report(survey.stage("strings").view)
     assert len(report) == 1 + len(KITS)
     assert report[1].startswith("castle: ")
-    assert report[1].endswith("cycle rank of the shapes 10 in the median, 21 at most"), "of grids of 3 x 4 to 4 x 8"
+    assert report[1].endswith("cycle rank 10 (median), 21 at most"), "of grids of 3 x 4 to 4 x 8"
     assert report[0].startswith(f"corpus: {total} strings of 11 graphs")
 
 
-def test_one_worker_two_workers_and_this_process_make_the_same_bytes(made: Path, tmp_path: Path) -> None:
+def test_output_does_not_depend_on_the_number_of_workers(made: Path, tmp_path: Path) -> None:
     assert make_here(config(), tmp_path / "here") == {}
     assert make_here(config(), tmp_path / "two", ("exemplars", "variations")) == {}
     run_stage("strings", STAGES, config(), DatasetPaths(tmp_path / "two", "toys"), workers=2)
@@ -237,26 +237,26 @@ def test_one_worker_two_workers_and_this_process_make_the_same_bytes(made: Path,
             assert (tmp_path / other / ".work" / "toys" / "strings" / path.name).read_bytes() == path.read_bytes()
 
 
-def test_without_random_strings_every_shape_has_its_canonical_one(tmp_path: Path) -> None:
+def test_zero_random_strings_leave_the_canonical_one(tmp_path: Path) -> None:
     assert make_here(config(count=0), tmp_path) == {}
     for shard in SPLITS:
         for _, members in read_shard(tmp_path / ".work" / "toys" / "strings" / f"{shard}.tar"):
             assert members["txt"].count(b"\n") == 1
 
 
-def test_one_graph_in_two_splits_fails_the_corpus_and_names_both_shapes(tmp_path: Path) -> None:
+def test_a_graph_in_two_splits_fails_and_names_both_shapes(tmp_path: Path) -> None:
     failed = make_here(config("one graph in two splits"), tmp_path)
     assert list(failed) == ["corpus"]
     assert "toys-val-000000-0 of val and toys-train-000000-0 of train have the same graph" in failed["corpus"]
 
 
-def test_a_sample_filed_under_a_wrong_graph_fails_its_shard(tmp_path: Path) -> None:
+def test_a_sample_with_a_wrong_graph_hash_fails_its_shard(tmp_path: Path) -> None:
     failed = make_here(config("wrong digest"), tmp_path)
     assert set(failed) == set(SPLITS)
     assert "sample toys-val-000000-1 is filed under graph 0000" in failed["toys-val-000000"]
 
 
-def test_a_shape_that_is_not_connected_is_refused_and_counted(tmp_path: Path) -> None:
+def test_shapes_that_are_not_connected_are_rejected_and_counted(tmp_path: Path) -> None:
     assert make_here(config("not connected"), tmp_path) == {}
     survey = Inventory(config("not connected"), STAGES, DatasetPaths(tmp_path, "toys"))
     records = survey.stage("strings").records
@@ -278,7 +278,7 @@ def trees(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_strings_of_trees_have_no_cycles_and_say_so(trees: Path) -> None:
+def test_strings_of_trees_have_no_cycles(trees: Path) -> None:
     work = DatasetPaths(trees, "toys").work
     for shard in SPLITS:
         samples = {each.key: each for each in read_samples(work / "variations" / f"{shard}.tar")}
@@ -295,20 +295,20 @@ def test_strings_of_trees_have_no_cycles_and_say_so(trees: Path) -> None:
     assert statistics["castle"]["train"]["cycle_rank"]["histogram"] == {"6": 2, "15": 1, "18": 1}
 
 
-def test_a_string_that_several_graphs_share_stands_once_in_a_corpus_of_trees(tmp_path: Path) -> None:
+def test_a_string_of_several_graphs_occurs_once_in_a_corpus_of_trees(tmp_path: Path) -> None:
     """A ring of links and the chain of the same links have strings in common; here they stand in different splits."""
     assert make_here(config("rings in val", edges="tree", count=40), tmp_path) == {}
     statistics = json.loads(corpus_file(tmp_path, "statistics.json"))
     train, val = (corpus_file(tmp_path, f"chain-{split}.txt").splitlines() for split in ("train", "val"))
     assert not set(train) & set(val)
     assert len(set(train)) == len(train)
-    assert statistics["chain"]["val"]["elsewhere_dropped"] > 0
-    assert statistics["chain"]["train"]["elsewhere_dropped"] == 0
+    assert statistics["chain"]["val"]["in_other_splits_dropped"] > 0
+    assert statistics["chain"]["train"]["in_other_splits_dropped"] == 0
     survey = Inventory(config("rings in val", edges="tree", count=40), STAGES, DatasetPaths(tmp_path, "toys"))
-    assert "that stand in another split dropped" in STAGE.report(survey.stage("strings").view)[0]
+    assert "of other splits dropped" in STAGE.report(survey.stage("strings").view)[0]
 
 
-def test_the_card_says_what_strings_stand_for_and_how_long_they_are(trees: Path) -> None:
+def test_the_card_describes_edges_and_lengths_of_strings(trees: Path) -> None:
     survey = Inventory(config(edges="tree"), STAGES, DatasetPaths(trees, "toys"))
     meaning, table = MEMBERS.card(survey.stage("strings").view)
     assert meaning.startswith(EDGE_DESCRIPTIONS["tree"])

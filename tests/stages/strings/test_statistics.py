@@ -16,7 +16,7 @@ from stages.strings.statistics import StringFigures, StringStatistics, measure_s
         ("[a_1]0(B)([a(1)])C0", StringFigures(characters=19, tokens=10, nodes=4, cycles=1, branch_depth=1)),
     ],
 )
-def test_a_string_is_measured_in_tokens(string: str, figures: StringFigures) -> None:
+def test_lengths_of_strings_are_in_tokens(string: str, figures: StringFigures) -> None:
     assert measure_string(string) == figures
 
 
@@ -32,7 +32,7 @@ def test_statistics_count_values_and_tokens() -> None:
     assert "cycle_rank" not in described
 
 
-def test_figures_of_several_files_are_joined() -> None:
+def test_figures_of_several_files_are_merged() -> None:
     first, second = StringStatistics(), StringStatistics()
     for statistics, strings, ranks in ((first, ["AB", "AAAAA"], [3]), (second, ["A0AA0"], [1, 7])):
         for string in strings:

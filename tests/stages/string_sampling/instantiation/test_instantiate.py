@@ -1,4 +1,4 @@
-"""Graphs become shapes: what is there is found, what cannot be is known not to be, and meshes have the last word."""
+"""Graphs become shapes: possible ones are found, impossible ones are detected, and meshes decide."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def loop(width: int, depth: int) -> list[str]:
     return [each for side in (width, depth) * 2 for each in ("corner", *["straight"] * side)]
 
 
-def put_together(
+def instantiate_names(
     maker: Instantiator, names: Sequence[str], edges: IntArray, method: SolverMethod = STANDARD_METHOD, seed: int = 0
 ) -> Instantiation:
     return maker.instantiate(labels(maker.kit, names), edges, np.random.default_rng(seed), method)
@@ -69,18 +69,16 @@ def put_together(
 
 @settings(deadline=None, max_examples=15)
 @given(width=st.integers(1, 3), depth=st.integers(1, 3), shift=st.integers(0, 30), seed=st.integers(0, 5))
-def test_a_ring_closes_wherever_its_graph_begins(
-    roads: Instantiator, width: int, depth: int, shift: int, seed: int
-) -> None:
+def test_ring_closes_from_any_start(roads: Instantiator, width: int, depth: int, shift: int, seed: int) -> None:
     names = loop(width, depth)
     names = [*names[shift % len(names) :], *names[: shift % len(names)]]
     edges = cycle(len(names))
-    found = put_together(roads, names, edges, seed=seed)
+    found = instantiate_names(roads, names, edges, seed=seed)
     assert found.assembly is not None, found.reason
     assert found.assembly.edges.tolist() == edges.tolist()
     assert roads.kit.label_of[found.assembly.types].tolist() == labels(roads.kit, names).tolist()
     assert assembly_faults(roads.kit, found.assembly) == []
-    assert found.tries <= 3 * len(names)
+    assert found.placements <= 3 * len(names)
 
 
 @pytest.mark.parametrize(
@@ -92,23 +90,23 @@ def test_a_ring_closes_wherever_its_graph_begins(
     ],
     ids=["three corners", "sides of different lengths", "no corner"],
 )
-def test_a_ring_that_cannot_close_is_known_to_be_impossible(roads: Instantiator, names: list[str]) -> None:
-    found = put_together(roads, names, cycle(len(names)))
+def test_unclosable_ring_is_impossible(roads: Instantiator, names: list[str]) -> None:
+    found = instantiate_names(roads, names, cycle(len(names)))
     assert (found.assembly, found.reason) == (None, "no arrangement")
 
 
 @pytest.mark.parametrize("links", [2, 3, 6])
-def test_a_chain_is_put_together_link_by_link(chains: Instantiator, links: int) -> None:
+def test_chain_needs_one_placement_per_link(chains: Instantiator, links: int) -> None:
     names = ["cap", *["link"] * links, "cap"]
-    found = put_together(chains, names, path(len(names)))
+    found = instantiate_names(chains, names, path(len(names)))
     assert found.assembly is not None
-    assert found.tries == len(names)
+    assert found.placements == len(names)
     spans = found.assembly.poses[:, :3, 3]
     assert np.linalg.norm(spans[-1] - spans[0]) == pytest.approx(links + 0.5, abs=1e-6)
     assert assembly_faults(chains.kit, found.assembly) == []
 
 
-def test_exemplars_come_back_from_their_own_graphs(roads: Instantiator) -> None:
+def test_exemplars_are_recovered_from_their_graphs(roads: Instantiator) -> None:
     for exemplar in roads.kit.exemplars:
         graph = roads.kit.labelled(exemplar.assembly)
         found = roads.instantiate(graph.types, graph.edges, np.random.default_rng(1))
@@ -117,23 +115,25 @@ def test_exemplars_come_back_from_their_own_graphs(roads: Instantiator) -> None:
         assert graph_digest(again.types, again.edges) == graph_digest(graph.types, graph.edges)
 
 
-def test_a_graph_in_pieces_and_one_that_the_grammar_refuses_are_named(chains: Instantiator) -> None:
-    two = put_together(chains, ["cap", "link", "cap", "cap", "link", "cap"], np.array([[0, 1], [1, 2], [3, 4], [4, 5]]))
-    assert two == Instantiation(None, "not in one piece", 0)
-    bare = put_together(chains, ["cap", "link"], path(2))
+def test_disconnected_and_refused_graphs_have_a_reason(chains: Instantiator) -> None:
+    two = instantiate_names(
+        chains, ["cap", "link", "cap", "cap", "link", "cap"], np.array([[0, 1], [1, 2], [3, 4], [4, 5]])
+    )
+    assert two == Instantiation(None, "not connected", 0)
+    bare = instantiate_names(chains, ["cap", "link"], path(2))
     assert bare == Instantiation(None, "neighbourhood not in the grammar", 0)
 
 
-def test_a_tree_of_a_ring_becomes_the_ring(roads: Instantiator) -> None:
+def test_spanning_tree_of_ring_becomes_the_ring(roads: Instantiator) -> None:
     """A string that tells of no cycle: the contact that it leaves out is found, for without it two tiles lack one."""
     names = loop(2, 1)
-    found = put_together(roads, names, path(len(names)), SolverMethod(whole=False))
+    found = instantiate_names(roads, names, path(len(names)), SolverMethod(whole=False))
     assert found.assembly is not None, found.reason
     assert len(found.assembly.edges) == len(names)
     assert assembly_faults(roads.kit, found.assembly) == []
 
 
-def test_strings_of_exemplars_become_shapes_whatever_they_tell_of(roads: Instantiator) -> None:
+def test_strings_of_exemplars_become_shapes_with_any_edges(roads: Instantiator) -> None:
     for edges in ("all", "faces", "tree"):
         writer = KitStrings(roads.kit, edges)
         graph = writer.graph(roads.kit.exemplars[1].assembly)
@@ -145,30 +145,30 @@ def test_strings_of_exemplars_become_shapes_whatever_they_tell_of(roads: Instant
         assert found.assembly is not None
 
 
-def test_what_was_asked_before_changes_no_answer(roads: Instantiator) -> None:
+def test_earlier_graphs_do_not_change_a_result(roads: Instantiator) -> None:
     fresh = Instantiator(ContactOracle(roads.kit))
     names = loop(3, 2)
-    one, other = (put_together(each, names, cycle(len(names)), seed=3) for each in (roads, fresh))
-    assert one.tries == other.tries
+    one, other = (instantiate_names(each, names, cycle(len(names)), seed=3) for each in (roads, fresh))
+    assert one.placements == other.placements
     assert one.assembly is not None
     assert other.assembly is not None
     assert one.assembly.poses.tobytes() == other.assembly.poses.tobytes()
 
 
-def test_room_for_a_large_graph_is_none_for_a_small_one(roads: Instantiator, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(instantiate, "VALUES_A_NODE", 1)
-    monkeypatch.setattr(instantiate, "FEWEST", 1)
+def test_room_depends_on_the_graph_alone(roads: Instantiator, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(instantiate, "VALUES_PER_NODE", 1)
+    monkeypatch.setattr(instantiate, "MIN_NODES", 1)
     fresh, used = (Instantiator(ContactOracle(roads.kit)) for _ in range(2))
-    used._room(400)
+    used._make_room(400)
     names = loop(3, 2)
-    reasons = {put_together(each, names, cycle(len(names)), seed=3).reason for each in (fresh, used)}
-    assert reasons == {"too many places for parts"}
+    reasons = {instantiate_names(each, names, cycle(len(names)), seed=3).reason for each in (fresh, used)}
+    assert reasons == {"too many placements"}
 
 
 @pytest.mark.parametrize("switch", ["constrained", "backtracks", "closes"])
-def test_each_step_beyond_the_paper_can_be_left_out(roads: Instantiator, switch: str) -> None:
+def test_each_step_beyond_the_paper_is_optional(roads: Instantiator, switch: str) -> None:
     names = loop(1, 1)
-    found = put_together(roads, names, cycle(len(names)), SolverMethod(**{switch: False}, budget=20_000))
+    found = instantiate_names(roads, names, cycle(len(names)), SolverMethod(**{switch: False}, budget=20_000))
     assert found.assembly is not None, found.reason
     assert assembly_faults(roads.kit, found.assembly) == []
 
@@ -195,38 +195,40 @@ def fences() -> Instantiator:
     return Instantiator(ContactOracle(kit_of(FENCE, [fence(1, 1), fence(2, 1)])))
 
 
-def test_looking_ahead_to_where_a_cycle_closes_saves_tries(fences: Instantiator) -> None:
+def test_look_ahead_to_cycles_saves_placements(fences: Instantiator) -> None:
     names = ["post", "wall"] * 14
-    tries = {
+    placements = {
         closes: [
-            put_together(fences, names, cycle(len(names)), SolverMethod(closes=closes, budget=20_000), seed).tries
+            instantiate_names(
+                fences, names, cycle(len(names)), SolverMethod(closes=closes, budget=20_000), seed
+            ).placements
             for seed in range(5)
         ]
         for closes in (True, False)
     }
-    assert max(tries[True]) < 20 * len(names)
-    assert 2 * sum(tries[True]) < sum(tries[False])
+    assert max(placements[True]) < 20 * len(names)
+    assert 2 * sum(placements[True]) < sum(placements[False])
 
 
 @pytest.mark.parametrize(("posts", "reason"), [(4, ""), (6, ""), (5, "no arrangement"), (7, "no arrangement")])
-def test_a_fence_of_unit_walls_has_an_even_number_of_them(fences: Instantiator, posts: int, reason: str) -> None:
-    found = put_together(fences, ["post", "wall"] * posts, cycle(2 * posts))
+def test_fence_of_unit_walls_needs_an_even_number(fences: Instantiator, posts: int, reason: str) -> None:
+    found = instantiate_names(fences, ["post", "wall"] * posts, cycle(2 * posts))
     assert found.reason == reason
 
 
-def test_a_random_assembly_is_hardly_ever_a_shape(roads: Instantiator) -> None:
+def test_random_assembly_is_rarely_a_shape(roads: Instantiator) -> None:
     """Figure 8: the chance that all dockings are right falls with each part."""
     at_random = SolverMethod(checked=False, constrained=False, backtracks=False, closes=False, budget=16)
     names = loop(2, 2)
-    found = [put_together(roads, names, cycle(len(names)), at_random, seed) for seed in range(40)]
+    found = [instantiate_names(roads, names, cycle(len(names)), at_random, seed) for seed in range(40)]
     assert sum(each.assembly is not None for each in found) <= 4
     assert {each.reason for each in found if each.assembly is None} == {"contacts are not the edges"}
-    assert all(each.tries == len(names) for each in found)
+    assert all(each.placements == len(names) for each in found)
 
 
-def test_a_budget_is_kept(roads: Instantiator) -> None:
-    found = put_together(roads, loop(3, 3), cycle(16), SolverMethod(budget=7))
-    assert (found.assembly, found.reason, found.tries) == (None, "budget spent", 7)
+def test_budget_limits_placements(roads: Instantiator) -> None:
+    found = instantiate_names(roads, loop(3, 3), cycle(16), SolverMethod(budget=7))
+    assert (found.assembly, found.reason, found.placements) == (None, "budget spent", 7)
 
 
 def arrangements(kit: Kit, kinds: list[int], edges: IntArray) -> Iterator[Assembly]:
@@ -249,7 +251,7 @@ def arrangements(kit: Kit, kinds: list[int], edges: IntArray) -> Iterator[Assemb
 
 @settings(deadline=None, max_examples=25)
 @given(names=st.lists(st.sampled_from(["straight", "corner"]), min_size=2, max_size=5))
-def test_what_is_possible_is_what_trying_everything_finds(ungoverned: Instantiator, names: list[str]) -> None:
+def test_solver_agrees_with_brute_force(ungoverned: Instantiator, names: list[str]) -> None:
     """On paths, whose ends have too few neighbours for the grammar: any arrangement whose contacts, by the meshes, are
     those of the path."""
     kit, edges = ungoverned.kit, path(len(names))

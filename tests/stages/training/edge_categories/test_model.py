@@ -173,7 +173,7 @@ def test_parts_of_one_label_have_one_surface_in_all_their_categories(tmp_path: P
             types: dict[int, int] = {}
             for text, (here, there), each in zip(decoded.texts, token_edges(decoded).tolist(), chosen, strict=True):
                 if text in of_chairs.alphabet.types:
-                    beside = of_chairs.beside(types.get(here), int(decoded.types[there]))
+                    beside = of_chairs.categories_between(types.get(here), int(decoded.types[there]))
                     assert each in beside or not beside
                     types[there] = int(of_chairs.types[each, 1])
 
