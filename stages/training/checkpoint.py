@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from pydantic import ValidationError
+
 from stages.training.model_config import ModelConfig
 
 if TYPE_CHECKING:
@@ -66,7 +68,11 @@ def load_module(
     Raises CheckpointError as `load_checkpoint`, and for weights with other tensors than the module.
     """
     tensors, header = load_checkpoint(path, expected)
-    module = build(config.model_validate({"name": "trained", "kind": header["kind"], **header["settings"]}), header)
+    try:
+        settings = config.model_validate({"name": "trained", "kind": header["kind"], **header["settings"]})
+    except ValidationError as error:
+        raise CheckpointError(f"{path} has settings of another version of Shapemill: train it again") from error
+    module = build(settings, header)
     if module.state_dict().keys() != tensors.keys():
         raise CheckpointError(f"{path} has other tensors than this version of Shapemill: train it again (make train)")
     module.load_state_dict(tensors)

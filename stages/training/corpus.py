@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Self, TypeVar
 
 import numpy.typing as npt
 
+from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
-from pipeline.stage import Task
+from pipeline.stage import Outcome, Task
 from stages.shape.sample import read_samples
+from stages.shapeassembly.syntax.errors import ProgramError
 from stages.shapeassembly.syntax.parser import parse
 from stages.shapeassembly.syntax.program import AssemblyProgram
 
@@ -31,6 +33,7 @@ class ArrayCorpus:
 
 
 Corpus = TypeVar("Corpus", bound=ArrayCorpus)
+Sample = TypeVar("Sample")
 
 
 def write_arrays(task: Task, file: str, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
@@ -63,6 +66,38 @@ def read_arrays(task: Task, suffix: str) -> dict[str, npt.NDArray[Any]]:
 def read_splits(task: Task, corpus: type[Corpus]) -> dict[str, Corpus]:
     """Read the corpora of train and val, in a round's shard."""
     return {split: corpus.of_arrays(read_arrays(task, split)) for split in ("train", "val")}
+
+
+def prepare_category(
+    task: Task,
+    convert: Callable[[str, AssemblyProgram], Sample],
+    join: Callable[[list[Sample]], ArrayCorpus],
+    count: Callable[[Any], dict[str, int]],
+    limit: str,
+) -> Outcome:
+    """Prepare the programs of a category: write `.<split>.safetensors` for train and val, and `.json`, their counts.
+
+    convert: turns a program, with its key, into a sample; raises ProgramError or Rejected for one to leave out.
+    join: makes the corpus of a split.
+    count: counts what is in a corpus.
+    limit: what is kept, for the error of an empty split.
+    Raises Rejected where a split keeps no sample.
+    """
+    counts: dict[str, dict[str, int]] = {}
+    for split in ("train", "val"):
+        kept: list[Sample] = []
+        for key, program in category_programs(task, split):
+            try:
+                kept.append(convert(key, program))
+            except (ProgramError, Rejected) as error:
+                task.reject(key, error.reason, error.detail)
+        if not kept:
+            raise Rejected(f"{task.shard.params['kit']} has no {limit} in split {split}")
+        corpus = join(kept)
+        counts[split] = count(corpus)
+        write_arrays(task, f"{task.shard.name}.{split}.safetensors", corpus.arrays())
+    write_description(task, {"counts": counts})
+    return Outcome(samples=0, summary=counts)
 
 
 def category_programs(task: Task, split: str) -> Iterator[tuple[str, AssemblyProgram]]:

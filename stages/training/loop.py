@@ -34,11 +34,6 @@ def set_deterministic(threads: int) -> None:
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]  # it only costs time
 
 
-def resolve_device(setting: str) -> torch.device:
-    """Return the device of a config's `device`."""
-    return torch.device("cuda" if setting == "cuda" or (setting == "auto" and torch.cuda.is_available()) else "cpu")
-
-
 def resolve_precision(setting: str, device: torch.device) -> str:
     """Return the precision of a config's `precision` on a device.
 

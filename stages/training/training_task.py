@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 import torch
@@ -14,6 +14,7 @@ from torch import Generator, Tensor, nn
 from pipeline.paths import file_digest
 from pipeline.stage import Task
 from stages.training.latent import LatentGaussian
+from stages.training.model_config import ModelConfig
 
 Module = TypeVar("Module", bound=nn.Module)
 
@@ -33,6 +34,29 @@ class TrainingTask(ABC):
     config: Any
     train: Any
     val: Any
+
+    @classmethod
+    def of(
+        cls,
+        task: Task,
+        config: ModelConfig,
+        module: nn.Module,
+        samples: Mapping[str, Any],
+        header: Mapping[str, Any],
+        suffix: str = "safetensors",
+        **fields: Any,
+    ) -> Self:
+        """Build the task of a round.
+
+        samples: of `train` and `val`.
+        header: without the sha256 of the prepared samples.
+        suffix: the end of the names of their files.
+        """
+        data = task.shard.params["data"]
+        paths = {split: task.input("training", f"{data}.{split}.{suffix}") for split in ("train", "val")}
+        header = {**header, "data": {split: file_digest(path) for split, path in paths.items()}}
+        module = module.to(resolve_device(config.device))
+        return cls(module, header, config, samples["train"], samples["val"], **fields)
 
     @property
     def device(self) -> torch.device:
@@ -93,10 +117,6 @@ def seeded(seed: int, build: Callable[[], Module]) -> Module:
         return build()
 
 
-def sample_digests(task: Task, suffix: str) -> dict[str, str]:
-    """Return the sha256 of the prepared samples of train and val, for the header.
-
-    suffix: the end of their file names.
-    """
-    data = task.shard.params["data"]
-    return {split: file_digest(task.input("training", f"{data}.{split}.{suffix}")) for split in ("train", "val")}
+def resolve_device(setting: str) -> torch.device:
+    """Return the device of a config's `device`."""
+    return torch.device("cuda" if setting == "cuda" or (setting == "auto" and torch.cuda.is_available()) else "cpu")

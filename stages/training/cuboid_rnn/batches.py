@@ -76,7 +76,6 @@ class CuboidBatch:
         return len(self.inputs)
 
     def to(self, device: torch.device) -> CuboidBatch:
-        """Move the batch to a device."""
         return CuboidBatch(**{name: tensor.to(device, non_blocking=True) for name, tensor in vars(self).items()})
 
 

@@ -12,8 +12,9 @@ from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.interpreter import execute
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.validity import execution_boxes
+from stages.shapeassembly.syntax.program import AssemblyProgram
 from stages.training.box_vectors import CENTER, SIZE, box_vector
-from stages.training.corpus import category_programs, write_arrays, write_description
+from stages.training.corpus import prepare_category
 from stages.training.cuboid_rnn.batches import MAX_BOXES, CuboidCorpus
 
 MIRROR_TOLERANCE = 0.02
@@ -21,27 +22,18 @@ MIRROR_TOLERANCE = 0.02
 
 
 def prepare(task: Task) -> Outcome:
-    """Write `.<split>.safetensors`, the `CuboidCorpus` of train and val, and `.json`, their counts.
+    """Prepare the `CuboidCorpus` of train and val. Leaves out shapes of more than MAX_BOXES cuboids."""
 
-    Rejects shapes of more than MAX_BOXES cuboids. Raises Rejected where a split keeps none.
-    """
-    counts: dict[str, dict[str, int]] = {}
-    for split in ("train", "val"):
-        kept: list[FloatArray] = []
-        for key, program in category_programs(task, split):
-            rows = cuboid_rows(execution_boxes(execute(program)))
-            if len(rows) > MAX_BOXES:
-                task.reject(key, "too many cuboids", f"{len(rows)}, at most {MAX_BOXES} are learnt")
-                continue
-            kept.append(rows)
-        if not kept:
-            kit = task.shard.params["kit"]
-            raise Rejected(f"{kit} has no shapes of at most {MAX_BOXES} cuboids in split {split}")
-        cuboids = CuboidCorpus.of(kept)
-        counts[split] = {"shapes": len(cuboids), "cuboids": len(cuboids.rows)}
-        write_arrays(task, f"{task.shard.name}.{split}.safetensors", cuboids.arrays())
-    write_description(task, {"counts": counts})
-    return Outcome(samples=0, summary=counts)
+    def convert(key: str, program: AssemblyProgram) -> FloatArray:
+        rows = cuboid_rows(execution_boxes(execute(program)))
+        if len(rows) > MAX_BOXES:
+            raise Rejected("too many cuboids", f"{len(rows)}, at most {MAX_BOXES} are learnt")
+        return rows
+
+    def count(cuboids: CuboidCorpus) -> dict[str, int]:
+        return {"shapes": len(cuboids), "cuboids": len(cuboids.rows)}
+
+    return prepare_category(task, convert, CuboidCorpus.of, count, f"shapes of at most {MAX_BOXES} cuboids")
 
 
 def cuboid_rows(boxes: Sequence[Box]) -> FloatArray:

@@ -16,8 +16,7 @@ from stages.training.cuboid_rnn.corpus import prepare
 from stages.training.cuboid_rnn.model import CuboidRnn, log_density
 from stages.training.cuboid_rnn.settings import CuboidRnnConfig
 from stages.training.kind import Kind
-from stages.training.loop import resolve_device
-from stages.training.training_task import TrainingTask, sample_digests, seeded
+from stages.training.training_task import TrainingTask, seeded
 
 
 @dataclass(frozen=True)
@@ -40,15 +39,11 @@ class CuboidRnnTask(TrainingTask):
 
 
 def new_task(task: Task, config: CuboidRnnConfig, seed: int) -> CuboidRnnTask:
-    """Build a task with fresh weights."""
-    cuboids = read_splits(task, CuboidCorpus)
-    header = {**read_description(task), "data": sample_digests(task, "safetensors")}
-    module = new_model(config, seed).to(resolve_device(config.device))
-    return CuboidRnnTask(module, header, config, cuboids["train"], cuboids["val"])
+    samples = read_splits(task, CuboidCorpus)
+    return CuboidRnnTask.of(task, config, new_model(config, seed), samples, read_description(task))
 
 
 def new_model(config: CuboidRnnConfig, seed: int) -> CuboidRnn:
-    """Build a model with random weights."""
     return seeded(seed, lambda: CuboidRnn(config))
 
 

@@ -16,8 +16,7 @@ from stages.training.edge_categories.corpus import prepare, read_corpus
 from stages.training.edge_categories.model import EdgeCategoriesModel, make_model, masked
 from stages.training.edge_categories.settings import EdgeCategoriesConfig
 from stages.training.kind import Kind
-from stages.training.loop import resolve_device
-from stages.training.training_task import TrainingTask, sample_digests, seeded
+from stages.training.training_task import TrainingTask, seeded
 
 
 @dataclass(frozen=True)
@@ -72,16 +71,13 @@ class EdgeCategoriesTask(TrainingTask):
 
 
 def new_task(task: Task, config: EdgeCategoriesConfig, seed: int) -> EdgeCategoriesTask:
-    """Build a task with fresh weights."""
     description = read_description(task)
     tables, strings = read_corpus(task)
-    header = {**description, "data": sample_digests(task, "rows")}
-    module = new_model(config, tables, description["cycles"], seed).to(resolve_device(config.device))
-    return EdgeCategoriesTask(module, header, config, strings["train"], strings["val"], tables)
+    module = new_model(config, tables, description["cycles"], seed)
+    return EdgeCategoriesTask.of(task, config, module, strings, description, "rows", tables=tables)
 
 
 def new_model(config: EdgeCategoriesConfig, tables: CategoryTables, cycles: int, seed: int) -> EdgeCategoriesModel:
-    """Build a model with random weights."""
     return seeded(seed, lambda: make_model(config, tables, cycles))
 
 

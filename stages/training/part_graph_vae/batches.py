@@ -92,7 +92,6 @@ class GraphLevel:
         return len(self.boxes)
 
     def to(self, device: torch.device) -> GraphLevel:
-        """Move the level to a device."""
         return GraphLevel(**{name: tensor.to(device, non_blocking=True) for name, tensor in vars(self).items()})
 
 

@@ -12,31 +12,18 @@ from stages.shapeassembly.extraction.boxes import bounding_box, box_corners, box
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.validity import MAX_CONNECTED_GAP_SHARE, execution_boxes
 from stages.training.box_vectors import BOX_WIDTH, box_vector
-from stages.training.corpus import category_programs, write_arrays, write_description
+from stages.training.corpus import prepare_category
 from stages.training.part_graph_vae.batches import MAX_CHILDREN, GraphCorpus, GraphNode
 
 
 def prepare(task: Task) -> Outcome:
-    """Write `.<split>.safetensors`, the `GraphCorpus` of train and val, and `.json`, their counts.
+    """Prepare the `GraphCorpus` of train and val. Leaves out shapes with a node of more than MAX_CHILDREN parts."""
 
-    Rejects shapes with a node of more than MAX_CHILDREN parts. Raises Rejected where a split keeps none.
-    """
-    counts: dict[str, dict[str, int]] = {}
-    for split in ("train", "val"):
-        kept: list[list[GraphNode]] = []
-        for key, program in category_programs(task, split):
-            try:
-                kept.append(graph_nodes(execute(program)))
-            except Rejected as error:
-                task.reject(key, error.reason, error.detail)
-        if not kept:
-            kit = task.shard.params["kit"]
-            raise Rejected(f"{kit} has no shapes of at most {MAX_CHILDREN} parts a node in split {split}")
-        graphs = GraphCorpus.of(kept)
-        counts[split] = {"shapes": len(graphs), "nodes": len(graphs.boxes), "parts": int(graphs.counts.sum())}
-        write_arrays(task, f"{task.shard.name}.{split}.safetensors", graphs.arrays())
-    write_description(task, {"counts": counts})
-    return Outcome(samples=0, summary=counts)
+    def count(graphs: GraphCorpus) -> dict[str, int]:
+        return {"shapes": len(graphs), "nodes": len(graphs.boxes), "parts": int(graphs.counts.sum())}
+
+    limit = f"shapes of at most {MAX_CHILDREN} parts a node"
+    return prepare_category(task, lambda _, program: graph_nodes(execute(program)), GraphCorpus.of, count, limit)
 
 
 def graph_nodes(execution: Execution) -> list[GraphNode]:

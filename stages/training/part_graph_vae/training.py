@@ -18,12 +18,11 @@ from pipeline.stage import Task
 from stages.training.corpus import read_description, read_splits
 from stages.training.kind import Kind
 from stages.training.latent import reparameterize
-from stages.training.loop import resolve_device
 from stages.training.part_graph_vae.batches import GraphBatch, GraphCorpus, batches
 from stages.training.part_graph_vae.corpus import prepare
 from stages.training.part_graph_vae.model import PartGraphVae
 from stages.training.part_graph_vae.settings import PartGraphVaeConfig
-from stages.training.training_task import TrainingTask, sample_digests, seeded
+from stages.training.training_task import TrainingTask, seeded
 
 
 @dataclass(frozen=True)
@@ -43,15 +42,11 @@ class PartGraphVaeTask(TrainingTask):
 
 
 def new_task(task: Task, config: PartGraphVaeConfig, seed: int) -> PartGraphVaeTask:
-    """Build a task with fresh weights."""
-    graphs = read_splits(task, GraphCorpus)
-    header = {**read_description(task), "data": sample_digests(task, "safetensors")}
-    module = new_model(config, seed).to(resolve_device(config.device))
-    return PartGraphVaeTask(module, header, config, graphs["train"], graphs["val"])
+    samples = read_splits(task, GraphCorpus)
+    return PartGraphVaeTask.of(task, config, new_model(config, seed), samples, read_description(task))
 
 
 def new_model(config: PartGraphVaeConfig, seed: int) -> PartGraphVae:
-    """Build a model with random weights."""
     return seeded(seed, lambda: PartGraphVae(config))
 
 

@@ -78,7 +78,6 @@ class WordBatch:
         return len(self.words)
 
     def to(self, device: torch.device) -> WordBatch:
-        """Move the batch to a device."""
         return WordBatch(**{name: tensor.to(device, non_blocking=True) for name, tensor in vars(self).items()})
 
     @property

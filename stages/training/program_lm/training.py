@@ -14,13 +14,12 @@ from pipeline.stage import Task
 from stages.shape.arrays import FloatArray
 from stages.training.corpus import read_arrays, read_description, read_splits
 from stages.training.kind import Kind
-from stages.training.loop import resolve_device
 from stages.training.program_lm.batches import WordBatch, WordCorpus, batches
 from stages.training.program_lm.corpus import prepare
 from stages.training.program_lm.model import ProgramLm
 from stages.training.program_lm.settings import ProgramLmConfig
 from stages.training.program_lm.tokens import NUMBER_STEPS, VOCABULARY_SIZE
-from stages.training.training_task import TrainingTask, sample_digests, seeded
+from stages.training.training_task import TrainingTask, seeded
 
 FIRST_NUMBER_WORD = VOCABULARY_SIZE - NUMBER_STEPS - 1
 
@@ -49,12 +48,9 @@ class ProgramLmTask(TrainingTask):
 
 
 def new_task(task: Task, config: ProgramLmConfig, seed: int) -> ProgramLmTask:
-    """Build a task with fresh weights."""
-    description, words = read_description(task), read_splits(task, WordCorpus)
-    values = read_arrays(task, "values")["values"]
-    header = {**description, "data": sample_digests(task, "safetensors")}
-    module = new_model(config, values, description["longest"], seed).to(resolve_device(config.device))
-    return ProgramLmTask(module, header, config, words["train"], words["val"])
+    description, values = read_description(task), read_arrays(task, "values")["values"]
+    module = new_model(config, values, description["longest"], seed)
+    return ProgramLmTask.of(task, config, module, read_splits(task, WordCorpus), description)
 
 
 def new_model(config: ProgramLmConfig, values: FloatArray, longest: int, seed: int) -> ProgramLm:

@@ -87,7 +87,6 @@ class AssemblyLevel:
         return len(self.lines)
 
     def to(self, device: torch.device) -> AssemblyLevel:
-        """Move the level to a device."""
         moved = {name: tensor.to(device, non_blocking=True) for name, tensor in vars(self).items() if name != "counts"}
         return AssemblyLevel(**moved, counts=self.counts)
 

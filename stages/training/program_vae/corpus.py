@@ -8,42 +8,30 @@ from pipeline.errors import Rejected
 from pipeline.stage import Outcome, Task
 from stages.shapeassembly.editing.ablations import without_alignment, without_macros, without_order
 from stages.shapeassembly.editing.flattening import without_hierarchy
-from stages.shapeassembly.syntax.errors import ProgramError
 from stages.shapeassembly.syntax.program import AssemblyProgram
-from stages.training.corpus import category_programs, write_arrays, write_description
+from stages.training.corpus import prepare_category
 from stages.training.program_vae.batches import ProgramCorpus
 from stages.training.program_vae.lines import AssemblyLines, assembly_lines
 from stages.training.program_vae.settings import Ablation
 
 
 def prepare(task: Task) -> Outcome:
-    """Write `.<split>.safetensors`, the `ProgramCorpus` of train and val, and `.json`, their counts.
+    """Prepare the `ProgramCorpus` of train and val.
 
-    Rejects programs that 63 numbers a line cannot represent, and those of more than `max_length` lines. Raises Rejected
-    where a split keeps no program.
+    Leaves out programs that 63 numbers a line cannot represent, and those of more than `max_length` lines.
     """
-    params = task.shard.params
-    counts: dict[str, dict[str, int]] = {}
-    for split in ("train", "val"):
-        kept: list[list[AssemblyLines]] = []
-        for key, program in category_programs(task, split):
-            try:
-                ablated = ablate_program(program, params.get("ablate", "nothing"), task.rng("order", key))
-                assemblies = assembly_lines(ablated)
-            except (ProgramError, Rejected) as error:
-                task.reject(key, error.reason, str(error))
-                continue
-            if sum(len(assembly.numbers) for assembly in assemblies) > params["max_length"]:
-                task.reject(key, "longer than training.max_length")
-                continue
-            kept.append(assemblies)
-        if not kept:
-            raise Rejected(f"{params['kit']} has no programs of at most {params['max_length']} lines in split {split}")
-        programs = ProgramCorpus.of(kept)
-        counts[split] = {"programs": len(programs), "assemblies": len(programs.boxes), "lines": len(programs.lines)}
-        write_arrays(task, f"{task.shard.name}.{split}.safetensors", programs.arrays())
-    write_description(task, {"counts": counts})
-    return Outcome(samples=0, summary=counts)
+    ablation, max_lines = task.shard.params.get("ablate", "nothing"), task.shard.params["max_length"]
+
+    def convert(key: str, program: AssemblyProgram) -> list[AssemblyLines]:
+        assemblies = assembly_lines(ablate_program(program, ablation, task.rng("order", key)))
+        if sum(len(assembly.numbers) for assembly in assemblies) > max_lines:
+            raise Rejected("longer than training.max_length")
+        return assemblies
+
+    def count(programs: ProgramCorpus) -> dict[str, int]:
+        return {"programs": len(programs), "assemblies": len(programs.boxes), "lines": len(programs.lines)}
+
+    return prepare_category(task, convert, ProgramCorpus.of, count, f"programs of at most {max_lines} lines")
 
 
 def ablate_program(program: AssemblyProgram, ablation: Ablation, rng: np.random.Generator) -> AssemblyProgram:

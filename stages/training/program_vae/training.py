@@ -16,7 +16,6 @@ from pipeline.stage import Task
 from stages.training.corpus import read_description, read_splits
 from stages.training.kind import Kind
 from stages.training.latent import reparameterize
-from stages.training.loop import resolve_device
 from stages.training.program_vae.batches import AssemblyLevel, ProgramCorpus, batches
 from stages.training.program_vae.corpus import prepare
 from stages.training.program_vae.lines import (
@@ -38,7 +37,7 @@ from stages.training.program_vae.lines import (
 )
 from stages.training.program_vae.model import ProgramVae, sizes_of
 from stages.training.program_vae.settings import ProgramVaeConfig
-from stages.training.training_task import TrainingTask, sample_digests, seeded
+from stages.training.training_task import TrainingTask, seeded
 
 
 @dataclass(frozen=True)
@@ -58,15 +57,11 @@ class ProgramVaeTask(TrainingTask):
 
 
 def new_task(task: Task, config: ProgramVaeConfig, seed: int) -> ProgramVaeTask:
-    """Build a task with fresh weights."""
-    programs = read_splits(task, ProgramCorpus)
-    header = {**read_description(task), "data": sample_digests(task, "safetensors")}
-    module = new_model(config, seed).to(resolve_device(config.device))
-    return ProgramVaeTask(module, header, config, programs["train"], programs["val"])
+    samples = read_splits(task, ProgramCorpus)
+    return ProgramVaeTask.of(task, config, new_model(config, seed), samples, read_description(task))
 
 
 def new_model(config: ProgramVaeConfig, seed: int) -> ProgramVae:
-    """Build a model with random weights."""
     return seeded(seed, lambda: ProgramVae(config))
 
 

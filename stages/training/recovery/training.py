@@ -23,7 +23,6 @@ from stages.shape.geometry.clouds import chamfer_squared
 from stages.sketches.settings import SketchesConfig
 from stages.training.corpus import read_description
 from stages.training.kind import Kind
-from stages.training.loop import resolve_device
 from stages.training.recovery.augmentation import augment_clouds, augment_drawings, quantized_cloud, unpack_drawings
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.drawings import draw_fitted
@@ -33,7 +32,7 @@ from stages.training.recovery.outputs import ParameterOutputs
 from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.shapes import TRAIN_INTERVAL, VALIDATION_INTERVAL, nearest_valid_values, random_shapes
 from stages.training.recovery.surface import sample_points, shape_points
-from stages.training.training_task import TrainingTask, seeded
+from stages.training.training_task import TrainingTask, resolve_device, seeded
 
 VALIDATED_SHAPES = 64
 """Validation shapes whose recovery is measured."""

@@ -13,6 +13,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from stages.shape.graphs.histograms import histogram_metric
+from stages.shapeassembly.analysis.edit_distance import edit_distance
 
 POINT_NEIGHBOURS = 4
 """Neighbours of a node besides strings of the same graph: "between 3 and 5" (strings §5.3)."""
@@ -113,21 +114,8 @@ def _edit_distances(codes, first):
     """Return the edit distances of all pairs of strings, int32 (n, n); string i is `codes[first[i]:first[i + 1]]`."""
     n = len(first) - 1
     distances = np.zeros((n, n), np.int32)
-    row = np.empty(int((first[1:] - first[:-1]).max()) + 1, np.int32)
     for i in range(n):
-        a = codes[first[i] : first[i + 1]]
         for j in range(i):
-            b = codes[first[j] : first[j + 1]]
-            for y in range(len(b) + 1):
-                row[y] = y
-            for x in range(len(a)):
-                corner = row[0]
-                row[0] = x + 1
-                for y in range(len(b)):
-                    above = row[y + 1]
-                    best = corner if a[x] == b[y] else corner + 1
-                    best = min(best, above + 1, row[y] + 1)
-                    corner = above
-                    row[y + 1] = best
-            distances[i, j] = distances[j, i] = row[len(b)]
+            distance = edit_distance(codes[first[i] : first[i + 1]], codes[first[j] : first[j + 1]])
+            distances[i, j] = distances[j, i] = distance
     return distances

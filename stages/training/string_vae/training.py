@@ -14,13 +14,12 @@ from pipeline.stage import Task
 from stages.shape.graphs.histograms import histogram_metric
 from stages.training.corpus import read_description, read_splits
 from stages.training.kind import Kind
-from stages.training.loop import resolve_device
 from stages.training.string_vae.batches import StringBatch, StringCorpus, batches
 from stages.training.string_vae.corpus import prepare, vocabulary_of
 from stages.training.string_vae.model import StringVae, shifted
 from stages.training.string_vae.settings import StringVaeConfig
 from stages.training.string_vae.vocabulary import Vocabulary
-from stages.training.training_task import TrainingTask, sample_digests, seeded
+from stages.training.training_task import TrainingTask, seeded
 
 ANNEAL_STEEPNESS = 12.0
 """The weight of the divergence rises from 0.25 % to 99.75 % of its value."""
@@ -80,19 +79,17 @@ class StringVaeTask(TrainingTask):
 
 
 def new_task(task: Task, config: StringVaeConfig, seed: int) -> StringVaeTask:
-    """Build a task with fresh weights."""
-    description, strings = read_description(task), read_splits(task, StringCorpus)
+    description = read_description(task)
     vocabulary = vocabulary_of(description)
-    # of a tree's graph there are many trees
-    canonical = config.target == "canonical" and description["edges"] != "tree"
+    canonical = config.target == "canonical" and description["edges"] != "tree"  # a graph has many spanning trees
     header = {
         **{key: description[key] for key in ("names", "edges", "cycles", "max_tokens", "patterns", "counts")},
         "canonical": canonical,
         "tokens": list(vocabulary.texts),
-        "data": sample_digests(task, "safetensors"),
     }
-    module = new_model(config, vocabulary, description["max_tokens"], seed).to(resolve_device(config.device))
-    return StringVaeTask(module, header, config, strings["train"], strings["val"], vocabulary, canonical)
+    module = new_model(config, vocabulary, description["max_tokens"], seed)
+    samples = read_splits(task, StringCorpus)
+    return StringVaeTask.of(task, config, module, samples, header, vocabulary=vocabulary, canonical=canonical)
 
 
 def new_model(config: StringVaeConfig, vocabulary: Vocabulary, max_tokens: int, seed: int) -> StringVae:

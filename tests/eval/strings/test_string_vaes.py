@@ -28,7 +28,7 @@ from stages.training.model_folder import curves_csv
 from stages.training.string_vae.latent_graph import PathFigures
 from stages.training.string_vae.latent_sampling import SAMPLING_METHODS, sample
 from stages.training.string_vae.trained import TrainedStringVae
-from tests.stages.training.string_vae.models import MOST, random_vae, toy_strings, trained_vae
+from tests.stages.training.string_vae.models import MAX_TOKENS, random_vae, toy_strings, trained_vae
 
 
 @pytest.mark.slow
@@ -106,7 +106,7 @@ def test_unreadable_strings_are_left_out(tmp_path: Path) -> None:
     model = random_vae("masked")
     (tmp_path / "toy-test.txt").write_text("".join(f"{line}\n" for line in [*toy_strings()[:3], "AZ", "B(B)"]))
     assert corpus_strings(tmp_path, "toy", "test", model) == list(toy_strings()[:3])
-    assert max(map(len, toy_strings())) <= MOST
+    assert max(map(len, toy_strings())) <= MAX_TOKENS
 
 
 def as_trained(model: TrainedStringVae, seed: int) -> TrainedModel[TrainedStringVae]:

@@ -1,4 +1,4 @@
-"""The programs and truth files beside the project, where they are there."""
+"""Published programs and reference files, where they are available."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from stages.shapeassembly.sources import program_texts
 
 SHARED = Path(__file__).resolve().parents[3].parent / "shared" / "shapeassembly"
 CATEGORIES = {"chair": 3835, "table": 6536, "storage": 1551}
-needs_shared = pytest.mark.skipif(not SHARED.is_dir(), reason="no programs beside the project")
+needs_shared = pytest.mark.skipif(not SHARED.is_dir(), reason="needs the published programs")
 
 
 @lru_cache(maxsize=3)

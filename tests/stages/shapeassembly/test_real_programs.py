@@ -35,7 +35,7 @@ def test_every_program_prints_back_equal_and_is_executed_to_finite_boxes(
     assert all(len(done) and np.isfinite(done.corners).all() for done in executions)
     # Six chairs ask for attachments that lie much farther apart than their cuboid is long; all others keep inside.
     beyond = [overflow(program, done) for program, done in zip(programs, executions, strict=True)]
-    assert sum(each > 0.03 for each in beyond) <= (6 if category == "chair" else 0)
+    assert sum(item > 0.03 for item in beyond) <= (6 if category == "chair" else 0)
 
 
 MISSES = {"random_small": 1}
@@ -43,7 +43,7 @@ MISSES = {"random_small": 1}
 
 
 @pytest.mark.parametrize("name", ["chair", "table", "storage", "random_flat", "random_hier", "random_small"])
-def test_corners_are_where_the_authors_have_them(name: str) -> None:
+def test_corners_match_the_authors_code(name: str) -> None:
     with np.load(SHARED / f"truth_{name}.npz", allow_pickle=False) as truth:
         texts, corners, nodes, starts = (truth[key] for key in ("program", "part_corners", "part_node", "part_offsets"))
     missed = []
@@ -66,7 +66,7 @@ PUBLISHED = {
 Reflects are left out: the table's 0.0880 for chairs and its total do not agree by 0.003, ours do."""
 
 
-def test_statistics_are_the_published_ones(category: str, programs: list[AssemblyProgram]) -> None:
+def test_statistics_match_the_published_ones(category: str, programs: list[AssemblyProgram]) -> None:
     found = program_statistics(programs)
     lines, translates, squeezes, macros, parts = PUBLISHED[category]
     assert found.lines == pytest.approx(lines, abs=0.1)
@@ -84,6 +84,6 @@ def test_assemblies_share_their_structure_more_than_whole_programs_do() -> None:
 
 def test_nearly_all_programs_keep_every_rule() -> None:
     texts = [text for category in CATEGORIES for text in shared_texts(category).values()]
-    broken = [each for text in texts[::4] for each in violations(parse(text))[:1]]
+    broken = [violation for text in texts[::4] for violation in violations(parse(text))[:1]]
     assert len(broken) < 0.03 * len(texts[::4])
-    assert {each.rule for each in broken} <= {"size", "attached twice", "bounding box at its sides"}
+    assert {item.rule for item in broken} <= {"size", "attached twice", "bounding box at its sides"}

@@ -48,7 +48,7 @@ def labelled(stem: str) -> dict[str, str]:
     """The label of each part of a shipped program, by the part's name."""
     shape = shape_of_text(next(path for path in EXAMPLES if path.stem == stem).read_text())
     assert len(set(shape.part_names)) == len(shape)
-    return dict(zip(shape.part_names, (shape.labels[each] for each in shape.part_labels), strict=True))
+    return dict(zip(shape.part_names, (shape.labels[label] for label in shape.part_labels), strict=True))
 
 
 def test_a_copy_is_labelled_like_what_it_is_a_copy_of() -> None:

@@ -1,4 +1,4 @@
-"""The stage in the real mill: what becomes a sample, what is refused and why, splits, the same bytes always."""
+"""The stage in the pipeline: what becomes a sample, what is refused and why, splits, the same bytes always."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def samples(out: Path) -> dict[str, list[Sample]]:
     return {path.stem: list(read_samples(path)) for path in sorted(out.glob("toy-*.tar"))}
 
 
-def test_samples_are_canonical_programs_shared_out_by_structure(made: tuple[str, Path]) -> None:
+def test_samples_are_canonical_programs_split_by_structure(made: tuple[str, Path]) -> None:
     found = [sample for shard in samples(made[1]).values() for sample in shard]
     splits: dict[str, set[str]] = {}
     for sample in found:
@@ -87,8 +87,8 @@ def test_samples_are_canonical_programs_shared_out_by_structure(made: tuple[str,
         assert len(shape_of_text(sample.text)) > 0
         splits.setdefault(sample.graph, set()).add(sample.split)
     assert len(splits) == len(EXAMPLES)
-    assert all(len(each) == 1 for each in splits.values())
-    assert {split for each in splits.values() for split in each} == {"train", "val", "test"}
+    assert all(len(split) == 1 for split in splits.values())
+    assert {split for item in splits.values() for split in item} == {"train", "val", "test"}
     assert len({sample.key for sample in found}) == len(found)
     assert "12 structures" in made[0]
 
@@ -100,19 +100,19 @@ def test_the_labels_of_a_category_are_those_of_all_its_programs_in_order(made: t
     assert {"Armchair/arm", "Desk/Drawers/Front/panel"} <= labels
 
 
-def test_what_is_no_good_program_is_refused_with_its_reason(made: tuple[str, Path]) -> None:
+def test_invalid_program_is_rejected_with_its_reason(made: tuple[str, Path]) -> None:
     lines = [json.loads(line) for path in (made[1] / "rejects").iterdir() for line in path.read_text().splitlines()]
     found = {line["item"]: line["reason"] for line in lines if line["item"].startswith("bad/")}
     assert found == {f"bad/{name}": reason for name, reason in REASONS.items()}
 
 
-def test_the_bytes_do_not_depend_on_the_number_of_workers(folder: Path, made: tuple[str, Path]) -> None:
+def test_bytes_do_not_depend_on_the_number_of_workers(folder: Path, made: tuple[str, Path]) -> None:
     sources = [{"name": "good", "path": str(folder / "good")}, {"name": "bad", "path": str(folder / "bad")}]
     code, printed, out = make(folder, {"programs": sources, "splits": {"shards": 2, "val": 0.2, "test": 0.2}}, 2)
     assert code == 0, printed
 
     def digests(path: Path) -> dict[str, str]:
-        return {each.name: hashlib.sha256(each.read_bytes()).hexdigest() for each in sorted(path.glob("toy-*"))}
+        return {item.name: hashlib.sha256(item.read_bytes()).hexdigest() for item in sorted(path.glob("toy-*"))}
 
     assert digests(out) == digests(made[1])
 
@@ -131,7 +131,7 @@ def test_an_archive_is_read_like_a_folder(folder: Path, tmp_path: Path) -> None:
     assert sorted(sample.lineage["parents"][0] for sample in found) == [f"data/furniture/{e.name}" for e in EXAMPLES]
 
 
-def test_edits_of_a_program_are_samples_of_its_split_that_name_it(folder: Path, tmp_path: Path) -> None:
+def test_edits_share_the_split_of_their_program(folder: Path, tmp_path: Path) -> None:
     splits = {"shards": 1, "val": 0.2, "test": 0.2}
     entry = {"name": "good", "path": str(EXAMPLES[0].parent.resolve()), "edits": 3, "log_std": 0.1}
     code, printed, out = make(tmp_path, {"programs": [entry], "splits": splits, "accept": "valid"})
@@ -149,7 +149,7 @@ def test_edits_of_a_program_are_samples_of_its_split_that_name_it(folder: Path, 
     assert len({sample.text for sample in found}) == len(found) == len({sample.key for sample in found})
 
 
-def test_a_source_that_is_not_there_is_said_before_anything_starts(tmp_path: Path) -> None:
+def test_missing_source_is_reported_before_the_run(tmp_path: Path) -> None:
     code, printed, _ = make(tmp_path, {"programs": [{"name": "a", "path": str(tmp_path / "nothing")}]})
     assert code == 2
     assert "there is no folder and no file" in printed
@@ -187,9 +187,7 @@ def test_published_lists_make_the_splits(folder: Path, tmp_path: Path) -> None:
         ({"val": "val.txt", "test": "val.txt"}, "for both val and test"),
     ],
 )
-def test_lists_that_cannot_be_followed_are_said(
-    tmp_path: Path, lists: dict[Literal["val", "test"], str], said: str
-) -> None:
+def test_invalid_lists_are_reported(tmp_path: Path, lists: dict[Literal["val", "test"], str], said: str) -> None:
     (tmp_path / "val.txt").write_text("one\n")
     (tmp_path / "none.txt").write_text("nobody\n")
     (tmp_path / "one.txt").write_text(CHAIR)

@@ -21,7 +21,7 @@ def written(folder: Path, content: bytes) -> Path:
     return path
 
 
-def test_tensors_and_header_come_back(tmp_path: Path) -> None:
+def test_tensors_and_header_round_trip(tmp_path: Path) -> None:
     tensors, header = load_checkpoint(written(tmp_path, checkpoint_bytes(TENSORS, HEADER)), HEADER)
     assert header["kit"] == "castle"
     assert all(torch.equal(tensors[name], tensor) for name, tensor in TENSORS.items())
@@ -40,7 +40,7 @@ def test_pickle_is_refused_before_it_is_read(tmp_path: Path, zipped: bool) -> No
         load_checkpoint(written(tmp_path, stream.getvalue()), {})
 
 
-def test_weights_whose_first_byte_is_that_of_a_pickle_are_none(tmp_path: Path) -> None:
+def test_weights_that_start_like_a_pickle_are_read(tmp_path: Path) -> None:
     """The first bytes of safetensors are the length of their header: of each 32 files one begins like a pickle."""
     contents = [checkpoint_bytes(TENSORS, {**HEADER, "note": "x" * length}) for length in range(256)]
     alike = [content for content in contents if content.startswith(b"\x80")]
@@ -55,7 +55,7 @@ def test_truncated_file_is_refused(tmp_path: Path, kept: int) -> None:
         load_checkpoint(written(tmp_path, checkpoint_bytes(TENSORS, HEADER)[:kept]), {})
 
 
-def test_weights_of_somebody_else_are_refused(tmp_path: Path) -> None:
+def test_foreign_weights_are_refused(tmp_path: Path) -> None:
     with pytest.raises(CheckpointError, match="Shapemill did not write it"):
         load_checkpoint(written(tmp_path, save(TENSORS)), {})
 
@@ -80,7 +80,7 @@ def test_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
         ({"version": 2}, "of another version: 1, and 2 is asked for"),
     ],
 )
-def test_weights_of_something_else_are_refused_by_name(
+def test_weights_with_another_header_are_refused_with_the_difference(
     tmp_path: Path, changed: dict[str, object], message: str
 ) -> None:
     path = written(tmp_path, checkpoint_bytes(TENSORS, HEADER))

@@ -29,7 +29,7 @@ from stages.training.program_vae.settings import ProgramVaeConfig
 from stages.training.program_vae.training import ProgramVaeTask
 from stages.training.program_vae.training import new_model as new_program_vae
 from stages.training.training_task import TrainingTask
-from tests.stages.training.program_lm.test_sampling import ENTRY, LONGEST, TEXTS, VALUES
+from tests.stages.training.program_lm.test_sampling import ENTRY, MAX_WORDS, TEXTS, VALUES
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
 FURNITURE = [parse(BOX), parse(STOOL)]
@@ -37,28 +37,28 @@ FURNITURE = [parse(BOX), parse(STOOL)]
 
 def program_vae() -> TrainingTask:
     entry = ProgramVaeConfig(name="tiny", kind="program_vae", latent=4, hidden=8, batch_size=2)
-    programs = ProgramCorpus.of([assembly_lines(each) for each in FURNITURE])
+    programs = ProgramCorpus.of([assembly_lines(item) for item in FURNITURE])
     return ProgramVaeTask(new_program_vae(entry, 0), {}, entry, programs, programs)
 
 
 def program_lm() -> TrainingTask:
-    return ProgramLmTask(new_program_lm(ENTRY, VALUES, LONGEST, 0), {}, ENTRY, TEXTS, TEXTS)
+    return ProgramLmTask(new_program_lm(ENTRY, VALUES, MAX_WORDS, 0), {}, ENTRY, TEXTS, TEXTS)
 
 
 def cuboid_rnn() -> TrainingTask:
     entry = CuboidRnnConfig(name="tiny", kind="cuboid_rnn", hidden=8, mixtures=2, batch_size=2)
-    cuboids = CuboidCorpus.of([cuboid_rows(execution_boxes(execute(each))) for each in FURNITURE])
+    cuboids = CuboidCorpus.of([cuboid_rows(execution_boxes(execute(item))) for item in FURNITURE])
     return CuboidRnnTask(new_cuboid_rnn(entry, 0), {}, entry, cuboids, cuboids)
 
 
 def part_graph_vae() -> TrainingTask:
     entry = PartGraphVaeConfig(name="tiny", kind="part_graph_vae", latent=4, hidden=8, batch_size=2)
-    graphs = GraphCorpus.of([graph_nodes(execute(each)) for each in FURNITURE])
+    graphs = GraphCorpus.of([graph_nodes(execute(item)) for item in FURNITURE])
     return PartGraphVaeTask(new_part_graph_vae(entry, 0), {}, entry, graphs, graphs)
 
 
 @pytest.mark.parametrize("made", [program_vae, program_lm, cuboid_rnn, part_graph_vae])
-def test_a_step_asks_for_no_number_of_its_device_and_makes_every_tensor_there(
+def test_step_never_reads_values_from_its_device(
     made: Callable[[], TrainingTask], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Tensors of the meta device have no numbers: whatever would wait for one, or mixes in another device, fails."""
@@ -75,4 +75,4 @@ def test_a_step_asks_for_no_number_of_its_device_and_makes_every_tensor_there(
     loss = learner.losses(batch, 0, torch.Generator())["loss"]
     torch.autograd.backward(loss)
     assert loss.device.type == "meta"
-    assert all(each.grad is not None for each in learner.module.parameters())
+    assert all(parameter.grad is not None for parameter in learner.module.parameters())

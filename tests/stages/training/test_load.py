@@ -1,4 +1,4 @@
-"""Training on the real mill: programs of a dataset to published weights."""
+"""Training in the real pipeline: programs of a dataset to published weights."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EXAMPLES = sorted(Path("datasets/exemplars/programs").glob("*.txt"))
 
 
 @pytest.mark.slow
-def test_models_of_programs_are_trained_and_read_again(tmp_path: Path) -> None:
+def test_models_of_programs_are_trained_loaded_and_sampled(tmp_path: Path) -> None:
     (tmp_path / "programs").mkdir()
     for path in EXAMPLES:
         for number in range(2):
@@ -77,7 +77,9 @@ def test_models_of_programs_are_trained_and_read_again(tmp_path: Path) -> None:
     trained = load_program_vae(out / "toy-models/tiny-furniture-0/weights.safetensors", {"kit": "furniture"})
     points = trained.encode([parse(path.read_text()) for path in EXAMPLES[:3]])
     assert points.shape == (3, 8)
-    train = [parse(each.text) for each in read_samples(next((out / ".work/toy/shapeassembly").glob("toy-train-*.tar")))]
+    train = [
+        parse(sample.text) for sample in read_samples(next((out / ".work/toy/shapeassembly").glob("toy-train-*.tar")))
+    ]
     codes, drawn = trained.encode(train), trained.sample_points(20_000, np.random.default_rng(0))
     assert np.allclose(drawn.mean(axis=0), codes.mean(axis=0), atol=0.05 * drawn.std())
     noise = np.linalg.eigvalsh(np.cov(drawn.T) - np.cov(codes.T, bias=True))
@@ -110,18 +112,18 @@ def test_models_of_programs_are_trained_and_read_again(tmp_path: Path) -> None:
     )
     for name, workers in {"tiny": (1, 2), "words": (1,)}.items():
         (tmp_path / name).mkdir()
-        dreamt(tmp_path / name, out, name, workers)
+        check_sampled_dataset(tmp_path / name, out, name, workers)
 
 
-def dreamt(folder: Path, out: Path, model: str, asked: tuple[int, ...]) -> None:
+def check_sampled_dataset(folder: Path, out: Path, model: str, asked: tuple[int, ...]) -> None:
     """What a model writes becomes samples, the same ones however they are shared out among shards and workers."""
     source = {"name": "stool", "dataset": "toy", "model": model, "kit": "furniture", "samples": 12}
     sections = {
         "shapeassembly": {"sampled": [source], "max_overflow": 100, "splits": {"shards": 1}},
         "program_sampling": {"programs_per_shard": 5},
     }
-    config = folder / "dreamt.yaml"
-    config.write_text(yaml.safe_dump({"name": "dreamt", "seed": 5, **sections}))
+    config = folder / "sampled.yaml"
+    config.write_text(yaml.safe_dump({"name": "sampled", "seed": 5, **sections}))
     found = []
     for workers in asked:
         made = folder / f"out{workers}"
@@ -129,14 +131,14 @@ def dreamt(folder: Path, out: Path, model: str, asked: tuple[int, ...]) -> None:
         for stage in ("program_sampling", "shapeassembly"):
             code, printed = shapemill("run", stage, "--config", config, "--out", made, "--workers", workers)
             assert code == 0, printed
-        work = made / ".work/dreamt"
+        work = made / ".work/sampled"
         written = [
             json.loads(line) for path in sorted((work / "program_sampling").glob("*.jsonl")) for line in path.open()
         ]
         assert [row["name"] for row in written] == [f"toy-models/{model}-furniture-0/{n:06d}" for n in range(12)]
         texts = {row["name"]: row["text"] for row in written}
-        samples = [each for path in sorted((work / "shapeassembly").glob("*.tar")) for each in read_samples(path)]
+        samples = [sample for path in sorted((work / "shapeassembly").glob("*.tar")) for sample in read_samples(path)]
         assert samples
-        assert all(texts[each.lineage["parents"][0]] == each.text for each in samples)
-        found.append([(each.key, each.split, each.text) for each in samples])
-    assert all(each == found[0] for each in found)
+        assert all(texts[sample.lineage["parents"][0]] == sample.text for sample in samples)
+        found.append([(sample.key, sample.split, sample.text) for sample in samples])
+    assert all(item == found[0] for item in found)

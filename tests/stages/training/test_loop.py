@@ -17,11 +17,11 @@ from stages.training.program_lm.settings import ProgramLmConfig
 
 
 @pytest.mark.parametrize("asked", ["float32", "bfloat16"])
-def test_numbers_that_are_asked_for_by_name_are_taken(asked: str) -> None:
+def test_explicit_precision_is_kept(asked: str) -> None:
     assert resolve_precision(asked, torch.device("cpu")) == asked
 
 
-def test_half_precision_is_chosen_only_where_the_processor_reckons_with_it() -> None:
+def test_auto_precision_is_bfloat16_only_with_hardware_support() -> None:
     words = set(Path("/proc/cpuinfo").read_text().split())
     knows = bool(words & {"avx512_bf16", "amx_bf16", "bf16"})
     assert resolve_precision("auto", torch.device("cpu")) == ("bfloat16" if knows else "float32")
@@ -51,7 +51,7 @@ class _Halving:
 
 
 def _trained(before: int, seed: int) -> torch.Tensor:
-    """The weights after a round, where the process has drawn so many numbers before."""
+    """The weights after a round, where the process has drawn numbers before."""
     torch.manual_seed(before)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(0)
@@ -62,7 +62,7 @@ def _trained(before: int, seed: int) -> torch.Tensor:
     return module[0].weight.detach()
 
 
-def test_what_modules_leave_out_hangs_on_the_seed_of_the_round_alone() -> None:
+def test_dropout_depends_on_the_seed_of_the_round_alone() -> None:
     assert torch.equal(_trained(before=1, seed=3), _trained(before=2, seed=3))
     assert not torch.equal(_trained(before=1, seed=3), _trained(before=1, seed=4))
 
@@ -92,14 +92,14 @@ def _rounds(stops: bool) -> dict[str, torch.Tensor]:
     for number in range(2):
         train(state, np.random.default_rng(number), lambda done, total: None)
         if stops:
-            tensors, step = {name: each.clone() for name, each in state.tensors().items()}, state.step
+            tensors, step = {name: tensor.clone() for name, tensor in state.tensors().items()}, state.step
             state = fresh()
             state.restore(tensors, step)
     return state.tensors()
 
 
-def test_a_training_with_a_layer_that_nothing_uses_goes_on_as_if_it_had_not_stopped() -> None:
+def test_training_with_an_unused_layer_resumes_identically() -> None:
     through, stopped = _rounds(stops=False), _rounds(stops=True)
     assert [name for name in through if ".idle." in name] == ["weights.idle.weight", "weights.idle.bias"]
     assert through.keys() == stopped.keys()
-    assert all(torch.equal(each, stopped[name]) for name, each in through.items())
+    assert all(torch.equal(item, stopped[name]) for name, item in through.items())

@@ -1,4 +1,4 @@
-"""Training on the real mill: rounds that follow each other, a kill, an edit, and what is published."""
+"""Training in the real pipeline: rounds, a kill, an edit, and published models."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_published_weights_are_those_of_the_best_round(out: Path) -> None:
         assert all((published.get_tensor(name) == kept.get_tensor(f"weights.{name}")).all() for name in names)
 
 
-def test_it_learns(out: Path) -> None:
+def test_validation_loss_falls(out: Path) -> None:
     rows = list(csv.DictReader((out / "toys-models/tiny-toy-0/curves.csv").read_text().splitlines()))
     assert float(rows[-1]["val_nats"]) < float(rows[0]["val_nats"])
 
@@ -98,7 +98,7 @@ def test_killed_training_ends_with_the_same_weights(out: Path, tmp_path: Path) -
     assert made(tmp_path / "toys-models") == made(out / "toys-models")
 
 
-def test_edit_of_one_model_trains_no_other_anew(tmp_path: Path) -> None:
+def test_edit_of_one_model_does_not_retrain_others(tmp_path: Path) -> None:
     both = config({"max_rounds": 1}, {"name": "other", "max_rounds": 1})
     assert train(both, tmp_path, only="tiny").made == 3
     assert [path.name for path in (tmp_path / "toys-models").iterdir()] == ["tiny-toy-0"]
@@ -111,14 +111,16 @@ def test_edit_of_one_model_trains_no_other_anew(tmp_path: Path) -> None:
     assert one.read_bytes() != other.read_bytes()
 
 
-def test_training_ends_when_rounds_in_a_row_are_no_better(tmp_path: Path) -> None:
+def test_training_ends_when_patience_is_exhausted(tmp_path: Path) -> None:
     # So large a rate makes it worse at once.
     wanted = config({"max_rounds": 9, "patience": 1, "learning_rate": 0.9, "steps": 3})
     result = train(wanted, tmp_path)
     assert not result.failed
-    survey = Inventory(wanted, STAGES, DatasetPaths(tmp_path, "toys")).stage("training")
-    losses = [survey.records[shard.name].summary["loss"] for shard in survey.shards if shard.params["job"] == "round"]
+    inventory = Inventory(wanted, STAGES, DatasetPaths(tmp_path, "toys")).stage("training")
+    losses = [
+        inventory.records[shard.name].summary["loss"] for shard in inventory.shards if shard.params["job"] == "round"
+    ]
     best = losses.index(min(losses))
     assert len(losses) < 9
     assert len(losses) == best + 2
-    assert survey.missing == []
+    assert inventory.missing == []

@@ -10,7 +10,7 @@ from stages.training.transformer import TransformerBlock
 
 @pytest.mark.parametrize("width", [2, 32, 100, 128, 130])
 @torch.no_grad()
-def test_one_token_after_another_is_the_whole_sequence(width: int) -> None:
+def test_stepwise_attention_matches_the_whole_sequence(width: int) -> None:
     torch.manual_seed(0)
     block = TransformerBlock(width)
     seen = torch.randn(3, 5, width)

@@ -32,7 +32,7 @@ from tests.stages.strings.graphs import arrays
 LABELS = ("joint", "leaf", "link")
 ALPHABET: Alphabet = make_alphabet(LABELS)
 SPLITS = {"toys-train-000000": "train", "toys-train-000001": "train", "toys-val-000000": "val"}
-SHAPES = 10
+SHAPES_PER_SHARD = 10
 """Shapes of a shard."""
 
 
@@ -44,7 +44,7 @@ class NothingConfig(StrictModel):
 def graphs() -> tuple[tuple[TypeArray, IntArray], ...]:
     """Rings and trees of joints, links and leaves; the type of a node is told by its degree."""
     found, seen, rng = [], set(), np.random.default_rng(5)
-    while len(found) < SHAPES * len(SPLITS):
+    while len(found) < SHAPES_PER_SHARD * len(SPLITS):
         graph = nx.cycle_graph(int(rng.integers(3, 6))) if rng.random() < 0.5 else nx.path_graph(2)
         for _ in range(int(rng.integers(2, 7))):
             open_nodes = [node for node, degree in graph.degree if degree < 3]
@@ -86,10 +86,10 @@ def strings(shard: str) -> Iterator[tuple[str, list[str]]]:
     """Digest and strings of each graph of a shard."""
     place = list(SPLITS).index(shard)
     rng = np.random.default_rng(place)
-    for types, edges in graphs()[place * SHAPES : (place + 1) * SHAPES]:
+    for types, edges in graphs()[place * SHAPES_PER_SHARD : (place + 1) * SHAPES_PER_SHARD]:
         canonical = canonical_string(types, edges, ALPHABET).string
         others = random_strings(types, edges, ALPHABET, 4, rng, {canonical})
-        yield graph_digest(types, edges), [canonical, *(each.string for each in others)]
+        yield graph_digest(types, edges), [canonical, *(other.string for other in others)]
 
 
 def make_kit(task: Task) -> Outcome:
@@ -101,12 +101,12 @@ def make_kit(task: Task) -> Outcome:
 def make_strings(task: Task) -> Outcome:
     name, rows = task.shard.name, []
     with task.output(f"{name}.tar") as stream, ShardWriter(stream) as writer:
-        for number, (digest, each) in enumerate(strings(name)):
-            writer.write(f"{name}-{number}", {"txt": "\n".join(each).encode()})
+        for number, (digest, item) in enumerate(strings(name)):
+            writer.write(f"{name}-{number}", {"txt": "\n".join(item).encode()})
             rows.append({"key": f"{name}-{number}", "kit": "toy", "graph": digest})
     with task.output(f"{name}.jsonl") as listing:
         listing.writelines(map(json_bytes, rows))
-    return Outcome(SHAPES, {"split": SPLITS[name]})
+    return Outcome(SHAPES_PER_SHARD, {"split": SPLITS[name]})
 
 
 def plan_strings(plan: Plan) -> list[Shard]:

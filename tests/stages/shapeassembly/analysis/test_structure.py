@@ -29,7 +29,7 @@ def test_tokens_of_a_program() -> None:
 
 @settings(deadline=None)
 @given(programs())
-def test_names_and_numbers_are_no_structure(program: AssemblyProgram) -> None:
+def test_signature_ignores_names_and_numbers(program: AssemblyProgram) -> None:
     assert signature(renamed(program)) == signature(program)
     other = with_parameters(program, parameters(program) * 0.5)
     assert signature(other) == signature(program)
@@ -45,7 +45,7 @@ def test_a_change_of_structure_changes_the_signature() -> None:
     assert program_distance(parse(TEXT), parse(TEXT.replace("reflect(a, X)", ""))) == 3
 
 
-def test_assemblies_are_alike_whatever_expands_their_cuboids() -> None:
+def test_block_signatures_ignore_what_expands_cuboids() -> None:
     alike = TEXT + TEXT.replace("P", "R").replace("Q {", "S {").replace("Q", "S").split("\nAssembly S")[0]
     digests = block_signatures(parse(alike + "\nAssembly S { bbox = Cuboid(0.5, 0.5, 0.5, True) }"))
     assert (digests[0], digests[1]) == (digests[2], digests[3])
@@ -58,7 +58,7 @@ WORDS = st.lists(st.integers(0, 3), max_size=8)
 
 
 @given(WORDS, WORDS)
-def test_edit_distance_is_the_textbook_one(a: list[int], b: list[int]) -> None:
+def test_edit_distance_matches_the_textbook(a: list[int], b: list[int]) -> None:
     table = [[i + j if not i * j else 0 for j in range(len(b) + 1)] for i in range(len(a) + 1)]
     for i, x in enumerate(a, 1):
         for j, y in enumerate(b, 1):

@@ -28,14 +28,14 @@ def same_boxes(one: Execution, other: Execution, tolerance: float) -> bool:
     for row, corners in zip(centres, one.corners, strict=True):
         near = np.flatnonzero(row <= tolerance)
         apart = [
-            np.linalg.norm(corners[:, None] - other.corners[each][None], axis=2).min(axis=1).max() for each in near
+            np.linalg.norm(corners[:, None] - other.corners[item][None], axis=2).min(axis=1).max() for item in near
         ]
         if not apart or min(apart) > tolerance:
             return False
     return len(one) == len(other)
 
 
-def test_macros_are_written_out_with_mirrored_sub_programs() -> None:
+def test_macros_are_expanded_with_mirrored_sub_programs() -> None:
     program = parse(SHELF)
     plain = without_macros(program)
     assert {type(line) for block in plain.blocks for line in block.lines} == {Cuboid, Attach}
@@ -52,12 +52,12 @@ def test_real_programs_without_macros_make_the_same_shapes(category: str) -> Non
     assert np.mean(same) >= 0.95
 
 
-def test_lines_in_another_order_keep_the_rules_and_the_parts() -> None:
+def test_random_order_keeps_the_rules_and_the_parts() -> None:
     program = parse(SHELF)
     texts = set()
     for seed in range(8):
         other = without_order(program, np.random.default_rng(seed))
-        assert [each for each in violations(other) if each.rule == "not grounded"] == []
+        assert [violation for violation in violations(other) if violation.rule == "not grounded"] == []
         assert all(set(one.lines) == set(two.lines) for one, two in zip(program.blocks, other.blocks, strict=True))
         assert len(execute(other)) == len(execute(program))
         texts.add(str(other))
@@ -67,5 +67,5 @@ def test_lines_in_another_order_keep_the_rules_and_the_parts() -> None:
 
 def test_without_alignment_only_the_bounding_boxes_are_aligned() -> None:
     program = without_alignment(parse(SHELF))
-    assert all(block.bbox.aligned and not any(each.aligned for each in block.cuboids) for block in program.blocks)
+    assert all(block.bbox.aligned and not any(cuboid.aligned for cuboid in block.cuboids) for block in program.blocks)
     assert [len(block.lines) for block in program.blocks] == [len(block.lines) for block in parse(SHELF).blocks]

@@ -31,7 +31,7 @@ def numbers(program: AssemblyProgram) -> list[tuple[float, ...]]:
 
 
 @given(programs(), st.integers(0, 99))
-def test_an_edit_is_a_program_of_the_same_structure(program: AssemblyProgram, seed: int) -> None:
+def test_edit_keeps_the_structure(program: AssemblyProgram, seed: int) -> None:
     made = edit_program(program, 0.3, np.random.default_rng(seed))
     assert signature(made) == signature(program)
     assert parse(print_program(made)) == made
@@ -39,7 +39,7 @@ def test_an_edit_is_a_program_of_the_same_structure(program: AssemblyProgram, se
 
 
 @given(programs(), st.integers(0, 99))
-def test_sizes_keep_their_order_and_places_their_side(program: AssemblyProgram, seed: int) -> None:
+def test_edit_keeps_the_order_of_sizes_and_the_side_of_points(program: AssemblyProgram, seed: int) -> None:
     made = edit_program(program, 0.3, np.random.default_rng(seed))
 
     def sizes(of: AssemblyProgram, axis: int) -> list[float]:
@@ -59,13 +59,13 @@ def test_sizes_keep_their_order_and_places_their_side(program: AssemblyProgram, 
             assert (after - 0.5) * (before - 0.5) >= 0
 
 
-def test_a_wider_spread_changes_more() -> None:
+def test_larger_log_std_changes_more() -> None:
     lines = "bbox = Cuboid(1.0, 2.0, 1.0, True) a = Cuboid(0.2, 2.0, 0.3, True) squeeze(a, bbox, bbox, top, 0.3, 0.4)"
     program = parse(f"Assembly P {{ {lines} }}")
 
     def change(spread: float) -> float:
         made = [edit_program(program, spread, np.random.default_rng(seed)) for seed in range(50)]
-        return float(np.mean([abs(np.log(each.root.bbox.dims[0])) for each in made]))
+        return float(np.mean([abs(np.log(item.root.bbox.dims[0])) for item in made]))
 
     assert 0.5 * 0.05 < change(0.05) < change(0.2) < change(0.5)
     assert len(execute(edit_program(program, 0.5, np.random.default_rng(1)))) == 1

@@ -21,14 +21,14 @@ bar = Cuboid(1.6, 0.1, 0.2, True) attach(leg, bbox, 0.5, 0.0, 0.5, 0.05, 0.0, 0.
 attach(bar, leg, 0.0, 0.5, 0.5, 1.0, 0.5, 0.5) reflect(leg, X) }"""
 
 
-def test_a_flat_program_has_one_assembly_of_the_same_cuboids() -> None:
+def test_flattened_program_has_one_assembly_of_the_same_cuboids() -> None:
     program = parse(BENCH)
     flat = without_hierarchy(program)
-    assert [len(each.blocks) for each in (program, flat)] == [2, 1]
+    assert [len(value.blocks) for value in (program, flat)] == [2, 1]
     assert same_boxes(execute(program), execute(flat), 0.01)
 
 
-def test_what_hangs_together_nowhere_is_refused() -> None:
+def test_disconnected_shape_is_rejected() -> None:
     with pytest.raises(Rejected):
         without_hierarchy(
             parse(
@@ -40,7 +40,7 @@ def test_what_hangs_together_nowhere_is_refused() -> None:
 
 
 @needs_shared
-def test_real_programs_keep_their_shapes_when_they_are_flat() -> None:
+def test_flattened_real_programs_keep_their_shapes() -> None:
     texts = list(shared_texts("chair").values())[::200]
     kept = 0
     for program in map(parse, texts):
@@ -50,7 +50,7 @@ def test_real_programs_keep_their_shapes_when_they_are_flat() -> None:
             continue
         kept += 1
         assert len(flat.blocks) == 1
-        assert not [each for each in violations(flat) if each.rule != "size"]
+        assert not [violation for violation in violations(flat) if violation.rule != "size"]
         diagonal = float(np.linalg.norm(program.root.bbox.dims))
         assert f_score(execution_boxes(execute(flat)), execution_boxes(execute(program)), 0.03 * diagonal, 512) > 70
     assert kept >= 0.7 * len(texts)

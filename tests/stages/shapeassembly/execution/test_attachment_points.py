@@ -1,4 +1,4 @@
-"""Where cuboids stand beside where they are attached."""
+"""Attachment points of executed cuboids, and the points that they should meet."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_an_aligned_cuboid_is_not_stretched(height: float, aligned: bool, gap: f
     assert np.ptp(wanted[:, 1]) == 1.0
 
 
-def test_every_attachment_of_a_cuboid_is_told_and_no_other() -> None:
+def test_attachment_points_cover_every_attachment_of_a_cuboid() -> None:
     text = """Assembly P { bbox = Cuboid(1.0, 1.0, 1.0, True) a = Cuboid(0.2, 0.2, 0.2, True)
     b = Cuboid(0.2, 0.2, 0.2, True)
     attach(a, bbox, 0.5, 0.0, 0.5, 0.5, 0.0, 0.5) attach(b, a, 0.0, 0.5, 0.5, 1.0, 0.5, 0.5)
@@ -31,7 +31,7 @@ def test_every_attachment_of_a_cuboid_is_told_and_no_other() -> None:
     assert own.tolist() == [[0.0, 0.5, 0.5], [0.5, 0.0, 0.5]]
     np.testing.assert_allclose(wanted, [[0.1, -0.4, 0.0], [0.4, -0.5, 0.0]], atol=1e-12)
     assert len(stands) == 2
-    assert [len(each) for each in attachment_points(block, "bbox")] == [0, 0, 0]
+    assert [len(point) for point in attachment_points(block, "bbox")] == [0, 0, 0]
 
 
 def test_a_squeeze_is_two_attachments() -> None:

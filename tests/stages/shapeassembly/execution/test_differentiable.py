@@ -87,7 +87,7 @@ def test_gradients_reach_through_mirrored_and_stretched_assemblies() -> None:
     assert difference(program) < 1e-10
 
 
-def test_parameters_that_cannot_be_executed_are_refused() -> None:
+def test_parameters_that_cannot_be_executed_raise() -> None:
     own = DifferentiableProgram(parse(HEAD + "}"))
     values = torch.tensor(parameters(parse(HEAD + "}"))) * 1e12
     with pytest.raises(ProgramError, match="too far"):
@@ -95,7 +95,7 @@ def test_parameters_that_cannot_be_executed_are_refused() -> None:
 
 
 @given(programs())
-def test_parameters_can_be_taken_out_and_put_back(program: AssemblyProgram) -> None:
+def test_parameters_round_trip(program: AssemblyProgram) -> None:
     values = parameters(program)
     assert with_parameters(program, values) == program
     low, high = parameter_ranges(program)

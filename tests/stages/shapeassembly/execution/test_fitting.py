@@ -19,7 +19,7 @@ from stages.shapeassembly.extraction.validity import execution_boxes
 CHAIR = parse(Path("datasets/exemplars/programs/chair-slats.txt").read_text())
 
 
-def test_a_perturbed_chair_is_fitted_back() -> None:
+def test_perturbed_chair_is_fitted_back() -> None:
     rng = np.random.default_rng(4)
     points = surface_points(execute(CHAIR), 3000, rng)
     low, high = parameter_ranges(CHAIR)
@@ -34,20 +34,20 @@ def test_a_perturbed_chair_is_fitted_back() -> None:
     assert ((low <= parameters(done.program)) & (parameters(done.program) <= high)).all()
 
 
-def test_cuboids_are_fitted_each_by_itself() -> None:
+def test_free_cuboids_are_fitted_independently() -> None:
     """Moved, turned and too thick, and back: what was attached need not be so any more."""
     rng = np.random.default_rng(4)
     wanted = execution_boxes(execute(CHAIR))
     points = surface_points(execute(CHAIR), 3000, rng)
     turn = Rotation.from_rotvec([0.05, 0.1, 0.0]).as_matrix()
-    moved = [Box(each.center + rng.normal(0, 0.03, 3), 1.1 * each.size, each.axes @ turn) for each in wanted]
+    moved = [Box(item.center + rng.normal(0, 0.03, 3), 1.1 * item.size, item.axes @ turn) for item in wanted]
     found = fit_cuboids(moved, points, rng, steps=120, samples=800)
     apart = [
-        np.mean([np.abs(a.center - b.center) for a, b in zip(each, wanted, strict=True)]) for each in (moved, found)
+        np.mean([np.abs(a.center - b.center) for a, b in zip(value, wanted, strict=True)]) for value in (moved, found)
     ]
     assert apart[1] < 0.6 * apart[0]
-    for each in found:
-        np.testing.assert_allclose(each.axes @ each.axes.T, np.eye(3), atol=1e-9)
+    for item in found:
+        np.testing.assert_allclose(item.axes @ item.axes.T, np.eye(3), atol=1e-9)
     with pytest.raises(ValueError, match="no cuboids"):
         fit_cuboids([], points, rng)
 
@@ -68,7 +68,7 @@ def test_the_same_seed_fits_the_same() -> None:
     assert (first.program, first.after) == (second.program, second.after)
 
 
-def test_nothing_to_fit_is_refused() -> None:
+def test_fit_without_points_or_parts_raises() -> None:
     empty = parse("Assembly P { bbox = Cuboid(1.0, 1.0, 1.0, True) }")
     with pytest.raises(ValueError, match="no points"):
         fit(CHAIR, np.empty((0, 3)), np.random.default_rng(0))

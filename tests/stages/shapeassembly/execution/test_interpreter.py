@@ -36,7 +36,7 @@ def same(found: np.ndarray, expected: object) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
-def test_a_cuboid_that_nothing_attaches_stands_in_the_middle_with_its_corners_in_order() -> None:
+def test_unattached_cuboid_is_centred_with_ordered_corners() -> None:
     done = run("c = Cuboid(0.2, 0.4, 0.6, True)")
     same(done.corners[0, 0], [0.1, 0.2, 0.3])
     same(done.corners[0, [4, 2, 1]], [[-0.1, 0.2, 0.3], [0.1, -0.2, 0.3], [0.1, 0.2, -0.3]])
@@ -90,7 +90,7 @@ def test_a_free_cuboid_with_one_attachment_is_stretched_and_turned() -> None:
     same(done.centres, [[0.5, -0.5, 0.0]])
 
 
-def test_the_smallest_change_of_size_wins() -> None:
+def test_hinge_takes_the_smallest_change_of_size() -> None:
     # From corner to corner the box measures 3; 3.1 is reached with the least change along its longest side.
     done = run(
         "c = Cuboid(1.0, 2.0, 2.0, False)",
@@ -142,8 +142,8 @@ FOUR = (
 
 
 @pytest.mark.parametrize(("aside", "turned"), [(0.9, True), (1.0, False)])
-def test_attachments_are_in_line_by_a_cross_product_that_is_not_normalised(aside: float, turned: bool) -> None:
-    """The third lies at 41 or 48 degrees beside the first two; 0.1 times 0.088 is under 0.01, 0.1 times 0.11 is not."""
+def test_collinearity_uses_the_unnormalised_cross_product(aside: float, turned: bool) -> None:
+    """The third is at 41 or 48 degrees to the first two; 0.1 times 0.088 is under 0.01, 0.1 times 0.11 is not."""
     away = 0.5 + (aside - 0.5) * 0.11
     done = run(*(line.format(aside, away) for line in FOUR))
     assert np.allclose(done.frames[0], np.eye(3)) != turned
@@ -255,7 +255,9 @@ def test_every_valid_program_is_executed_to_finite_boxes(program: AssemblyProgra
 def renamed(program: AssemblyProgram) -> AssemblyProgram:
     """The program with other names for assemblies and cuboids; copies keep theirs."""
     names = {block.name: f"assembly_{block.name}" for block in program.blocks}
-    names |= {each.name: names.get(each.name, f"part_{each.name}") for b in program.blocks for each in b.cuboids}
+    names |= {
+        cuboid.name: names.get(cuboid.name, f"part_{cuboid.name}") for b in program.blocks for cuboid in b.cuboids
+    }
     names[BBOX] = BBOX
 
     def change(line: Line) -> Line:
@@ -272,7 +274,7 @@ def renamed(program: AssemblyProgram) -> AssemblyProgram:
 
 @settings(deadline=None)
 @given(programs())
-def test_names_mean_nothing(program: AssemblyProgram) -> None:
+def test_execution_ignores_names(program: AssemblyProgram) -> None:
     assert np.array_equal(execute(renamed(program)).corners, execute(program).corners)
 
 
@@ -300,19 +302,17 @@ TURN = Attach("child", BBOX, (1.0, 1.0, 1.0), (0.9, 0.9, 0.9))
 
 @settings(deadline=None)
 @given(SIZE, st.lists(st.tuples(SIZE, st.integers(0, 3), POINT, POINT), min_size=1, max_size=4))
-def test_a_hierarchy_is_what_it_is_when_written_in_one_assembly(
-    size: Point, parts: list[tuple[Point, int, Point, Point]]
-) -> None:
+def test_hierarchy_equals_its_single_assembly(size: Point, parts: list[tuple[Point, int, Point, Point]]) -> None:
     """One attachment a cuboid: to the one that the child stands for, or to one of the child's before it."""
     child = Cuboid("child", size, False)
     cuboids = [Cuboid(f"part{index}", dims, True) for index, (dims, _, _, _) in enumerate(parts)]
-    names = [BBOX, *(each.name for each in cuboids)]
+    names = [BBOX, *(cuboid.name for cuboid in cuboids)]
     joints = [
         Attach(names[index + 1], names[min(target, index)], source, goal)
         for index, (_, target, source, goal) in enumerate(parts)
     ]
     below = Block("child", Cuboid(BBOX, size, True), (*cuboids, *joints))
-    inner = [replace(each, target="child") if each.target == BBOX else each for each in joints]
+    inner = [replace(joint, target="child") if joint.target == BBOX else joint for joint in joints]
     deep = execute(AssemblyProgram((Block("root", WHOLE, (child, STAND)), below)))
     flat = execute(AssemblyProgram((Block("root", WHOLE, (child, *cuboids, STAND, *inner)),)))
     same(deep.corners, flat.corners[1:])
@@ -345,7 +345,7 @@ HEAD = "Assembly P { bbox = Cuboid(1.0, 1.0, 1.0, True) c = Cuboid(0.5, 0.5, 0.5
         (HEAD + "P = Cuboid(0.5, 0.5, 0.5, True) }", "too deep"),
     ],
 )
-def test_what_cannot_be_executed_is_refused_with_its_line(text: str, reason: str) -> None:
+def test_program_that_cannot_be_executed_is_refused_with_its_line(text: str, reason: str) -> None:
     with pytest.raises(ProgramError) as caught:
         execute(parse(text))
     assert caught.value.reason == reason
@@ -376,7 +376,7 @@ def test_hostile_sizes_are_refused() -> None:
             execute(parse(text))
 
 
-def test_a_program_that_grows_without_end_is_refused() -> None:
+def test_endless_program_is_refused() -> None:
     far = "d = Cuboid(1e6, 1e6, 1e6, True) attach(d, bbox, 0.0, 0.0, 0.0, 1e6, 1e6, 1e6) "
     with pytest.raises(ProgramError, match="too far"):
         execute(parse(HEAD + far + "attach(c, d, 0.5, 0.5, 0.5, 1e6, 1e6, 1e6) }"))

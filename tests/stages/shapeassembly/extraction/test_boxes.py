@@ -32,7 +32,7 @@ boxes = st.builds(
 
 
 @given(boxes, st.tuples(number, number, number))
-def test_place_in_a_box_is_the_reverse_of_point_at(some: Box, place: tuple[float, float, float]) -> None:
+def test_local_points_inverts_world_points(some: Box, place: tuple[float, float, float]) -> None:
     np.testing.assert_allclose(local_points(some, world_points(some, np.array(place))), place, atol=1e-9)
 
 

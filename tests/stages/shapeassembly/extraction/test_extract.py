@@ -42,7 +42,7 @@ def covers(made: Sequence[Box], wanted: Sequence[Box], tolerance: float = 0.005)
     """Whether each box of one list is a box of the other, and their numbers agree."""
     corners = [box_corners(box) for box in made]
     return len(made) == len(wanted) and all(
-        any(boxes_match(box_corners(box), each, tolerance) for each in corners) for box in wanted
+        any(boxes_match(box_corners(box), corner, tolerance) for corner in corners) for box in wanted
     )
 
 
@@ -94,7 +94,7 @@ def test_shelf_between_two_sides_is_squeezed() -> None:
     assert "squeeze(cube2, cube0, cube1, left, 0.6, 0.5)" in lines(hierarchy(*sides, shelf))
 
 
-def test_sides_that_stand_on_two_feet_each_become_a_sub_program() -> None:
+def test_sides_on_two_feet_become_a_repeated_sub_program() -> None:
     def frame(x: float) -> list[PartNode]:
         posts = [leaf("post", (x, 0, z), (0.1, 1.0, 0.1)) for z in (-0.4, 0.4)]
         return [*posts, leaf("bar", (x, 0.1, 0), (0.1, 0.1, 0.7))]
@@ -114,7 +114,7 @@ def test_hierarchy_of_the_input_becomes_sub_programs_numbered_level_by_level() -
     deep = node("deep", [box_of_two("inner", -1.0), leaf("c", (-0.6, 0, 0.1), (0.3, 1, 0.3))])
     program = extracted(hierarchy(base, deep, box_of_two("right", 1))).program
     assert [block.name for block in program.blocks] == [f"Program_{i}" for i in range(len(program.blocks))]
-    assert {each.name for each in program.root.cuboids} == {"cube0", "Program_1", "Program_2"}
+    assert {cuboid.name for cuboid in program.root.cuboids} == {"cube0", "Program_1", "Program_2"}
 
 
 POSTS = [leaf("post", (x, 0, 0), (0.1, 1, 0.1)) for x in (-0.9, 0.9)]
@@ -130,7 +130,7 @@ def test_members_of_a_group_are_attached_alike() -> None:
     assert lines(braced, Gates(max_leaves=3))[-1] == "reflect(cube0, X)"
 
 
-def test_steps_of_cleaning_can_be_left_out() -> None:
+def test_cleaning_steps_can_be_disabled() -> None:
     deep = hierarchy(*(leaf("post", (x, 0.02, 0), (0.1, 1.04, 0.1)) for x in (-0.9, 0.9)), BEAM)
     gates = Gates(min_leaves=1, min_f_score=0)
     assert extract(deep, CATEGORY_RULES["any"], gates).program.root.cuboids[0].dims[1] == 1.0
@@ -145,7 +145,7 @@ def test_steps_of_cleaning_can_be_left_out() -> None:
 
 @pytest.mark.parametrize("axis", [0, 2])
 @pytest.mark.parametrize("degrees", [8.0, 20.0, -35.0])
-def test_tilted_back_between_seat_and_top_is_where_it_was(axis: int, degrees: float) -> None:
+def test_tilted_back_keeps_its_place(axis: int, degrees: float) -> None:
     seat = leaf("seat", (0, -0.5, 0.2), (1.2, 0.2, 1.2))
     legs = leaf("block", (0, -0.8, 0.2), (0.4, 0.4, 0.4))
     axes = turned(axis, degrees)
@@ -172,7 +172,7 @@ def test_program_does_not_depend_on_the_order_of_the_file(order: list[int]) -> N
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(1e-3, 1e3), st.tuples(*[st.floats(-100, 100)] * 3))
-def test_size_and_place_of_a_shape_come_back(scale: float, move: tuple[float, float, float]) -> None:
+def test_center_and_scale_restore_size_and_place(scale: float, move: tuple[float, float, float]) -> None:
     shape = table()
     parts = [
         leaf(part.label, tuple(part.box.center * scale + np.array(move)), tuple(part.box.size * scale))
@@ -208,19 +208,19 @@ def test_size_and_place_of_a_shape_come_back(scale: float, move: tuple[float, fl
         ),
     ],
 )
-def test_what_cannot_be_a_training_program_is_refused_by_name(shape: PartHierarchy, reason: str) -> None:
+def test_unsuitable_hierarchy_is_rejected_by_name(shape: PartHierarchy, reason: str) -> None:
     with pytest.raises(Rejected) as caught:
         extracted(shape)
     assert caught.value.reason == reason
 
 
-def test_many_boxes_are_refused_before_hours_are_spent_on_them() -> None:
+def test_too_many_boxes_are_rejected_at_once() -> None:
     boxes = [leaf("a", (x, 0.0, z), (1, 1 + x / 90, 1), turned(0, 20)) for x in range(45) for z in range(44)]
     with pytest.raises(Rejected, match="too many parts"):
         extracted(hierarchy(*boxes))
 
 
-def test_fit_below_the_gate_is_refused() -> None:
+def test_poor_fit_is_rejected() -> None:
     # Nothing but the block holds the board, so that no attachment can turn it about the upright axis.
     block = leaf("block", (0, 0, 0), (1, 1, 1))
     other = leaf("other", (0.3, -0.2, 0.8), (0.3, 0.6, 0.6))
@@ -275,7 +275,7 @@ def known_program(category: str, name: str) -> str:
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="needs the shared material")
 @pytest.mark.parametrize(("category", "near"), [("chair", 16), ("table", 15), ("storage", 32)])
-def test_programs_come_back_from_the_shapes_that_they_make(category: str, near: int) -> None:
+def test_programs_are_extracted_from_their_own_shapes(category: str, near: int) -> None:
     files = sorted((SHARED / "partgraphs" / "structurenet" / category).glob("*.json"))
     scores, distances = [], []
     for path in files:

@@ -1,4 +1,4 @@
-"""Extraction in the real mill: programs out of hierarchies, refusals by name, the same bytes with any workers."""
+"""Extraction in the real pipeline: programs out of hierarchies, refusals by name, the same bytes with any workers."""
 
 from __future__ import annotations
 
@@ -68,19 +68,19 @@ def test_every_table_becomes_a_sample_whose_text_is_its_program(toy: tuple[Path,
         assert len(execute(parse(sample.text))) == 5
 
 
-def test_tables_of_one_structure_stand_in_one_split(toy: tuple[Path, str, Path]) -> None:
+def test_programs_of_one_structure_share_a_split(toy: tuple[Path, str, Path]) -> None:
     assert len({sample.split for sample in samples(toy[2])}) == 1
 
 
-def test_what_is_refused_is_counted_by_reason(toy: tuple[Path, str, Path]) -> None:
+def test_rejections_are_counted_by_reason(toy: tuple[Path, str, Path]) -> None:
     lines = [line for path in (toy[2] / "rejects").iterdir() for line in path.read_text().splitlines()]
     refused = Counter(json.loads(line)["reason"] for line in lines)
     assert refused == {"unreadable hierarchy": 1, "parts not connected": 1}
     assert "1 unreadable hierarchy" in toy[1]
 
 
-def test_two_workers_make_the_same_bytes_as_one(toy: tuple[Path, str, Path]) -> None:
+def test_bytes_do_not_depend_on_workers(toy: tuple[Path, str, Path]) -> None:
     folder, _, alone = toy
     _, together = made(folder, 2)
-    first, second = ({path.name: path.read_bytes() for path in each.glob("toy-*")} for each in (alone, together))
+    first, second = ({path.name: path.read_bytes() for path in value.glob("toy-*")} for value in (alone, together))
     assert first == second

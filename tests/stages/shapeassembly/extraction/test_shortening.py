@@ -34,9 +34,9 @@ def test_bar_through_two_posts_is_cut_at_both() -> None:
         leaf("part", (0, 0.4, 0), (0.1, 1.0, 0.1)),
         leaf("part", (1.0, 0.5, 0), (0.1, 1.0, 0.1)),
     ],
-    ids=["hidden", "coincident", "touching", "half beside"],
+    ids=["hidden", "coincident", "touching", "half outside"],
 )
-def test_part_that_would_vanish_or_whose_end_can_be_seen_stays(part: PartNode) -> None:
+def test_hidden_parts_and_visible_ends_are_not_cut(part: PartNode) -> None:
     box = shortened(leaf("top", (0, 1, 0), (2, 0.2, 2)), part)["part"].box
     np.testing.assert_allclose(box.size, part.box.size)
     np.testing.assert_allclose(box.center, part.box.center)

@@ -53,12 +53,12 @@ EMPTY = "{ bbox = Cuboid(0.5, 0.5, 0.5, True) }"
     ],
 )
 def test_a_broken_rule_is_named_with_its_line(rule: str, number: int, text: str) -> None:
-    found = [(each.rule, each.number) for each in violations(parse(text))]
+    found = [(violation.rule, violation.number) for violation in violations(parse(text))]
     assert (rule, number) in found
-    assert {each for each, _ in found} - {rule} <= {"not grounded", "attached twice"}
+    assert {item for item, _ in found} - {rule} <= {"not grounded", "attached twice"}
 
 
-def test_every_rule_is_tried_above() -> None:
+def test_every_rule_has_a_case() -> None:
     [cases] = test_a_broken_rule_is_named_with_its_line.pytestmark  # type: ignore[attr-defined]
     assert {case[0] for case in cases.args[1]} == set(RULE_NAMES)
 

@@ -105,13 +105,13 @@ HEAD = "Assembly P {\n\tbbox = Cuboid(1.0, 1.0, 1.0, True)\n"
         (HEAD + "\tattach(ç, bbox)\n}", "syntax", 3, 9),
     ],
 )
-def test_a_mistake_is_named_with_its_place(text: str, reason: str, line: int, column: int) -> None:
+def test_syntax_error_states_its_place(text: str, reason: str, line: int, column: int) -> None:
     with pytest.raises(ProgramError) as caught:
         parse(text)
     assert (caught.value.reason, caught.value.line, caught.value.column) == (reason, line, column)
 
 
-def test_a_mistake_is_shown_with_a_caret() -> None:
+def test_syntax_error_is_shown_with_a_caret() -> None:
     with pytest.raises(ProgramError) as caught:
         parse(HEAD + "\treflect(cube0, W)\n}")
     assert str(caught.value).splitlines() == [
@@ -121,6 +121,6 @@ def test_a_mistake_is_shown_with_a_caret() -> None:
     ]
 
 
-def test_a_text_beyond_the_limit_is_refused_unread() -> None:
+def test_overlong_text_is_refused() -> None:
     with pytest.raises(ProgramError, match="too long"):
         parse(" " * (MAX_TEXT_CHARACTERS + 1))

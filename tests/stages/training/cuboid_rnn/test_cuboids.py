@@ -26,23 +26,23 @@ ENTRY = CuboidRnnConfig(name="tiny", kind="cuboid_rnn", hidden=48, mixtures=1, b
 
 
 @pytest.mark.parametrize("text", [BOX, STOOL, TWO_LEGS])
-def test_cuboids_come_back_from_their_numbers(text: str) -> None:
+def test_box_vectors_round_trip(text: str) -> None:
     for box in execution_boxes(execute(parse(text))):
         again = box_from_vector(box_vector(box))
         assert boxes_match(box_corners(box), box_corners(again), 1e-6)
 
 
-def test_what_is_there_mirrored_is_said_once_and_the_lowest_first() -> None:
+def test_mirrored_pairs_count_once_and_rows_go_from_bottom_to_top() -> None:
     boxes = execution_boxes(execute(parse(TWO_LEGS)))
     rows = cuboid_rows(boxes)
     assert rows[:, 9].tolist() == [1, 0]
     assert (rows[0, 6:9] != 0).any(), "the leg leans"
-    told = [box_from_vector(row) for row in (*rows[:, :9], *mirror_cuboids(rows[:1, :9]))]
+    restored = [box_from_vector(row) for row in (*rows[:, :9], *mirror_cuboids(rows[:1, :9]))]
     for box in boxes:
-        assert any(boxes_match(box_corners(box), box_corners(each), 1e-3) for each in told)
+        assert any(boxes_match(box_corners(box), box_corners(item), 1e-3) for item in restored)
 
 
-def test_a_batch_says_axis_after_axis_and_what_stood_before() -> None:
+def test_batch_has_a_step_per_axis_and_the_step_before_as_input() -> None:
     rows = cuboid_rows(execution_boxes(execute(parse(TWO_LEGS))))
     cuboids = CuboidCorpus.of([rows, rows[1:]])
     batch = batch_of(cuboids, np.array([0, 1]))
@@ -57,19 +57,19 @@ def test_a_batch_says_axis_after_axis_and_what_stood_before() -> None:
     assert (batch.inputs[0, :, 5:].argmax(dim=-1) == torch.arange(9) % 3).all()
 
 
-def test_a_density_is_that_of_the_mixture_and_an_upright_cuboid_has_no_turn() -> None:
+def test_log_density_matches_the_mixture_and_ignores_rotation_of_upright_cuboids() -> None:
     generator = torch.Generator().manual_seed(0)
     weights = torch.randn(1, 1, 2, generator=generator)
     means, numbers = torch.randn(1, 1, 2, 3, generator=generator), torch.randn(1, 1, 3, generator=generator)
     wide = torch.full((1, 1, 2, 3), 0.5)
-    each = torch.distributions.Normal(means, wide).log_prob(numbers[:, :, None]).exp()
+    item = torch.distributions.Normal(means, wide).log_prob(numbers[:, :, None]).exp()
     shares = weights.softmax(dim=-1)
-    for turned, some in ((0.0, each[..., :2]), (1.0, each)):
+    for turned, some in ((0.0, item[..., :2]), (1.0, item)):
         wanted = (shares * some.prod(dim=-1)).sum(dim=-1).log()
         torch.testing.assert_close(log_density(weights, means, wide, numbers, torch.full((1, 1), turned)), wanted)
 
 
-def test_a_network_learns_two_shapes_and_writes_them() -> None:
+def test_network_learns_and_samples_two_shapes() -> None:
     shapes = [cuboid_rows(execution_boxes(execute(parse(text)))) for text in (BOX, TWO_LEGS)]
     cuboids = CuboidCorpus.of(shapes)
     learner = CuboidRnnTask(new_model(ENTRY, 0), {}, ENTRY, cuboids, cuboids)
@@ -90,9 +90,9 @@ def test_a_network_learns_two_shapes_and_writes_them() -> None:
     wanted = [execution_boxes(execute(parse(text))) for text in (BOX, TWO_LEGS)]
     alike = [
         sum(
-            len(each) == len(boxes)
-            and all(any(boxes_match(box_corners(a), box_corners(b), 0.1) for b in each) for a in boxes)
-            for each in found
+            len(item) == len(boxes)
+            and all(any(boxes_match(box_corners(a), box_corners(b), 0.1) for b in item) for a in boxes)
+            for item in found
         )
         for boxes in wanted
     ]
@@ -100,4 +100,4 @@ def test_a_network_learns_two_shapes_and_writes_them() -> None:
     assert min(alike) >= 3
     again, _ = model.sample(20, np.random.default_rng(0), 0.0)
     for one, two in zip(found, again, strict=True):
-        np.testing.assert_array_equal([each.center for each in one], [each.center for each in two])
+        np.testing.assert_array_equal([item.center for item in one], [item.center for item in two])

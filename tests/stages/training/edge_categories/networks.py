@@ -1,4 +1,4 @@
-"""Toy shapes whose places are known by heart: posts on a grid and rods between them; and the mill before training."""
+"""Toy shapes with known placements: posts on a grid and rods between them; and the pipeline before training."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES,
 from tests.toy_kits.chains_and_rings import Placed, box, pose, with_arrow
 from tests.toy_kits.chains_and_rings import kit_of as toy_kit
 
-CYCLES = 4
+MAX_CYCLE_NUMBERS = 4
 SPLITS = {"nets-train-000000": "train", "nets-train-000001": "train", "nets-val-000000": "val"}
-SHAPES = 6
+SHAPES_PER_SHARD = 6
 """Shapes of a shard."""
 
 
@@ -71,7 +71,7 @@ def network(seed: int, size: int = 4) -> Assembly:
     grid = nx.grid_2d_graph(3, 3)
     posts = [(int(rng.integers(3)), int(rng.integers(3)))]
     while len(posts) < size:
-        free = sorted({each for post in posts for each in grid[post]} - set(posts))
+        free = sorted({item for post in posts for item in grid[post]} - set(posts))
         posts.append(free[int(rng.integers(len(free)))])
     types, poses, edges = [0] * size, [pose(3 * x, 0, 3 * z) for x, z in posts], []
     for first, second in sorted(grid.subgraph(posts).edges):
@@ -97,18 +97,20 @@ def labelled(assembly: Assembly, count: int, seed: int) -> list[np.ndarray]:
     strings = writer().strings(writer().graph(assembly), count, np.random.default_rng(seed))
     found = space().label(assembly, strings, either_hand=True)
     return [
-        np.column_stack([read_string(each.string, space().alphabet, CYCLES), each.categories]).astype(np.int16)
-        for each in found
+        np.column_stack([read_string(item.string, space().alphabet, MAX_CYCLE_NUMBERS), item.categories]).astype(
+            np.int16
+        )
+        for item in found
     ]
 
 
 def strings_of(shapes: int) -> LabelledStrings:
-    each = [labelled(network(seed), 3, seed) for seed in range(shapes)]
-    rows = [row for of_shape in each for row in of_shape]
+    item = [labelled(network(seed), 3, seed) for seed in range(shapes)]
+    rows = [row for of_shape in item for row in of_shape]
     return LabelledStrings(
         np.concatenate(rows),
         np.cumsum([0, *map(len, rows)]),
-        np.repeat(np.arange(shapes, dtype=np.int32), [len(of_shape) for of_shape in each]),
+        np.repeat(np.arange(shapes, dtype=np.int32), [len(of_shape) for of_shape in item]),
     )
 
 
@@ -127,7 +129,7 @@ def header(settings: EdgeCategoriesConfig) -> dict[str, Any]:
         "settings": settings.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
         "names": list(kit().labels),
         "places": places,
-        "cycles": CYCLES,
+        "cycles": MAX_CYCLE_NUMBERS,
     }
 
 
@@ -136,7 +138,7 @@ def random_model(**changes: Any) -> TrainedEdgeCategories:
     import torch
 
     settings = entry(**changes)
-    module = new_model(settings, CategoryTables.of(space()), CYCLES, 0)
+    module = new_model(settings, CategoryTables.of(space()), MAX_CYCLE_NUMBERS, 0)
     with torch.no_grad():
         for parameter in module.parameters():
             parameter.mul_(2.0)
@@ -147,7 +149,7 @@ def learner(settings: EdgeCategoriesConfig, shapes: int = 12) -> EdgeCategoriesT
     """A learner of some shapes, on which it is validated as well."""
     strings = strings_of(shapes)
     return EdgeCategoriesTask(
-        new_model(settings, CategoryTables.of(space()), CYCLES, 1),
+        new_model(settings, CategoryTables.of(space()), MAX_CYCLE_NUMBERS, 1),
         {},
         settings,
         strings,
@@ -162,7 +164,7 @@ def trained_model(**changes: Any) -> TrainedEdgeCategories:
     settings = entry(learning_rate=0.01, **changes)
     learning = learner(settings)
     train(TrainState.of(learning), np.random.default_rng(2), lambda done, total: None)
-    module = make_model(settings, CategoryTables.of(space()), CYCLES)
+    module = make_model(settings, CategoryTables.of(space()), MAX_CYCLE_NUMBERS)
     module.load_state_dict(learning.module.state_dict())
     return TrainedEdgeCategories(module.eval(), space(), header(settings))
 
@@ -177,10 +179,10 @@ def make_shapes(task: Task) -> Outcome:
     name = task.shard.name
     place = list(SPLITS).index(name)
     with task.output(f"{name}.tar") as stream, ShardWriter(stream) as written:
-        for number in range(place * SHAPES, (place + 1) * SHAPES):
+        for number in range(place * SHAPES_PER_SHARD, (place + 1) * SHAPES_PER_SHARD):
             key = f"{name}-{number}"
             write_sample(written, Sample(key, SPLITS[name], "variations", "toy", key, {}, network(number, 3 + place)))
-    return Outcome(SHAPES, {"split": SPLITS[name], "samples": SHAPES})
+    return Outcome(SHAPES_PER_SHARD, {"split": SPLITS[name], "samples": SHAPES_PER_SHARD})
 
 
 def plan_shapes(plan: Plan) -> list[Shard]:

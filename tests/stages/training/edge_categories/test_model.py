@@ -23,7 +23,7 @@ from stages.training.edge_categories.settings import EdgeCategoriesConfig
 from stages.training.edge_categories.trained import TrainedEdgeCategories, load_edge_categories
 from stages.training.edge_categories.training import new_model
 from tests.stages.training.edge_categories.networks import (
-    CYCLES,
+    MAX_CYCLE_NUMBERS,
     kit,
     labelled,
     learner,
@@ -49,17 +49,17 @@ def right(seed: int) -> np.ndarray:
     return found.categories
 
 
-def test_a_string_is_read_with_the_parts_at_both_ends_of_each_edge() -> None:
-    rows = read_string("A0B(C)BA0", space().alphabet, CYCLES)
+def test_string_is_read_with_the_parts_at_both_ends_of_edges() -> None:
+    rows = read_string("A0B(C)BA0", space().alphabet, MAX_CYCLE_NUMBERS)
     sign, bracket, cycle = 3, 4, 6
     assert rows[:, 0].tolist() == [1, cycle, 2, bracket, sign, bracket + 1, 2, 1, cycle]
     assert rows[:, 1].tolist() == [-1, 0, 0, -1, 2, -1, 2, 6, 7]
     assert rows[:, 2].tolist() == [0, 7, 2, -1, 4, -1, 6, 7, 0]
-    many = read_string("A%17BAB%17", space().alphabet, CYCLES)
-    assert many[1, 0] == many[5, 0] == cycle + CYCLES - 1, "numbers that are not told apart are the last"
+    many = read_string("A%17BAB%17", space().alphabet, MAX_CYCLE_NUMBERS)
+    assert many[1, 0] == many[5, 0] == cycle + MAX_CYCLE_NUMBERS - 1, "numbers that are not told apart are the last"
 
 
-def test_a_batch_holds_the_mask_of_each_token_by_the_labels_of_its_edge() -> None:
+def test_batch_has_the_mask_of_every_token_by_the_labels_of_its_edge() -> None:
     rows = [labelled(network(seed), 0, 0)[0] for seed in (1, 2)]
     batch = batch_of(rows, space().masks)
     for place, seed in enumerate((1, 2)):
@@ -71,50 +71,50 @@ def test_a_batch_holds_the_mask_of_each_token_by_the_labels_of_its_edge() -> Non
         assert batch.is_token[place].sum() == count == len(split_tokens(encoded.string))
 
 
-def test_batches_hold_each_string_once() -> None:
+def test_batches_hold_every_string_once_in_random_order() -> None:
     made = strings_of(6)
     for rng in (None, np.random.default_rng(0)):
-        seen = [each.lengths.tolist() for each in batches(made, 4, space().masks, rng)]
-        assert sorted(length for each in seen for length in each) == sorted(made.lengths.tolist())
+        seen = [batch.lengths.tolist() for batch in batches(made, 4, space().masks, rng)]
+        assert sorted(length for item in seen for length in item) == sorted(made.lengths.tolist())
         assert max(map(len, seen)) <= 4
 
 
 @pytest.mark.parametrize("decoder", DECODERS)
-def test_a_string_is_judged_alike_whatever_stands_beside_it(decoder: str) -> None:
+def test_logits_of_a_string_do_not_depend_on_the_rest_of_the_batch(decoder: str) -> None:
     module = random_model(decoder=decoder).module
     rows = sorted((labelled(network(seed, size), 0, 0)[0] for seed, size in ((1, 2), (2, 5))), key=len)
     with torch.no_grad():
-        alone, beside = (module(batch_of(each, space().masks))[0, : len(rows[0])] for each in (rows[:1], rows))
+        alone, beside = (module(batch_of(value, space().masks))[0, : len(rows[0])] for value in (rows[:1], rows))
     torch.testing.assert_close(alone, beside, rtol=1e-4, atol=1e-4)
 
 
-def test_a_walker_sees_the_categories_before_a_token_and_no_others() -> None:
+def test_autoregressive_decoder_depends_on_earlier_categories_only() -> None:
     module = random_model(decoder="autoregressive").module
     batch = batch_of([labelled(network(3), 0, 0)[0]], space().masks)
-    token = next(each for each in range(4, batch.codes.shape[1]) if int(batch.allowed[0, each].sum()) > 1)
+    token = next(number for number in range(4, batch.codes.shape[1]) if int(batch.allowed[0, number].sum()) > 1)
     with torch.no_grad():
         before = module(batch)[0]
         allowed = batch.allowed[0, token].nonzero()[:, 0].tolist()
-        batch.categories[0, token] = next(each for each in allowed if each != int(batch.categories[0, token]))
+        batch.categories[0, token] = next(item for item in allowed if item != int(batch.categories[0, token]))
         after = module(batch)[0]
     torch.testing.assert_close(before[: token + 1], after[: token + 1])
     assert not torch.allclose(before[token + 1], after[token + 1])
 
 
-def test_frames_of_a_walker_are_those_of_the_categories() -> None:
+def test_frames_of_the_autoregressive_decoder_match_the_placed_parts() -> None:
     module = random_model(decoder="autoregressive").module
     assert isinstance(module, AutoregressiveEdgeDecoder)
     (encoded,) = strings(4)
     row = labelled(network(4), 0, 0)[0]
     frames = module.frames(batch_of([row], space().masks))[0].double().numpy()
-    frames[:, :3, 3] *= np.mean([each.diagonal for each in kit().types])
+    frames[:, :3, 3] *= np.mean([item.diagonal for item in kit().types])
     placed = space().place(encoded.string, row[:, 3])
     parts = [token for token, text in enumerate(split_tokens(encoded.string)) if text in space().alphabet.types]
     np.testing.assert_allclose(pose_vectors(frames[parts], 1.0), pose_vectors(placed.poses, 1.0), atol=1e-4)
 
 
 @pytest.mark.parametrize("decoder", DECODERS)
-def test_token_by_token_a_model_says_what_it_says_of_the_whole(decoder: str) -> None:
+def test_stepwise_scores_match_those_of_whole_strings(decoder: str) -> None:
     model = random_model(decoder=decoder)
     (encoded,) = strings(5)
     steps = model.decoding([encoded.string, "A", encoded.string])
@@ -129,19 +129,19 @@ def test_token_by_token_a_model_says_what_it_says_of_the_whole(decoder: str) -> 
         again.take(np.array([category]))
 
 
-def test_strings_that_are_kept_go_on_as_they_would_have() -> None:
+def test_kept_rows_continue_unchanged() -> None:
     model = random_model(decoder="autoregressive")
     texts = [strings(seed)[0].string for seed in (1, 2)]
     both, kept = model.decoding(texts), model.decoding(texts)
-    for each in (both, kept):
+    for value in (both, kept):
         for _ in range(3):
-            each.take(each.scores().argmax(axis=1))
+            value.take(value.scores().argmax(axis=1))
     kept.keep(np.array([1, 1]))
     np.testing.assert_allclose(kept.scores(), both.scores()[[1, 1]], atol=1e-5)
 
 
 @pytest.mark.parametrize("decoder", DECODERS)
-def test_only_what_the_mask_allows_is_chosen(decoder: str) -> None:
+def test_chosen_categories_are_allowed_by_the_mask(decoder: str) -> None:
     model = random_model(decoder=decoder)
     for seed in range(3):
         (encoded,) = strings(seed)
@@ -156,26 +156,26 @@ def test_only_what_the_mask_allows_is_chosen(decoder: str) -> None:
 
 
 @pytest.mark.slow
-def test_parts_of_one_label_have_one_surface_in_all_their_categories(tmp_path: Path) -> None:
-    """Labels do not tell the type of a part; the category of a part binds those beside it, if there are any."""
+def test_sampled_categories_keep_the_type_of_every_part(tmp_path: Path) -> None:
+    """Labels do not determine the type of a part; its first category does, for all its neighbours."""
     shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path, 4))
     chairs = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").resolve(STRICTEST))
     of_chairs, of_kit = CategorySpace(chairs), KitStrings(chairs, "all")
     settings = model_entry(random_model(decoder="autoregressive"))
-    module = new_model(settings, CategoryTables.of(of_chairs), CYCLES, 0)
+    module = new_model(settings, CategoryTables.of(of_chairs), MAX_CYCLE_NUMBERS, 0)
     model = TrainedEdgeCategories(module.eval(), of_chairs, random_model().header)
     for seed, exemplar in enumerate(chairs.exemplars):
         texts = [
-            each.string for each in of_kit.strings(of_kit.graph(exemplar.assembly), 2, np.random.default_rng(seed))
+            string.string for string in of_kit.strings(of_kit.graph(exemplar.assembly), 2, np.random.default_rng(seed))
         ]
         for string, chosen in zip(texts, model.choose(texts, np.random.default_rng(seed)), strict=True):
             decoded = decode(string, of_chairs.alphabet)
             types: dict[int, int] = {}
-            for text, (here, there), each in zip(decoded.texts, token_edges(decoded).tolist(), chosen, strict=True):
+            for text, (here, there), item in zip(decoded.texts, token_edges(decoded).tolist(), chosen, strict=True):
                 if text in of_chairs.alphabet.types:
                     beside = of_chairs.categories_between(types.get(here), int(decoded.types[there]))
-                    assert each in beside or not beside
-                    types[there] = int(of_chairs.types[each, 1])
+                    assert item in beside or not beside
+                    types[there] = int(of_chairs.types[item, 1])
 
 
 def model_entry(model: TrainedEdgeCategories) -> EdgeCategoriesConfig:
@@ -183,7 +183,7 @@ def model_entry(model: TrainedEdgeCategories) -> EdgeCategoriesConfig:
 
 
 @pytest.mark.slow
-def test_it_learns_and_a_walker_learns_what_no_token_can_know_by_itself() -> None:
+def test_both_decoders_learn_and_the_autoregressive_one_learns_more() -> None:
     """Where the first of several rods goes is anybody's guess, but those after it must go elsewhere."""
     found = {}
     for decoder in DECODERS:
@@ -200,14 +200,14 @@ def test_it_learns_and_a_walker_learns_what_no_token_can_know_by_itself() -> Non
 
 
 @pytest.mark.slow
-def test_strings_vote_for_a_shape_that_closes_and_all_read_it_alike() -> None:
+def test_strings_vote_for_a_closed_shape_that_all_describe() -> None:
     model = trained_model(decoder="autoregressive")
     several = strings(1, 4)
     # as seen from the first: its nodes are those of its own order
     order = np.argsort(several[0].nodes)
-    others = [Encoded(each.string, order[each.nodes]) for each in several[1:]]
+    others = [Encoded(item.string, order[item.nodes]) for item in several[1:]]
     results = model.vote(several)
-    likely = [each.log_probability for each in results]
+    likely = [result.log_probability for result in results]
     assert likely
     assert likely == sorted(likely, reverse=True)
     spans = []
@@ -220,7 +220,7 @@ def test_strings_vote_for_a_shape_that_closes_and_all_read_it_alike() -> None:
 
 
 @pytest.mark.parametrize("decoder", DECODERS)
-def test_weights_come_back_from_their_file_and_only_for_their_kit(decoder: str, tmp_path: Path) -> None:
+def test_weights_are_read_for_their_own_kit_only(decoder: str, tmp_path: Path) -> None:
     model = random_model(decoder=decoder)
     path = tmp_path / "weights.safetensors"
     path.write_bytes(checkpoint_bytes(model.module.state_dict(), model.header))
@@ -233,11 +233,11 @@ def test_weights_come_back_from_their_file_and_only_for_their_kit(decoder: str, 
             load_edge_categories(path, kit())
 
 
-def test_strings_of_other_spanning_trees_vote_for_a_shape_if_all_that_they_tell_of_holds() -> None:
-    ring = next(each for each in map(network, range(50)) if len(each.edges) == len(each))
+def test_strings_of_different_spanning_trees_vote_for_the_shape_with_all_their_contacts() -> None:
+    ring = next(number for number in map(network, range(50)) if len(number.edges) == len(number))
     trees = KitStrings(kit(), "tree")
     strings = trees.strings(trees.graph(ring), 5, np.random.default_rng(0))
-    truth = [each.categories for each in space().label(ring, strings, either_hand=True)]
+    truth = [label.categories for label in space().label(ring, strings, either_hand=True)]
     model = random_model(decoder="autoregressive")
     (result,) = model.vote(strings, truth)
     for read, wanted in zip(result.categories, truth, strict=True):

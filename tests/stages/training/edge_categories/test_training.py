@@ -1,4 +1,4 @@
-"""Training on the real mill: what is made ready, and what is published."""
+"""Training in the real pipeline: prepared samples and published models."""
 
 from __future__ import annotations
 
@@ -36,21 +36,21 @@ def made_ready(out: Path, split: str) -> LabelledStrings:
     )
 
 
-def test_what_is_made_ready_are_strings_of_the_shapes_with_their_categories(out: Path) -> None:
+def test_prepared_strings_have_the_categories_of_their_shapes(out: Path) -> None:
     described = json.loads((out / WORK / "toy-edge_categories.json").read_text())
     for split, seeds in (("train", range(12)), ("val", range(12, 18))):
         found = made_ready(out, split)
         assert described["counts"][split] == {"strings": len(found), "graphs": len(seeds), "tokens": len(found.rows)}
         assert found.first[-1] == len(found.rows)
         sizes = {seed: len(network(seed, 3 + (seed // 6))) for seed in seeds}
-        parts = [int((found.row(each)[:, 0] <= 3).sum()) for each in range(len(found))]
+        parts = [int((found.row(number)[:, 0] <= 3).sum()) for number in range(len(found))]
         assert [sizes[seeds[shape]] for shape in found.graph.tolist()] == parts
     first = made_ready(out, "train").row(0)[:, 3]
     (canonical,) = writer().strings(writer().graph(network(0, 3)), 0, np.random.default_rng(0))
     assert first.tolist() == space().label(network(0, 3), [canonical], either_hand=True)[0].categories.tolist()
 
 
-def test_model_is_published_and_read_beside_its_kit(out: Path) -> None:
+def test_model_is_published_and_read_with_its_kit(out: Path) -> None:
     folder = out / "nets-models/tiny-toy-0"
     rows = list(csv.DictReader((folder / "curves.csv").read_text().splitlines()))
     assert [int(row["step"]) for row in rows] == [4, 8]
@@ -60,7 +60,7 @@ def test_model_is_published_and_read_beside_its_kit(out: Path) -> None:
     space().place("ABA", chosen)
 
 
-def test_second_run_trains_nothing_and_other_strings_are_made_ready_anew(out: Path) -> None:
+def test_second_run_trains_nothing_and_changed_strings_are_prepared_again(out: Path) -> None:
     assert train_networks(config(), out).made == 0
-    survey = Inventory(config({"strings_per_shape": 2}), STAGES, DatasetPaths(out, "nets")).stage("training")
-    assert "toy-edge_categories" not in survey.records, "they are drawn by that number"
+    inventory = Inventory(config({"strings_per_shape": 2}), STAGES, DatasetPaths(out, "nets")).stage("training")
+    assert "toy-edge_categories" not in inventory.records, "they are drawn by that number"

@@ -27,37 +27,37 @@ def graphs() -> GraphCorpus:
     return GraphCorpus.of([graph_nodes(execute(parse(text))) for text in (BOX, STOOL)])
 
 
-def test_nodes_are_the_assemblies_and_their_parts_the_cuboids_and_copies() -> None:
+def test_nodes_are_assemblies_with_their_cuboids_and_copies() -> None:
     """The stool has its two legs in an assembly of their own, and a top with four copies."""
     nodes = graph_nodes(execute(parse(STOOL)))
-    assert [each.below.tolist() for each in nodes] == [[1, -1, -1, -1, -1, -1], [-1, -1]]
-    leaves = sum(int((each.below == -1).sum()) for each in nodes)
+    assert [node.below.tolist() for node in nodes] == [[1, -1, -1, -1, -1, -1], [-1, -1]]
+    leaves = sum(int((node.below == -1).sum()) for node in nodes)
     assert leaves == len(execute(parse(STOOL)))
-    for each in nodes:
-        assert (each.touching == each.touching.T).all()
-        assert not each.touching.diagonal().any()
+    for node in nodes:
+        assert (node.touching == node.touching.T).all()
+        assert not node.touching.diagonal().any()
 
 
-def test_a_node_with_too_many_parts_is_refused() -> None:
+def test_node_with_too_many_parts_is_rejected() -> None:
     many = BOX[:-1] + "translate(c, X, 13, 0.5) }"
     with pytest.raises(Rejected) as caught:
         graph_nodes(execute(parse(many)))
     assert caught.value.reason == "too many parts"
 
 
-def test_losses_of_a_batch_are_those_of_its_shapes_one_by_one() -> None:
+def test_loss_of_a_batch_is_the_sum_over_its_shapes() -> None:
     module = new_model(ENTRY, 1)
     points = torch.randn(2, ENTRY.latent, generator=torch.Generator().manual_seed(0))
     together = reconstruction(module, batch_of(graphs(), np.array([0, 1])), points)
     alone = [reconstruction(module, batch_of(graphs(), np.array([row])), points[row : row + 1]) for row in (0, 1)]
     for whole, parts in zip(together, zip(*alone, strict=True), strict=True):
-        assert whole.item() == pytest.approx(sum(each.item() for each in parts), rel=1e-5)
+        assert whole.item() == pytest.approx(sum(part.item() for part in parts), rel=1e-5)
     means = module.encode(batch_of(graphs(), np.array([0, 1])))[0]
     for row in (0, 1):
         torch.testing.assert_close(module.encode(batch_of(graphs(), np.array([row])))[0][0], means[row])
 
 
-def test_a_model_learns_two_shapes_and_writes_them() -> None:
+def test_model_learns_and_samples_two_shapes() -> None:
     learner = PartGraphVaeTask(new_model(ENTRY, 0), {}, ENTRY, graphs(), graphs())
     optimizer = torch.optim.Adam(learner.module.parameters(), lr=3e-3)
     noise = torch.Generator().manual_seed(0)
@@ -75,7 +75,7 @@ def test_a_model_learns_two_shapes_and_writes_them() -> None:
         wanted = execution_boxes(execute(parse(text)))
         assert len(found) == len(wanted)
         for box in wanted:
-            assert any(boxes_match(box_corners(box), box_corners(each), 0.15) for each in found)
+            assert any(boxes_match(box_corners(box), box_corners(item), 0.15) for item in found)
     one, other = (model.sample(5, np.random.default_rng(0)) for _ in range(2))
     assert one[1] == other[1] >= 5
     assert all(np.array_equal(a[0].center, b[0].center) for a, b in zip(one[0], other[0], strict=True))

@@ -20,8 +20,8 @@ from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
 EXAMPLES = [parse(path.read_text()) for path in sorted(Path("datasets/exemplars/programs").glob("*.txt"))]
 PROGRAMS = [*EXAMPLES, parse(STOOL), parse(BOX)]
-UNIT = max(max(each.root.bbox.dims) for each in PROGRAMS)
-WORDED = [program_words(each, UNIT) for each in PROGRAMS]
+UNIT = max(max(program.root.bbox.dims) for program in PROGRAMS)
+WORDED = [program_words(program, UNIT) for program in PROGRAMS]
 VALUES = step_values(WORDED)
 
 
@@ -34,7 +34,7 @@ def again(number: int) -> AssemblyProgram | None:
 
 
 @pytest.mark.parametrize("number", range(len(PROGRAMS)))
-def test_programs_may_be_written_and_are_the_same_but_for_the_steps_of_numbers(number: int) -> None:
+def test_programs_round_trip_up_to_the_steps_of_numbers(number: int) -> None:
     assert word_sequence(WORDED[number], VALUES, UNIT) is not None
     program, wanted = again(number), PROGRAMS[number]
     assert program is not None
@@ -60,7 +60,7 @@ def chance(seed: int, often: set[int]) -> AssemblyProgram | None:
 
 
 @pytest.mark.parametrize("often", [set(), {ATTACH, SQUEEZE}, {CUBOID}, {REFLECT}])
-def test_whatever_is_written_breaks_no_rule_and_comes_to_an_end(often: set[int]) -> None:
+def test_random_allowed_words_give_finished_valid_programs(often: set[int]) -> None:
     lines = 0
     for seed in range(12):
         program = chance(seed, often)
@@ -88,7 +88,7 @@ def may(text: PartialProgram) -> set[int]:
     return set((np.flatnonzero(text.allowed()) - first_word(field)).tolist())
 
 
-def test_lines_follow_in_order_every_cuboid_is_attached_and_nothing_is_joined_twice() -> None:
+def test_grammar_orders_lines_and_attaches_every_cuboid_once() -> None:
     text = PartialProgram(VALUES, UNIT)
     said(text, 30, 30, 30)
     assert may(text) == {CUBOID}
@@ -120,7 +120,7 @@ def test_lines_follow_in_order_every_cuboid_is_attached_and_nothing_is_joined_tw
     assert text.field is None
 
 
-def test_what_expands_a_cuboid_is_as_large_and_none_is_expanded_too_deep() -> None:
+def test_sub_program_has_the_size_of_its_cuboid_and_depth_is_limited() -> None:
     text = PartialProgram(VALUES, UNIT)
     said(text, 50, 50, 50)
     for depth in range(1, MAX_DEPTH):

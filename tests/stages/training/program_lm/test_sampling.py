@@ -22,31 +22,31 @@ from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
 ENTRY = ProgramLmConfig(name="tiny", kind="program_lm", width=32, layers=2, batch_size=2)
 PROGRAMS = [parse(text) for text in (BOX, STOOL)]
-WORDED = [program_words(each, 1.2) for each in PROGRAMS]
+WORDED = [program_words(program, 1.2) for program in PROGRAMS]
 VALUES = step_values(WORDED)
-READ = [each for each in (word_sequence(words, VALUES, 1.2) for words in WORDED) if each is not None]
+READ = [item for item in (word_sequence(words, VALUES, 1.2) for words in WORDED) if item is not None]
 TEXTS = WordCorpus.of(READ)
-LONGEST = 100
+MAX_WORDS = 100
 
 
 def trained(module: ProgramLm, top_p: float) -> TrainedProgramLm:
     return TrainedProgramLm(module.eval(), {"unit": 1.2}, top_p)
 
 
-def test_a_batch_holds_each_program_behind_its_start() -> None:
+def test_batch_holds_programs_with_their_start() -> None:
     (batch,) = batches(TEXTS, 2, None)
     rows = (batch.places // batch.words.shape[1]).tolist()
-    assert [rows.count(row) for row in range(2)] == [len(each.words) for each in READ]
-    for row, each in enumerate(READ):
-        np.testing.assert_array_equal(batch.words[row, : len(each.words)], each.words)
+    assert [rows.count(row) for row in range(2)] == [len(item.words) for item in READ]
+    for row, item in enumerate(READ):
+        np.testing.assert_array_equal(batch.words[row, : len(item.words)], item.words)
         assert batch.before[row, 0] == START
-        assert batch.before[row, 1] == each.words[0]
-        np.testing.assert_array_equal(batch.cues[row, : len(each.words)], each.cues)
+        assert batch.before[row, 1] == item.words[0]
+        np.testing.assert_array_equal(batch.cues[row, : len(item.words)], item.cues)
 
 
 @torch.no_grad()
-def test_words_one_by_one_are_said_as_in_whole_programs_wherever_each_stands_and_after_going_back() -> None:
-    module = new_model(ENTRY, VALUES, LONGEST, 1)
+def test_stepwise_logits_match_whole_programs_after_backtracking_too() -> None:
+    module = new_model(ENTRY, VALUES, MAX_WORDS, 1)
     (batch,) = batches(TEXTS, 2, None)
     whole = torch.zeros(*batch.words.shape, VOCABULARY_SIZE)
     whole.flatten(0, 1)[batch.places] = module(batch.before, batch.cues, batch.sizes, batch.places)
@@ -64,7 +64,7 @@ def test_words_one_by_one_are_said_as_in_whole_programs_wherever_each_stands_and
             torch.testing.assert_close(said[0], whole[0, first], atol=1e-4, rtol=1e-4)
 
 
-def test_numbers_alone_are_jittered_by_a_step_and_stay_numbers() -> None:
+def test_jitter_shifts_only_numbers_by_one_step() -> None:
     before = torch.arange(VOCABULARY_SIZE).repeat(400, 1)
     found = jittered(before, 0.2, torch.Generator().manual_seed(0))
     moved = (found - before)[:, FIRST_NUMBER_WORD:]
@@ -74,7 +74,7 @@ def test_numbers_alone_are_jittered_by_a_step_and_stay_numbers() -> None:
     assert (moved != 0).float().mean().item() == pytest.approx(0.2 * NUMBER_STEPS / (NUMBER_STEPS + 1), abs=0.01)
 
 
-def test_words_are_drawn_by_their_shares_among_those_allowed_and_the_likeliest() -> None:
+def test_words_are_sampled_by_probability_among_allowed_top_p() -> None:
     shares = np.array([0.5, 0.3, 0.15, 0.05])
     allowed = np.array([True, True, True, True])
     rows = 20_000
@@ -94,8 +94,8 @@ def test_words_are_drawn_by_their_shares_among_those_allowed_and_the_likeliest()
     np.testing.assert_allclose(found(0.9, 1.0, allowed), [0, 2 / 3, 1 / 3, 0], atol=0.01)
 
 
-def test_a_model_learns_two_programs_and_writes_them() -> None:
-    module = new_model(ENTRY, VALUES, LONGEST, 0)
+def test_model_learns_and_samples_two_programs() -> None:
+    module = new_model(ENTRY, VALUES, MAX_WORDS, 0)
     learner = ProgramLmTask(module, {}, ENTRY, TEXTS, TEXTS)
     optimizer = torch.optim.Adam(module.parameters(), lr=3e-3)
     noise = torch.Generator().manual_seed(0)
@@ -113,15 +113,15 @@ def test_a_model_learns_two_programs_and_writes_them() -> None:
         assert learner.validate(noise)["loss"] < 0.05 * before["loss"]
     programs, begun = trained(module, 0.9).sample(40, np.random.default_rng(0))
     assert begun == 40
-    assert {signature(each) for each in programs} == {signature(each) for each in PROGRAMS}
-    for each in programs:
-        (wanted,) = [of for of in PROGRAMS if signature(of) == signature(each)]
-        np.testing.assert_allclose(execute(each).corners, execute(wanted).corners, atol=0.03)
+    assert {signature(program) for program in programs} == {signature(program) for program in PROGRAMS}
+    for program in programs:
+        (wanted,) = [of for of in PROGRAMS if signature(of) == signature(program)]
+        np.testing.assert_allclose(execute(program).corners, execute(wanted).corners, atol=0.03)
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_what_is_written_keeps_every_rule_and_its_box_whatever_the_weights(seed: int) -> None:
-    module = new_model(ENTRY, VALUES, LONGEST, seed)
+def test_samples_keep_every_rule_and_their_box_with_random_weights(seed: int) -> None:
+    module = new_model(ENTRY, VALUES, MAX_WORDS, seed)
     model = trained(module, 1.0)
     programs, begun = model.sample(8, np.random.default_rng(seed))
     assert begun > 8, "many are given up"
@@ -133,7 +133,7 @@ def test_what_is_written_keeps_every_rule_and_its_box_whatever_the_weights(seed:
     assert again == programs
 
 
-def test_a_program_that_breaks_a_rule_is_not_learnt() -> None:
+def test_program_that_breaks_a_rule_has_no_word_sequence() -> None:
     twice = BOX[:-1] + "attach(c, bbox, 0.5, 0.0, 0.5, 0.5, 0.0, 0.5) }"
     found: WordSequence | None = word_sequence(program_words(parse(twice), 1.2), VALUES, 1.2)
     assert found is None

@@ -22,12 +22,12 @@ from stages.training.program_vae.lines import CUBOID, STOP
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
 
-def test_a_program_is_its_lines_word_by_word_and_each_assembly_stands_behind_the_one_it_expands_a_cuboid_of() -> None:
+def test_words_of_a_program_list_assemblies_depth_first() -> None:
     words = program_words(parse(STOOL), 1.2)
     fields = [field for field, _, _ in words]
     assert fields[:3] == [TokenField.ROOT_X, TokenField.ROOT_Y, TokenField.ROOT_Z]
     commands = [word for field, word, _ in words if field == TokenField.COMMAND]
-    assert [commands.count(each) for each in (STOP, CUBOID)] == [2, 3]
+    assert [commands.count(value) for value in (STOP, CUBOID)] == [2, 3]
     assert commands.index(STOP) == 6, "the root ends before what expands its first cuboid begins"
     said = [(field, word - first_word(field)) for field, word, _ in words]
     cuboid = said.index((TokenField.COMMAND, CUBOID))
@@ -43,7 +43,7 @@ def test_a_program_is_its_lines_word_by_word_and_each_assembly_stands_behind_the
 
 
 @pytest.mark.parametrize("field", [TokenField.SIZE_Y, TokenField.GOAL_X])
-def test_steps_cover_all_numbers_and_are_the_nearest(field: TokenField) -> None:
+def test_steps_cover_all_numbers_and_round_to_nearest(field: TokenField) -> None:
     steps = [number_of_step(field, step) for step in range(NUMBER_STEPS + 1)]
     assert (steps[0], steps[-1]) == (0, pytest.approx(1))
     assert [step_of(field, number) for number in steps] == list(range(NUMBER_STEPS + 1))
@@ -52,7 +52,7 @@ def test_steps_cover_all_numbers_and_are_the_nearest(field: TokenField) -> None:
     assert [step_of(field, number) for number in (-1.0, 7.0)] == [0, NUMBER_STEPS]
 
 
-def test_a_step_stands_for_the_median_of_what_was_said_so_that_recurring_numbers_are_exact() -> None:
+def test_step_values_are_medians_so_that_recurring_numbers_are_exact() -> None:
     word = first_word(TokenField.GOAL_X) + 32
     values = step_values(
         [[(TokenField.GOAL_X, word, number) for number in (0.5, 0.5, 0.503)], [(TokenField.GOAL_X, word, 0.497)]]
@@ -66,7 +66,7 @@ def test_a_step_stands_for_the_median_of_what_was_said_so_that_recurring_numbers
     ("line", "reason"),
     [("reflect(c, X) reflect(cube1, Z)", "names a copy"), ("translate(c, X, 41, 0.5)", "too many copies")],
 )
-def test_what_has_no_words_is_refused(line: str, reason: str) -> None:
+def test_program_without_words_is_rejected(line: str, reason: str) -> None:
     with pytest.raises(ProgramError, match=reason.split()[0]) as raised:
         program_words(parse(BOX[:-1] + line + " }"), 1.0)
     assert raised.value.reason == reason

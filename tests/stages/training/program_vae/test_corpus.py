@@ -18,7 +18,7 @@ PROGRAM = parse(BENCH)
 
 
 @pytest.mark.parametrize("without", get_args(Ablation))
-def test_what_a_model_is_to_do_without_is_not_in_its_programs(without: Ablation) -> None:
+def test_ablated_programs_lack_the_part_of_the_language(without: Ablation) -> None:
     found = ablate_program(PROGRAM, without, np.random.default_rng(0))
     nodes = assembly_lines(found)
     kinds = {type(line) for block in found.blocks for line in block.lines}
@@ -29,13 +29,13 @@ def test_what_a_model_is_to_do_without_is_not_in_its_programs(without: Ablation)
     assert aligned == (without != "align")
 
 
-def test_order_is_drawn_from_the_generator_alone() -> None:
-    told = [ablate_program(PROGRAM, "order", np.random.default_rng(seed)) for seed in (1, 1, *range(2, 9))]
-    assert told[0] == told[1]
-    assert any(each != told[0] for each in told)
+def test_random_order_depends_on_the_generator_alone() -> None:
+    shuffled = [ablate_program(PROGRAM, "order", np.random.default_rng(seed)) for seed in (1, 1, *range(2, 9))]
+    assert shuffled[0] == shuffled[1]
+    assert any(item != shuffled[0] for item in shuffled)
 
 
-def test_models_that_learn_the_same_share_what_is_made_ready() -> None:
+def test_models_with_equal_ablation_share_prepared_samples() -> None:
     def entry(without: Ablation) -> ProgramVaeConfig:
         return ProgramVaeConfig(name="any", kind="program_vae", ablate=without)
 

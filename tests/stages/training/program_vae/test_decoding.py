@@ -28,20 +28,20 @@ def trained(module: ProgramVae) -> TrainedProgramVae:
     return TrainedProgramVae(module.eval(), {"settings": ENTRY.model_dump()})
 
 
-def test_losses_of_a_batch_are_those_of_its_programs_one_by_one() -> None:
+def test_loss_of_a_batch_is_the_sum_over_its_programs() -> None:
     """Whatever stands in one batch, and whatever stands behind an end."""
     module = new_model(ENTRY, 1)
     codes = torch.randn(2, ENTRY.latent, generator=torch.Generator().manual_seed(0))
     together = reconstruction(module, batch_of(PROGRAMS, np.array([0, 1])), codes)
     alone = [reconstruction(module, batch_of(PROGRAMS, np.array([row])), codes[row : row + 1]) for row in (0, 1)]
     for whole, parts in zip(together, zip(*alone, strict=True), strict=True):
-        assert whole.item() == pytest.approx(sum(each.item() for each in parts), rel=1e-5)
+        assert whole.item() == pytest.approx(sum(part.item() for part in parts), rel=1e-5)
     means = module.encode(batch_of(PROGRAMS, np.array([0, 1])))[0]
     for row in (0, 1):
         torch.testing.assert_close(module.encode(batch_of(PROGRAMS, np.array([row])))[0][0], means[row])
 
 
-def test_a_model_learns_two_programs_and_writes_them() -> None:
+def test_model_learns_and_samples_two_programs() -> None:
     module = new_model(ENTRY, 0)
     learner = ProgramVaeTask(module, {}, ENTRY, PROGRAMS, PROGRAMS)
     optimizer = torch.optim.Adam(module.parameters(), lr=3e-3)
@@ -68,14 +68,14 @@ def test_a_model_learns_two_programs_and_writes_them() -> None:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_what_is_written_keeps_every_rule_whatever_the_weights(seed: int) -> None:
+def test_decoded_programs_keep_every_rule_with_random_weights(seed: int) -> None:
     module = new_model(ENTRY, seed)
     with torch.no_grad():
         for parameter in module.parameters():
             parameter.mul_(3.0)
     points = np.random.default_rng(seed).normal(size=(40, ENTRY.latent)).astype(np.float32)
     for reject in (True, False):
-        programs = [each for each in trained(module).decode(points, reject=reject) if each is not None]
+        programs = [string for string in trained(module).decode(points, reject=reject) if string is not None]
         for program in programs:
             assert violations(program) == []
             assert not any(protruding_parts(block) for block in program.blocks)
@@ -99,10 +99,10 @@ def allowed(made: PartialAssembly) -> set[int]:
 def choices(made: PartialAssembly, command: int) -> set[tuple[int, ...]]:
     logits = np.full(7, -1.0)
     logits[command] = 0.0
-    return {each[1:] for each in made.choices(logits, np.zeros((7, 3, 11)), 100) if each[0] == command}
+    return {choice[1:] for choice in made.choices(logits, np.zeros((7, 3, 11)), 100) if choice[0] == command}
 
 
-def test_lines_follow_in_the_order_of_the_grammar_and_only_grounded_cuboids_bear_others() -> None:
+def test_lines_follow_the_grammar_and_targets_are_grounded() -> None:
     made = draft()
     assert made.sizes[0] == (0.2, 0.4, 1.0)
     assert allowed(made) == {CUBOID, ATTACH, SQUEEZE}
@@ -115,14 +115,14 @@ def test_lines_follow_in_the_order_of_the_grammar_and_only_grounded_cuboids_bear
     assert add_line(made, (REFLECT, 1), NUMBERS, reaching=True)
     assert allowed(made) == {STOP, TRANSLATE, REFLECT}
     block = made.block("P", {})
-    assert [each.name for each in block.cuboids] == ["cube0"], "the other is not grounded"
+    assert [cuboid.name for cuboid in block.cuboids] == ["cube0"], "the other is not grounded"
 
 
 @pytest.mark.parametrize(
     ("goal", "kept"),
     [([0.5, 0.5, 0.5], False), ([0.5, 0.04, 0.5], True), ([0.5, 0.96, 0.5], False), ([0.95, 0, 0.5], True)],
 )
-def test_the_box_is_attached_to_at_its_ends_and_not_left_by_more_than_a_tenth(goal: list[float], kept: bool) -> None:
+def test_bounding_box_is_attached_to_at_its_ends_and_not_exceeded(goal: list[float], kept: bool) -> None:
     made = draft()
     numbers = LineNumbers(np.array([0.5, 0.0, 0.5, *goal]), 0, np.zeros(2), 0, 1, 0.0)
     assert add_line(made, (ATTACH, 1, 0), numbers, reaching=False) == kept

@@ -35,7 +35,7 @@ BOX = """Assembly P { bbox = Cuboid(1.0, 1.0, 1.0, True) c = Cuboid(0.5, 0.5, 0.
 attach(c, bbox, 0.5, 0.0, 0.5, 0.5, 0.0, 0.5) }"""
 
 
-def test_a_line_is_63_numbers_of_which_only_its_own_are_set() -> None:
+def test_line_vector_sets_only_the_numbers_of_its_command() -> None:
     root, legs = assembly_lines(parse(STOOL))
     assert root.numbers.shape == (7, LINE_WIDTH)
     cuboid, _, attach, squeeze, translate, reflect, stop = root.numbers
@@ -61,13 +61,13 @@ def test_a_line_is_63_numbers_of_which_only_its_own_are_set() -> None:
         (" ".join(f"d{k} = Cuboid(0.1, 0.1, 0.1, True)" for k in range(10)), "too many cuboids"),
     ],
 )
-def test_what_63_numbers_cannot_say_is_refused(line: str, reason: str) -> None:
+def test_program_without_line_vectors_is_rejected(line: str, reason: str) -> None:
     with pytest.raises(ProgramError) as caught:
         assembly_lines(parse(BOX[:-1] + line + "}"))
     assert caught.value.reason == reason
 
 
-def test_levels_hold_the_assemblies_of_one_depth_and_know_where_they_stand() -> None:
+def test_levels_hold_assemblies_of_one_depth_with_their_parents() -> None:
     programs = ProgramCorpus.of([assembly_lines(parse(text)) for text in (BOX, STOOL)])
     roots, below = batch_of(programs, np.array([1, 0]))
     assert roots.lengths.tolist() == [7, 3]
@@ -75,7 +75,7 @@ def test_levels_hold_the_assemblies_of_one_depth_and_know_where_they_stand() -> 
     assert len(roots.places) == sum(roots.counts) == 10
     commands = roots.lines.flatten(0, 1)[roots.places, COMMAND].argmax(dim=-1).tolist()
     assert commands == sorted(commands)
-    assert [commands.count(each) for each in range(7)] == list(roots.counts)
+    assert [commands.count(number) for number in range(7)] == list(roots.counts)
     assert below.parents.tolist() == [[0, 0]]
     assert roots.expanded.tolist() == [True, False, False]
     assert roots.opened.tolist() == [0]
@@ -84,7 +84,7 @@ def test_levels_hold_the_assemblies_of_one_depth_and_know_where_they_stand() -> 
     assert (roots.before[:, 1:] == roots.lines[:, :-1]).all()
 
 
-def test_a_pass_sees_every_program_once_and_arrays_come_back() -> None:
+def test_epoch_has_every_program_once_and_arrays_round_trip() -> None:
     programs = ProgramCorpus.of([assembly_lines(parse(text)) for text in (BOX, STOOL, BOX, STOOL, BOX)])
     sizes = [len(levels[0].lines) for levels in batches(programs, 2, np.random.default_rng(0))]
     assert sorted(sizes) == [1, 2, 2]

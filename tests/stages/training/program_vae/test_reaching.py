@@ -16,9 +16,7 @@ LEG = LineNumbers(np.zeros(6), 2, np.array([0.2, 0.5]), 0, 1, 0.0)
 @pytest.mark.parametrize(
     ("height", "aligned", "written"), [(0.96, True, 1.0), (0.96, False, 0.96), (0.995, True, 0.995), (0.5, True, 1.0)]
 )
-def test_an_aligned_cuboid_that_is_too_short_gets_the_size_with_which_it_reaches(
-    height: float, aligned: bool, written: float
-) -> None:
+def test_short_aligned_cuboid_is_resized_to_reach_its_attachments(height: float, aligned: bool, written: float) -> None:
     """What is not aligned is stretched where it is attached; a hundredth of the diagonal is no gap."""
     made = PartialAssembly((1.0, 1.0, 1.0))
     made.declare(np.array([0.1, height, 0.1]), aligned, None)
@@ -27,7 +25,7 @@ def test_an_aligned_cuboid_that_is_too_short_gets_the_size_with_which_it_reaches
     assert attachment_gap(made, 1) <= MAX_GAP_SHARE
 
 
-def test_a_line_that_leaves_a_gap_is_written_only_if_it_may() -> None:
+def test_line_that_leaves_a_gap_is_added_only_without_reaching() -> None:
     """Two attachments side by side, at the middle of the cuboid both: no size brings them together."""
     made = PartialAssembly((1.0, 1.0, 1.0))
     made.declare(np.array([0.2, 0.4, 1.0]), True, None)

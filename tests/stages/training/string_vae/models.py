@@ -20,7 +20,7 @@ from stages.training.string_vae.vocabulary import END_TOKEN, Vocabulary
 from tests.stages.training import toy_training
 
 VOCABULARY = Vocabulary(toy_training.ALPHABET, 2)
-MOST = 60
+MAX_TOKENS = 60
 
 
 @cache
@@ -48,15 +48,15 @@ def entry(**changes: Any) -> StringVaeConfig:
 def toy_strings() -> tuple[str, ...]:
     """The strings of all shards of the toy."""
     return tuple(
-        each for shard in toy_training.SPLITS for _, strings in toy_training.strings(shard) for each in strings
+        string for shard in toy_training.SPLITS for _, strings in toy_training.strings(shard) for string in strings
     )
 
 
 def numbered() -> StringCorpus:
     """The strings as a learner takes them."""
     shapes = [strings for shard in toy_training.SPLITS for _, strings in toy_training.strings(shard)]
-    codes = [np.append(VOCABULARY.codes(each), np.int16(END_TOKEN)) for each in toy_strings()]
-    masks = [masks_along(rules(), 2, each.astype(np.int64))[0] for each in codes]
+    codes = [np.append(VOCABULARY.codes(string), np.int16(END_TOKEN)) for string in toy_strings()]
+    masks = [masks_along(rules(), 2, code.astype(np.int64))[0] for code in codes]
     return StringCorpus(
         tokens=np.concatenate(codes),
         first=np.cumsum([0, *map(len, codes)]),
@@ -71,7 +71,7 @@ def numbered() -> StringCorpus:
 def wrapped(module: torch.nn.Module, settings: StringVaeConfig) -> TrainedStringVae:
     header = {
         "settings": settings.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
-        "max_tokens": MOST,
+        "max_tokens": MAX_TOKENS,
         "patterns": patterns_json(rules()),
         "names": list(toy_training.LABELS),
         "cycles": 2,
@@ -83,7 +83,7 @@ def wrapped(module: torch.nn.Module, settings: StringVaeConfig) -> TrainedString
 def random_vae(decoder: str, seed: int = 0, cycle_attention: bool = True) -> TrainedStringVae:
     """A model with random weights, which are larger than fresh ones, so that it has preferences."""
     settings = entry(decoder=decoder, cycle_attention=cycle_attention)
-    module = new_model(settings, VOCABULARY, MOST, seed)
+    module = new_model(settings, VOCABULARY, MAX_TOKENS, seed)
     with torch.no_grad():
         for parameter in module.parameters():
             parameter.mul_(3.0)
@@ -95,6 +95,8 @@ def trained_vae(decoder: str = "masked", **changes: Any) -> TrainedStringVae:
     """A model that has learnt the strings of the toy, some hundred steps."""
     settings = entry(decoder=decoder, learning_rate=0.01, **changes)
     strings = numbered()
-    learner = StringVaeTask(new_model(settings, VOCABULARY, MOST, 1), {}, settings, strings, strings, VOCABULARY, True)
+    learner = StringVaeTask(
+        new_model(settings, VOCABULARY, MAX_TOKENS, 1), {}, settings, strings, strings, VOCABULARY, True
+    )
     train(TrainState.of(learner), np.random.default_rng(2), lambda done, total: None)
     return wrapped(learner.module, settings)

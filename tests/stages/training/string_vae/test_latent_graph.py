@@ -17,7 +17,7 @@ from stages.training.string_vae.latent_graph import (
 )
 
 
-def test_equals_are_joined_at_no_cost_however_far_apart_they_lie() -> None:
+def test_strings_of_one_graph_are_joined_at_no_cost() -> None:
     line = np.arange(12, dtype=np.float32)[:, None] ** 2
     graphs = [str(number) for number in range(11)] + ["0"]
     histograms = np.stack([np.arange(12) + 1, np.full(12, 5)], axis=1)
@@ -27,7 +27,7 @@ def test_equals_are_joined_at_no_cost_however_far_apart_they_lie() -> None:
     assert path_figures(graph).components == 1
 
 
-def test_interpolation_is_a_shortest_path_by_what_changes() -> None:
+def test_interpolation_is_a_shortest_path_by_histogram_distance() -> None:
     # Neighbours in latent space are a chain; the histograms grow along it.
     points = np.arange(9, dtype=np.float32)[:, None]
     histograms = np.stack([np.arange(1, 10), np.full(9, 3)], axis=1)
@@ -42,11 +42,11 @@ def test_interpolation_is_a_shortest_path_by_what_changes() -> None:
 
 
 @given(st.integers(0, 2**32), st.integers(2, 25))
-def test_figures_are_those_of_all_shortest_paths(seed: int, count: int) -> None:
+def test_path_figures_cover_all_shortest_paths(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     graph_of = rng.integers(0, count, count)
     histograms = rng.integers(1, 6, (count, 3))[graph_of]  # equal graphs have equal parts
-    graphs = [str(each) for each in graph_of]
+    graphs = [str(item) for item in graph_of]
     points = rng.standard_normal((count, 2)).astype(np.float32)
     graph = search_graph(points, graphs, histograms)
     oracle = nx.Graph()
@@ -72,8 +72,8 @@ def edits(one: list[int], other: list[int]) -> int:
 
 
 @given(st.lists(st.lists(st.integers(1, 3), min_size=1, max_size=5), min_size=3, max_size=6))
-def test_nearest_strings_are_those_of_the_fewest_edits(strings: list[list[int]]) -> None:
-    links = nearest_strings([np.array(each, np.int16) for each in strings], 2)
+def test_nearest_strings_have_the_least_edit_distance(strings: list[list[int]]) -> None:
+    links = nearest_strings([np.array(string, np.int16) for string in strings], 2)
     for node in range(len(strings)):
         chosen = [other for one, other in links.tolist() if one == node]
         assert len(set(chosen)) == 2
@@ -82,10 +82,10 @@ def test_nearest_strings_are_those_of_the_fewest_edits(strings: list[list[int]])
         assert sorted(edits(strings[node], strings[other]) for other in chosen) == distances[:2]
 
 
-def test_naive_graph_joins_like_strings() -> None:
+def test_naive_graph_joins_similar_strings() -> None:
     codes = [
-        np.array(each, np.int16)
-        for each in ([1, 2], [1, 2, 3], [1, 1, 2], [2, 1, 2], [7] * 9, [7] * 10, [7] * 11, [7] * 12)
+        np.array(value, np.int16)
+        for value in ([1, 2], [1, 2, 3], [1, 1, 2], [2, 1, 2], [7] * 9, [7] * 10, [7] * 11, [7] * 12)
     ]
     graph = naive_graph(codes, list("abcdefgh"), np.ones((8, 2), np.int64))
     assert path_figures(graph).components == 2

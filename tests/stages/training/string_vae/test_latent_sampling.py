@@ -16,7 +16,7 @@ from stages.training.string_vae.latent_sampling import (
 from tests.stages.training.string_vae.models import random_vae, toy_strings
 
 
-def test_points_of_a_line_are_equidistant_from_each_other_and_the_ends() -> None:
+def test_points_of_a_line_are_equidistant() -> None:
     first, second = np.array([0.0, 1.0], np.float32), np.array([5.0, 1.0], np.float32)
     np.testing.assert_allclose(linear_points(first, second, 4), [[1, 1], [2, 1], [3, 1], [4, 1]], rtol=1e-6)
 
@@ -67,25 +67,25 @@ class Asked:
 def test_offsets_grow_in_every_dimension_until_a_new_valid_string_is_found() -> None:
     model = Asked(["known", "invalid", "known", "new", "never asked"])
     found = perturb(model, np.zeros((1, 3), np.float32), [frozenset({"known"})], 0.25, np.random.default_rng(0))
-    assert [(each.string, each.decoded, each.valid) for each in found] == [("new", 4, 3)]
+    assert [(item.string, item.decoded, item.valid) for item in found] == [("new", 4, 3)]
     sizes = np.abs(np.concatenate(model.points))
     assert (np.diff(sizes, axis=0) > 0).all()
     assert sizes.max() <= 0.25
 
 
-def test_search_that_finds_nothing_ends_at_the_largest_offset() -> None:
+def test_failed_search_ends_at_the_maximum_offset() -> None:
     model = Asked(["invalid"] * 50)
     found = perturb(model, np.zeros((2, 3), np.float32), [frozenset()] * 2, 0.1, np.random.default_rng(0))
-    assert [each.string for each in found] == [None, None]
+    assert [item.string for item in found] == [None, None]
     assert 0.09 <= np.abs(np.concatenate(model.points)).max() <= 0.1
 
 
 @pytest.mark.parametrize("way", SAMPLING_METHODS)
-def test_each_way_makes_as_many_searches_as_asked_and_finds_valid_strings(way: str) -> None:
+def test_every_method_runs_the_requested_searches_and_finds_valid_strings(way: str) -> None:
     model, strings = random_vae("masked"), toy_strings()
     found = sample(model, way, strings, 10, np.random.default_rng(4))
     assert len(found) == 10
-    assert all(model.is_valid(each.string) for each in found if each.string is not None)
+    assert all(model.is_valid(item.string) for item in found if item.string is not None)
     assert found == sample(model, way, strings, 10, np.random.default_rng(4))
     if way == "path":
-        assert all(each.string not in strings for each in found)
+        assert all(item.string not in strings for item in found)

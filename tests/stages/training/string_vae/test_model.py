@@ -18,7 +18,7 @@ from stages.training.string_vae.training import StringVaeTask, annealed, new_mod
 from stages.training.string_vae.vocabulary import END_TOKEN
 from tests.stages.training import toy_training
 from tests.stages.training.string_vae.models import (
-    MOST,
+    MAX_TOKENS,
     VOCABULARY,
     entry,
     numbered,
@@ -44,7 +44,7 @@ def test_a_cycle_is_open_from_its_number_to_the_same_number_again() -> None:
     np.testing.assert_array_equal(open_until(codes[:, :0], 7), wanted[:, :0])
 
 
-def test_looking_back_bears_on_open_cycles_alone_each_by_where_it_began() -> None:
+def test_cycle_attention_changes_only_open_cycles() -> None:
     assert random_vae("plain", cycle_attention=True).module.cycle_attention is None
     module = random_vae("masked", cycle_attention=True).module
     assert module.cycle_attention is not None
@@ -52,14 +52,14 @@ def test_looking_back_bears_on_open_cycles_alone_each_by_where_it_began() -> Non
     before = module.decode(shifted(codes), points, until_of(codes))
     plain, _ = module.decoder(shifted(codes), points)
     changed = (before != plain)[0]
-    numbers = [[each in opened for each in (6, 7)] for opened in ((), (), (7,), (7,), (6, 7), (6, 7), (7,), (7,), ())]
+    numbers = [[value in opened for value in (6, 7)] for opened in ((), (), (7,), (7,), (6, 7), (6, 7), (7,), (7,), ())]
     np.testing.assert_array_equal(changed[:, -2:].numpy(), numbers)
     assert not changed[:, :-2].any()
 
 
 @pytest.mark.parametrize("cycle_attention", [False, True])
 @pytest.mark.parametrize("decoder", DECODERS)
-def test_token_by_token_the_decoder_says_what_it_says_of_the_whole(decoder: str, cycle_attention: bool) -> None:
+def test_stepwise_decoder_matches_whole_strings(decoder: str, cycle_attention: bool) -> None:
     module = random_vae(decoder, cycle_attention=cycle_attention).module
     rng = np.random.default_rng(1)
     codes = torch.from_numpy(rng.integers(0, len(VOCABULARY), (3, 11)))
@@ -73,19 +73,19 @@ def test_token_by_token_the_decoder_says_what_it_says_of_the_whole(decoder: str,
 
 @pytest.mark.parametrize("cycle_attention", [False, True])
 @pytest.mark.parametrize("decoder", DECODERS)
-def test_a_token_is_told_by_those_before_it_alone(decoder: str, cycle_attention: bool) -> None:
+def test_token_depends_only_on_earlier_tokens(decoder: str, cycle_attention: bool) -> None:
     module = random_vae(decoder, cycle_attention=cycle_attention).module
     codes = torch.ones((1, 9), dtype=torch.int64)
     codes[0, [1, 7]] = len(VOCABULARY) - 1
     changed = codes.clone()
     changed[0, 5] = 2
     points = torch.zeros((1, 8))
-    before, after = (module.decode(shifted(each), points, until_of(each))[0] for each in (codes, changed))
+    before, after = (module.decode(shifted(value), points, until_of(value))[0] for value in (codes, changed))
     torch.testing.assert_close(before[:6], after[:6])
     assert not torch.allclose(before[6], after[6])
 
 
-def test_a_string_is_encoded_alike_whatever_stands_beside_it() -> None:
+def test_encoding_of_a_string_does_not_depend_on_the_rest_of_the_batch() -> None:
     model, strings = random_vae("masked"), sorted(toy_strings(), key=len)
     alone, beside = model.encode(strings[:1]), model.encode([strings[0], strings[-1]])[:1]
     np.testing.assert_allclose(alone, beside, rtol=1e-4, atol=1e-5)
@@ -95,34 +95,34 @@ def test_a_string_is_encoded_alike_whatever_stands_beside_it() -> None:
 @pytest.mark.parametrize("decoder", ["masked", "transformer"])
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("drawn", [True, False])
-def test_every_string_of_a_masked_decoder_is_one_of_the_grammar(decoder: str, seed: int, drawn: bool) -> None:
+def test_masked_decoder_generates_strings_of_the_grammar(decoder: str, seed: int, drawn: bool) -> None:
     model, rng = random_vae(decoder, seed), np.random.default_rng(seed)
     points = (3 * rng.standard_normal((64, 8))).astype(np.float32)
     strings = model.decode(points, rng if drawn else None)
-    for each in strings:
-        check_string(each, toy_training.ALPHABET, toy_training.grammar())
-        assert model.is_valid(each)
-        assert len(VOCABULARY.codes(each)) <= MOST
+    for string in strings:
+        check_string(string, toy_training.ALPHABET, toy_training.grammar())
+        assert model.is_valid(string)
+        assert len(VOCABULARY.codes(string)) <= MAX_TOKENS
     assert len(set(strings)) > 1
 
 
-def test_string_that_is_lost_in_cycles_is_ended_without_more() -> None:
+def test_string_with_too_many_dead_ends_is_finished_without_cycles() -> None:
     model = random_vae("masked")
     with torch.no_grad():  # cycle numbers wherever they may stand
         model.module.decoder.logits.bias[-2:] += 50.0
     strings = model.decode(np.random.default_rng(0).standard_normal((64, 8)).astype(np.float32), None)
-    for each in strings:
-        check_string(each, toy_training.ALPHABET, toy_training.grammar())
-    assert any(each.count("0") or each.count("1") for each in strings)
+    for string in strings:
+        check_string(string, toy_training.ALPHABET, toy_training.grammar())
+    assert any(string.count("0") or string.count("1") for string in strings)
 
 
-def test_plain_decoder_writes_what_is_no_string() -> None:
+def test_plain_decoder_generates_invalid_strings() -> None:
     model, rng = random_vae("plain"), np.random.default_rng(0)
     strings = model.decode(rng.standard_normal((64, 8)).astype(np.float32), rng)
     assert sum(map(model.is_valid, strings)) < 32
 
 
-def test_equal_draws_write_equal_strings() -> None:
+def test_equal_seeds_decode_equal_strings() -> None:
     model = random_vae("masked")
     points = np.random.default_rng(3).standard_normal((20, 8)).astype(np.float32)
     first, again, other = (model.decode(points, np.random.default_rng(seed)) for seed in (5, 5, 6))
@@ -132,7 +132,7 @@ def test_equal_draws_write_equal_strings() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("decoder", DECODERS)
-def test_it_learns_to_write_the_canonical_string_of_what_it_has_read(decoder: str) -> None:
+def test_trained_decoder_returns_canonical_strings(decoder: str) -> None:
     right = {}
     for name, model in (("trained", trained_vae(decoder)), ("random", random_vae(decoder))):
         pairs = zip(map(model.target_of, toy_strings()), model.decode(model.encode(toy_strings()), None), strict=True)
@@ -141,12 +141,12 @@ def test_it_learns_to_write_the_canonical_string_of_what_it_has_read(decoder: st
     assert right["trained"] > 0.5
 
 
-def test_half_precision_learns_nearly_the_same() -> None:
+def test_bfloat16_learns_nearly_the_same() -> None:
     losses = []
     for precision in ("float32", "bfloat16"):
         settings, strings = entry(precision=precision, steps=4), numbered()
         learner = StringVaeTask(
-            new_model(settings, VOCABULARY, MOST, 1), {}, settings, strings, strings, VOCABULARY, True
+            new_model(settings, VOCABULARY, MAX_TOKENS, 1), {}, settings, strings, strings, VOCABULARY, True
         )
         learnt = train(TrainState.of(learner), np.random.default_rng(2), lambda done, total: None)
         losses.append(learnt["loss"])
@@ -155,7 +155,7 @@ def test_half_precision_learns_nearly_the_same() -> None:
 
 
 @pytest.mark.parametrize("canonical", [False, True])
-def test_batches_hold_every_string_once_beside_what_is_to_be_written(canonical: bool) -> None:
+def test_batches_hold_every_string_once_with_its_target(canonical: bool) -> None:
     strings, seen = numbered(), []
     model = random_vae("masked")
     for batch in batches(strings, 16, len(VOCABULARY), canonical, np.random.default_rng(0)):
@@ -172,7 +172,7 @@ def test_batches_hold_every_string_once_beside_what_is_to_be_written(canonical: 
     assert sorted(seen) == sorted(toy_strings())
 
 
-def test_divergence_weighs_nothing_first_and_all_at_the_end() -> None:
+def test_weight_of_the_divergence_rises_from_zero_to_one() -> None:
     weights = [annealed(step, 100) for step in range(0, 201, 10)]
     assert weights == sorted(weights)
     assert weights[0] < 0.005
@@ -181,7 +181,7 @@ def test_divergence_weighs_nothing_first_and_all_at_the_end() -> None:
     assert annealed(0, 0) == 1.0
 
 
-def test_triplet_loss_asks_that_the_more_similar_is_nearer() -> None:
+def test_triplet_loss_is_small_if_similar_shapes_are_near() -> None:
     histograms = torch.tensor([[4.0, 0.0], [3.0, 1.0], [0.0, 4.0]])
     near = torch.tensor([[0.0], [0.1], [9.0]])
     far = torch.tensor([[0.0], [9.0], [0.1]])
@@ -192,7 +192,7 @@ def test_triplet_loss_asks_that_the_more_similar_is_nearer() -> None:
     assert losses[0] < 0.1 * losses[1]
 
 
-def test_published_weights_are_read_alone_and_others_refused(tmp_path: Path) -> None:
+def test_published_weights_are_read_and_those_of_another_kit_refused(tmp_path: Path) -> None:
     model = random_vae("masked")
     header = {**model.header, "kind": "string_vae", "kit": "toy"}
     path = tmp_path / "weights.safetensors"
@@ -205,13 +205,13 @@ def test_published_weights_are_read_alone_and_others_refused(tmp_path: Path) -> 
         load_string_vae(path, {"kit": "castle"})
 
 
-def test_low_temperature_writes_the_likeliest_string_and_a_higher_one_others_more_often() -> None:
+def test_low_temperature_decodes_the_likeliest_string() -> None:
     model = random_vae("masked")
     points = np.random.default_rng(3).standard_normal((64, 8)).astype(np.float32)
     likeliest = model.decode(points, None)
     same = [
-        sum(a == b for a, b in zip(likeliest, model.decode(points, np.random.default_rng(0), each), strict=True))
-        for each in (1e-9, 0.1, 1.0)
+        sum(a == b for a, b in zip(likeliest, model.decode(points, np.random.default_rng(0), value), strict=True))
+        for value in (1e-9, 0.1, 1.0)
     ]
     assert same[0] == 64
     assert same[0] > same[1] > same[2]

@@ -24,17 +24,17 @@ def part(label: str, *children: PartNode) -> PartNode:
 
 def flat(root: PartNode) -> list[float | str]:
     numbers = [*root.box.center.tolist(), *root.box.size.tolist(), *root.box.axes.ravel().tolist()]
-    return [root.label, *numbers, len(root.children), *(each for child in root.children for each in flat(child))]
+    return [root.label, *numbers, len(root.children), *(item for child in root.children for item in flat(child))]
 
 
-def test_hierarchy_comes_back_to_the_last_digit() -> None:
+def test_hierarchy_survives_the_child_process_exactly() -> None:
     whole = PartHierarchy("stuhl ä", part("root", part("seat"), part("back", part("slat"), part("slat"))))
     found = read_in_child(lambda _: whole, Path("chair.json"))
     assert found.name == whole.name
     assert flat(found.root) == flat(whole.root)
 
 
-def test_refusal_keeps_reason_and_detail() -> None:
+def test_rejection_keeps_reason_and_detail() -> None:
     def read(path: Path) -> PartHierarchy:
         raise Rejected("some reason", f"{path.name}: no `label`")
 
@@ -43,7 +43,7 @@ def test_refusal_keeps_reason_and_detail() -> None:
     assert (caught.value.reason, caught.value.detail) == ("some reason", "chair.json: no `label`")
 
 
-def test_crash_of_a_reader_is_a_refusal_that_names_the_file() -> None:
+def test_crash_of_a_reader_is_a_rejection_that_names_the_file() -> None:
     def read(_: Path) -> PartHierarchy:
         ctypes.string_at(0)
         raise AssertionError
@@ -53,7 +53,7 @@ def test_crash_of_a_reader_is_a_refusal_that_names_the_file() -> None:
     assert caught.value.reason == UNREADABLE
 
 
-def test_shapes_of_grass_come_back_as_they_are(tmp_path: Path) -> None:
+def test_grass_shapes_survive_the_child_process(tmp_path: Path) -> None:
     path = tmp_path / "chairs.npz"
     np.savez(path, full_boxes=RNG.normal(size=(5, 12)), full_offsets=np.array([0, 2, 5]))
     here, there = read_grass(path), read_grass_in_child(path)

@@ -53,14 +53,14 @@ def test_structurenet_box_is_centre_size_x_axis_y_axis(tmp_path: Path) -> None:
         ({"label": "root", "box": UPRIGHT, "children": [{"label": "x", "box": UPRIGHT}] * 3000}, "2000 parts"),
     ],
 )
-def test_structurenet_file_that_is_none_is_refused_with_its_fault(tmp_path: Path, tree: object, words: str) -> None:
+def test_invalid_structurenet_file_is_rejected_with_its_fault(tmp_path: Path, tree: object, words: str) -> None:
     with pytest.raises(Rejected, match=words) as caught:
         read_structurenet(written(tmp_path, tree))
     assert caught.value.reason == "unreadable hierarchy"
     assert "shape.json" in str(caught.value)
 
 
-def test_structurenet_file_of_many_levels_is_refused(tmp_path: Path) -> None:
+def test_structurenet_file_of_many_levels_is_rejected(tmp_path: Path) -> None:
     tree: dict[str, object] = {"label": "leaf", "box": UPRIGHT}
     for _ in range(40):
         tree = {"label": "node", "box": UPRIGHT, "children": [tree]}
@@ -86,7 +86,7 @@ def test_grass_sizes_belong_to_the_two_axes_given_and_their_cross_product(tmp_pa
     assert second.box.center.tolist() == [1, 1, 1]
 
 
-def test_one_bad_grass_box_refuses_its_shape_alone(tmp_path: Path) -> None:
+def test_bad_grass_box_rejects_only_its_shape(tmp_path: Path) -> None:
     good = [0, 0, 0, 1, 2, 3, 1, 0, 0, 0, 0, 1]
     rows = np.array([good, [0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 1, 0]], np.float32)
     chairs = read_grass(grass(tmp_path, full_boxes=rows, full_offsets=np.array([0, 1, 2])))
@@ -105,7 +105,7 @@ def test_one_bad_grass_box_refuses_its_shape_alone(tmp_path: Path) -> None:
         {"full_boxes": np.array([{}]), "full_offsets": np.array([0, 1])},
     ],
 )
-def test_npz_that_is_no_grass_file_is_refused(tmp_path: Path, arrays: dict[str, np.ndarray]) -> None:
+def test_npz_without_grass_arrays_is_rejected(tmp_path: Path, arrays: dict[str, np.ndarray]) -> None:
     with pytest.raises(Rejected, match=r"chairs\.npz"):
         read_grass(grass(tmp_path, **arrays))
 
@@ -155,7 +155,7 @@ def test_partnet_boxes_are_the_smallest_around_the_meshes_of_a_part(tmp_path: Pa
         ({"objs": "original-1"}, "lists"),
     ],
 )
-def test_partnet_leaf_that_is_none_is_refused(tmp_path: Path, change: dict[str, object], words: str) -> None:
+def test_invalid_partnet_leaf_is_rejected(tmp_path: Path, change: dict[str, object], words: str) -> None:
     path = partnet(tmp_path)
     tree = json.loads(path.read_text())
     tree[0]["children"][0] |= change
@@ -168,7 +168,7 @@ def test_partnet_leaf_that_is_none_is_refused(tmp_path: Path, change: dict[str, 
 @pytest.mark.parametrize(
     ("text", "words"), [("", "no vertices"), ("v a b c", "three numbers"), ("v nan 0 0", "finite")]
 )
-def test_partnet_mesh_that_is_none_is_refused(tmp_path: Path, text: str, words: str) -> None:
+def test_invalid_partnet_mesh_is_rejected(tmp_path: Path, text: str, words: str) -> None:
     path = partnet(tmp_path)
     (path.parent / "objs" / "original-1.obj").write_text(text)
     with pytest.raises(Rejected, match=words):
@@ -201,7 +201,7 @@ def test_glb_nodes_are_parts_turned_y_up(tmp_path: Path) -> None:
     assert parts["drawer"].children[1].box.center.tolist() == pytest.approx([0.65, 0.5, 0.0])
 
 
-def test_glb_that_is_none_or_empty_is_refused(tmp_path: Path) -> None:
+def test_invalid_or_empty_glb_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "bad.glb"
     for content in (b"", b"glTF" + b"\0" * 40, b"{}"):
         path.write_bytes(content)

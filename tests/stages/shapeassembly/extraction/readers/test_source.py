@@ -26,16 +26,16 @@ def test_folder_is_read_in_the_order_of_its_names_and_by_slices(tmp_path: Path) 
     assert len(source) == 3
     found = list(source.read(1, 3))
     assert [name for name, _ in found] == ["b/2.json", "c/3.json"]
-    assert [each.root.label for _, each in found if isinstance(each, PartHierarchy)] == ["2", "3"]
+    assert [item.root.label for _, item in found if isinstance(item, PartHierarchy)] == ["2", "3"]
 
 
-def test_unreadable_file_is_one_refusal_among_the_others(tmp_path: Path) -> None:
+def test_unreadable_file_is_one_rejection_among_the_others(tmp_path: Path) -> None:
     source = HierarchySource(folder(tmp_path), "structurenet", "y")
     (tmp_path / "b" / "2.json").write_text("{")
-    assert [isinstance(each, Rejected) for _, each in source.read(0, 3)] == [False, True, False]
+    assert [isinstance(item, Rejected) for _, item in source.read(0, 3)] == [False, True, False]
 
 
-def test_digest_tells_names_and_bytes_of_its_own_slice(tmp_path: Path) -> None:
+def test_digest_depends_on_names_and_bytes_of_its_slice(tmp_path: Path) -> None:
     source = HierarchySource(folder(tmp_path), "structurenet", "y")
     first, rest = source.digest(0, 1), source.digest(1, 3)
     (tmp_path / "c" / "3.json").write_text(json.dumps({"label": "changed", "box": BOX}))
@@ -64,7 +64,7 @@ def test_shapes_of_one_npz_file_are_counted_and_named_by_place(tmp_path: Path) -
     assert [name for name, _ in source.read(0, 2)] == ["chairs.npz/00000", "chairs.npz/00001"]
 
 
-def test_npz_file_that_cannot_be_read_is_one_refusal(tmp_path: Path) -> None:
+def test_unreadable_npz_file_is_one_rejection(tmp_path: Path) -> None:
     (tmp_path / "chairs.npz").write_bytes(b"no zip")
     source = HierarchySource(tmp_path / "chairs.npz", "grass", "y")
     assert len(source) == 1
