@@ -16,7 +16,7 @@ ALPHABET: Alphabet = make_alphabet([f"part {index}" for index in range(6)])
 def arrays(graph: nx.Graph, types: np.ndarray | None = None) -> Graph:
     """Types (all 0 unless given) and edges i < j of a networkx graph."""
     graph = nx.convert_node_labels_to_integers(graph)
-    edges = np.array([sorted(each) for each in graph.edges()], dtype=np.int32).reshape(-1, 2)
+    edges = np.array([sorted(edge) for edge in graph.edges()], dtype=np.int32).reshape(-1, 2)
     return (np.zeros(len(graph), dtype=np.int16) if types is None else types.astype(np.int16)), edges
 
 
@@ -35,7 +35,7 @@ def isomorphic(first: Graph, second: Graph) -> bool:
     graphs = []
     for types, edges in (first, second):
         graph = nx.Graph()
-        graph.add_nodes_from((index, {"type": int(each)}) for index, each in enumerate(types))
+        graph.add_nodes_from((index, {"type": int(part_type)}) for index, part_type in enumerate(types))
         graph.add_edges_from(edges.tolist())
         graphs.append(graph)
     return bool(nx.is_isomorphic(*graphs, node_match=lambda a, b: a["type"] == b["type"]))

@@ -28,14 +28,14 @@ def assembly() -> Assembly:
 
 def written(edges: Edges) -> list[str]:
     writer = KitStrings(kit(), edges)
-    return [each.string for each in writer.strings(writer.graph(assembly()), 3, np.random.default_rng(2))]
+    return [encoded.string for encoded in writer.strings(writer.graph(assembly()), 3, np.random.default_rng(2))]
 
 
 def sample(strings: list[str], said: Edges | None) -> PackagedSample:
     """A sample with these strings, of a dataset that says what they tell of, or is older than that."""
     labelled = kit().labelled(assembly())
     record = {"language": "kit", "kit": "cubes", "graph": graph_digest(labelled.types, labelled.edges)}
-    members = {"txt": "".join(f"{each}\n" for each in strings).encode(), CONTACTS: pair_bytes(assembly().edges)}
+    members = {"txt": "".join(f"{string}\n" for string in strings).encode(), CONTACTS: pair_bytes(assembly().edges)}
     sections = {"strings": {"strings_per_shape": 3, **({"edges": said} if said else {})}}
     return PackagedSample("cubes-0", record, members, {}, kit_shape(kit(), assembly()), sections)
 
@@ -73,9 +73,9 @@ def test_strings_of_all_contacts_fail_as_strings_of_faces(places: DatasetPaths) 
 
 def test_a_tree_outside_the_graph_fails_the_audit() -> None:
     first, *others = written("tree")
-    letters = [place for place, each in enumerate(first) if each.isalpha()]
+    letters = [place for place, character in enumerate(first) if character.isalpha()]
     for place in letters[1:]:
-        other = next(each for each in letters if first[each] != first[place])
+        other = next(letter for letter in letters if first[letter] != first[place])
         swapped = list(first)
         swapped[place], swapped[other] = first[other], first[place]
         faults = list(string_faults(sample(["".join(swapped), *others], "tree")))

@@ -101,8 +101,8 @@ def test_tokens_have_their_edges() -> None:
 
 def test_categories_after_a_post_do_not_depend_on_the_pose_of_the_shape() -> None:
     space = roads()
-    assert {pair: len(each.poses) for pair, each in space.pairs.items()} == {(0, 1): 4, (1, 0): 2}
-    straight, corner = (each.assembly for each in space.kit.exemplars)
+    assert {pair: len(category_pair.poses) for pair, category_pair in space.pairs.items()} == {(0, 1): 4, (1, 0): 2}
+    straight, corner = (exemplar.assembly for exemplar in space.kit.exemplars)
     string = "ABABA"
     found = []
     for assembly, nodes in ((straight, [0, 3, 1, 4, 2]), (corner, [0, 2, 1, 3, 4])):
@@ -126,7 +126,7 @@ def test_exemplars_are_rebuilt_from_any_string(name: str, edges: Edges) -> None:
         for encoded in strings_of(space, exemplar.assembly, edges, 2, seed):
             categories = assert_comes_back(space, exemplar.assembly, encoded)
             is_bracket = [text in "()" for text in split_tokens(encoded.string)]
-            assert [each == DUMMY_CATEGORY for each in categories] == is_bracket
+            assert [category == DUMMY_CATEGORY for category in categories] == is_bracket
 
 
 @settings(max_examples=30)
@@ -179,12 +179,12 @@ def test_cycle_numbers_have_the_category_of_the_other_part() -> None:
         categories, decoded = labelled(space, assembly, encoded), decode(encoded.string, space.alphabet)
         placed = space.place(encoded.string, categories)
         cycles = 0
-        for text, (here, there), each in zip(decoded.texts, token_edges(decoded).tolist(), categories, strict=True):
+        for text, (here, there), category in zip(decoded.texts, token_edges(decoded).tolist(), categories, strict=True):
             if not text.isdigit():
                 continue
             cycles += 1
             kind = space.kit.types[placed.types[there]]
-            reached = pose_vectors((placed.poses[here] @ space.poses[each])[None], kind.diagonal / 2)
+            reached = pose_vectors((placed.poses[here] @ space.poses[category])[None], kind.diagonal / 2)
             images = pose_vectors(placed.poses[there] @ kind.symmetries, kind.diagonal / 2)
             assert np.linalg.norm(images - reached, axis=1).min() <= space.kit.pose_tolerance
         assert cycles == 2 * (len(assembly.edges) - len(assembly) + 1) > 0
@@ -195,7 +195,7 @@ def test_mirrored_parts_are_one_type_in_kits_that_merge_them() -> None:
     meshes = {"plain": box(1, 1, 1), "arrow": with_arrow(box(1, 1, 1))}
     parts: list[Placed] = [*cubes((0, 0, 0), (1, 0, 0), (1, 1, 0)), ("arrow", pose(0, 1, 0) @ mirror)]
     kit = toy_kit(meshes, [parts, cubes((0, 0, 0), (0, 1, 0))], mirror_images_match=True)
-    assert min(np.linalg.det(each[:3, :3]) for each in kit.exemplars[0].assembly.poses) < 0
+    assert min(np.linalg.det(pose[:3, :3]) for pose in kit.exemplars[0].assembly.poses) < 0
     space = CategorySpace(kit)
     for exemplar in kit.exemplars:
         for encoded in strings_of(space, exemplar.assembly, "all", 4, 0):
@@ -217,7 +217,7 @@ def test_categories_of_a_neighbor_depend_on_type_and_label() -> None:
     for (a, b), pair in space.pairs.items():
         beside = space.categories_between(a, b)  # each type of this kit has a label of its own
         assert beside == range(pair.first, pair.first + len(pair.poses))
-        assert all(space.types[each].tolist() == [a, b] for each in beside)
+        assert all(space.types[category].tolist() == [a, b] for category in beside)
     assert space.categories_between(0, 0) == range(0), "a tower's base does not stand on another"
     assert sum(len(pair.poses) for pair in space.pairs.values()) == len(space) - 1 - len(space.kit.types)
 
@@ -256,7 +256,7 @@ def test_parts_with_equal_labels_are_rebuilt_with_their_own_surface(tmp_path: Pa
         for encoded in strings_of(space, exemplar.assembly, "all", 2, 0):
             categories = assert_comes_back(space, exemplar.assembly, encoded)
             decoded = decode(encoded.string, space.alphabet)
-            for each, (here, there) in zip(categories, token_edges(decoded).tolist(), strict=True):
+            for category, (here, there) in zip(categories, token_edges(decoded).tolist(), strict=True):
                 if here >= 0:
                     parent = int(exemplar.assembly.types[encoded.nodes[here]])
-                    assert each in space.categories_between(parent, int(decoded.types[there]))
+                    assert category in space.categories_between(parent, int(decoded.types[there]))

@@ -42,7 +42,7 @@ def gaps(kit: Kit, assembly: Assembly, other: Assembly) -> list[float]:
     """How far each part stands from where it should, in tolerances."""
     found = []
     for kind, one, two in zip(assembly.types, assembly.poses, other.poses, strict=True):
-        first, second = (pose_vectors(each[None], kit.types[kind].diagonal / 2) for each in (one, two))
+        first, second = (pose_vectors(pose[None], kit.types[kind].diagonal / 2) for pose in (one, two))
         found.append(float(np.linalg.norm(first - second)) / kit.pose_tolerance)
     return found
 
@@ -68,8 +68,8 @@ def test_exemplars_are_rebuilt_from_any_string(name: str, edges: Edges) -> None:
             described = assert_comes_back(book, exemplar.assembly, encoded)
             assert len(described.poses) == 1, "every part but the first stands at a docking of the kit"
             tokens = split_tokens(encoded.string)
-            parts = [each in book.alphabet.types for each in tokens]
-            assert [each != NO_CATEGORY for each in described.categories] == parts
+            parts = [token in book.alphabet.types for token in tokens]
+            assert [category != NO_CATEGORY for category in described.categories] == parts
 
 
 @pytest.mark.slow
@@ -82,8 +82,8 @@ def test_parts_with_equal_labels_keep_their_own_surface(edges: Edges, tmp_path: 
     assert len(kit.labels) < len(kit.types)
     search = Search(ContactOracle(kit), SearchConfig())
     found, _ = search.run(np.random.default_rng(0), 1000, 12, "test", lambda count: None)
-    assert any(set(each.assembly.types.tolist()) - set(kit.exemplars[0].assembly.types.tolist()) for each in found)
-    for assembly in (*(each.assembly for each in kit.exemplars), *(each.assembly for each in found)):
+    assert any(set(shape.assembly.types.tolist()) - set(kit.exemplars[0].assembly.types.tolist()) for shape in found)
+    for assembly in (*(item.assembly for item in kit.exemplars), *(item.assembly for item in found)):
         for encoded in strings_of(book, assembly, 1, 0):
             assert_comes_back(book, assembly, encoded)
 

@@ -79,22 +79,22 @@ def test_bracketed_names_are_tokens() -> None:
 
 def test_figure_1_is_two_shapes() -> None:
     """strings, figure 1: three strings of the input shape and two of a variant."""
-    shapes = [decode(each, ALPHABET) for each in FIGURE_1]
-    assert {(len(each.types), len(each.edges)) for each in shapes} == {(14, 14)}
-    assert all(equivalent(FIGURE_1[0], each, ALPHABET) for each in FIGURE_1)
+    shapes = [decode(string, ALPHABET) for string in FIGURE_1]
+    assert {(len(shape.types), len(shape.edges)) for shape in shapes} == {(14, 14)}
+    assert all(equivalent(FIGURE_1[0], string, ALPHABET) for string in FIGURE_1)
     assert equivalent(*FIGURE_1_VARIANT, ALPHABET)
     assert not equivalent(FIGURE_1[0], FIGURE_1_VARIANT[0], ALPHABET)
 
 
 def test_figure_4_is_one_shape() -> None:
-    assert all(equivalent(FIGURE_4[0], each, ALPHABET) for each in FIGURE_4)
+    assert all(equivalent(FIGURE_4[0], string, ALPHABET) for string in FIGURE_4)
     assert len(edges(FIGURE_4[0])) == 30
 
 
 def test_figure_9_has_one_cycle_of_towers() -> None:
     decoded = decode("B(D)C(AC(BD)AC(AC0BD)BD)AC(AC(BD)A0)BD", ALPHABET)
     assert len(decoded.edges) == len(decoded.types) == 24
-    cycle = next(each.edge for each in decoded.tokens if each.kind == "cycle")
+    cycle = next(token.edge for token in decoded.tokens if token.kind == "cycle")
     assert sorted(decoded.types[decoded.edges[cycle]].tolist()) == [0, 2]  # the numbers stand behind a C and an A
 
 
@@ -107,7 +107,7 @@ def test_strings_with_equal_counts_of_different_graphs_are_not_equivalent() -> N
 def test_tokens_have_their_nodes_and_edges() -> None:
     decoded = decode("A%10(BC)DE%10", ALPHABET)
     assert decoded.edges.tolist() == [[0, 1], [0, 3], [0, 4], [1, 2], [3, 4]]
-    assert [(each.index, each.text, each.kind, each.node, each.edge) for each in decoded.tokens] == [
+    assert [(token.index, token.text, token.kind, token.node, token.edge) for token in decoded.tokens] == [
         (0, "A", "node", 0, -1),
         (1, "%10", "cycle", 0, 2),
         (4, "(", "open", -1, -1),
@@ -206,8 +206,8 @@ def test_arbitrary_text_decodes_or_raises_at_a_character_of_it(string: str) -> N
     keys = decoded.edges @ (1000, 1)
     assert (decoded.edges[:, 0] < decoded.edges[:, 1]).all()
     assert (np.diff(keys) > 0).all()
-    assert "".join(each.text for each in decoded.tokens) == string
-    assert all(string[each.index :].startswith(each.text) for each in decoded.tokens)
-    owners = [each.edge for each in decoded.tokens if each.edge >= 0]
-    spanning = {each.edge for each in decoded.tokens if each.kind == "node"} - {-1}
+    assert "".join(token.text for token in decoded.tokens) == string
+    assert all(string[token.index :].startswith(token.text) for token in decoded.tokens)
+    owners = [token.edge for token in decoded.tokens if token.edge >= 0]
+    spanning = {token.edge for token in decoded.tokens if token.kind == "node"} - {-1}
     assert sorted(owners) == sorted([*spanning, *2 * [e for e in range(len(decoded.edges)) if e not in spanning]])

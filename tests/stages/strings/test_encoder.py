@@ -19,8 +19,8 @@ def assert_stands_for(encoded: Encoded, graph: Graph) -> None:
     decoded = decode(encoded.string, ALPHABET)
     assert sorted(encoded.nodes.tolist()) == list(range(len(types)))
     assert decoded.types.tolist() == types[encoded.nodes].tolist()
-    found = {frozenset(each) for each in encoded.nodes[decoded.edges].tolist()}
-    assert found == {frozenset(each) for each in edges.tolist()}
+    found = {frozenset(edge) for edge in encoded.nodes[decoded.edges].tolist()}
+    assert found == {frozenset(edge) for edge in edges.tolist()}
     assert len(decoded.edges) == len(edges)
 
 
@@ -49,13 +49,13 @@ def test_all_strings_of_a_small_graph_are_enumerated() -> None:
     """The star with centre A and leaves B, C: from A two orders, from each leaf one walk."""
     graph = (np.array([0, 1, 2], dtype=np.int16), np.array([[0, 1], [0, 2]], dtype=np.int32))
     found = random_strings(*graph, ALPHABET, 50, np.random.default_rng(0))
-    assert {each.string for each in found} == {"A(B)C", "A(C)B", "BAC", "CAB"}
+    assert {encoded.string for encoded in found} == {"A(B)C", "A(C)B", "BAC", "CAB"}
 
 
 def test_all_strings_of_a_triangle_are_enumerated() -> None:
     """Each broken edge leaves a chain of three, walked from an end or from the middle in two orders."""
     graph = (np.array([0, 1, 2], dtype=np.int16), np.array([[0, 1], [0, 2], [1, 2]], dtype=np.int32))
-    found = {each.string for each in random_strings(*graph, ALPHABET, 50, np.random.default_rng(0))}
+    found = {encoded.string for encoded in random_strings(*graph, ALPHABET, 50, np.random.default_rng(0))}
     chains = {"A0BC0", "A0CB0", "B0AC0", "B0CA0", "C0AB0", "C0BA0"}
     forks = {"A(B0)C0", "A(C0)B0", "B(A0)C0", "B(C0)A0", "C(A0)B0", "C(B0)A0"}
     assert found == chains | forks
@@ -64,44 +64,47 @@ def test_all_strings_of_a_triangle_are_enumerated() -> None:
 def test_the_strings_of_figure_1_are_encoded() -> None:
     decoded = decode("CDA0(DC)DCDBDCDCD0", ALPHABET)
     found = random_strings(decoded.types, decoded.edges, ALPHABET, 4000, np.random.default_rng(0))
-    strings = {each.string for each in found}
+    strings = {encoded.string for encoded in found}
     assert {"CDA0(DC)DCDBDCDCD0", "A0(DC)(DC)DCDBDCDCD0", "A0(DC)(DCDBDCDCD0)DC"} <= strings
 
 
 def test_random_strings_are_distinct_and_new() -> None:
     graph = arrays(nx.grid_2d_graph(5, 5))
     rng = np.random.default_rng(1)
-    first = {each.string for each in random_strings(*graph, ALPHABET, 40, rng)}
+    first = {encoded.string for encoded in random_strings(*graph, ALPHABET, 40, rng)}
     assert len(first) == 40
     chain = arrays(nx.path_graph(3), np.array([0, 1, 2]))
-    assert {each.string for each in random_strings(*chain, ALPHABET, 9, rng, {"ABC", "CBA"})} == {"B(A)C", "B(C)A"}
+    assert {encoded.string for encoded in random_strings(*chain, ALPHABET, 9, rng, {"ABC", "CBA"})} == {
+        "B(A)C",
+        "B(C)A",
+    }
 
 
 def test_a_graph_with_a_single_string_yields_no_others() -> None:
     found = random_strings(*arrays(nx.path_graph(2)), ALPHABET, 8, np.random.default_rng(0))
-    assert [each.string for each in found] == ["AA"]
+    assert [encoded.string for encoded in found] == ["AA"]
 
 
 def test_random_strings_start_at_all_nodes() -> None:
     """Every node is a root and every edge is broken sometimes."""
     types, edges = arrays(nx.cycle_graph(5), np.arange(5))
     found = random_strings(types, edges, ALPHABET, 200, np.random.default_rng(2))
-    assert {each.string[0] for each in found} == set("ABCDE")
+    assert {encoded.string[0] for encoded in found} == set("ABCDE")
     broken = set()
-    for each in found:
-        decoded = decode(each.string, ALPHABET)
+    for encoded in found:
+        decoded = decode(encoded.string, ALPHABET)
         cycle = next(token.edge for token in decoded.tokens if token.kind == "cycle")
-        broken.add(tuple(sorted(each.nodes[decoded.edges[cycle]].tolist())))
+        broken.add(tuple(sorted(encoded.nodes[decoded.edges[cycle]].tolist())))
     assert len(broken) == 5
 
 
 def test_equal_generators_encode_equal_strings() -> None:
     graph = arrays(nx.grid_2d_graph(6, 7))
     one, other = (
-        [each.string for each in random_strings(*graph, ALPHABET, 10, np.random.default_rng(5))] for _ in range(2)
+        [encoded.string for encoded in random_strings(*graph, ALPHABET, 10, np.random.default_rng(5))] for _ in range(2)
     )
     assert one == other
-    assert one != [each.string for each in random_strings(*graph, ALPHABET, 10, np.random.default_rng(6))]
+    assert one != [encoded.string for encoded in random_strings(*graph, ALPHABET, 10, np.random.default_rng(6))]
 
 
 def test_numbers_begin_at_0_and_are_reused() -> None:
@@ -128,15 +131,17 @@ def test_numbers_above_9_and_above_99_follow_smiles() -> None:
 def test_no_node_opens_a_number_that_closes_there() -> None:
     """`A00` would read like an edge from A to itself to anybody who does not count."""
     types, edges = arrays(nx.complete_graph(9))
-    for each in random_strings(types, edges, ALPHABET, 20, np.random.default_rng(0)):
-        numbers = [(token.node, token.text) for token in decode(each.string, ALPHABET).tokens if token.kind == "cycle"]
+    for encoded in random_strings(types, edges, ALPHABET, 20, np.random.default_rng(0)):
+        numbers = [
+            (token.node, token.text) for token in decode(encoded.string, ALPHABET).tokens if token.kind == "cycle"
+        ]
         assert len(set(numbers)) == len(numbers)
 
 
 def test_closing_numbers_come_first_and_opening_ones_follow_in_order_of_their_ends() -> None:
     types, edges = arrays(nx.complete_graph(9))
-    for each in random_strings(types, edges, ALPHABET, 20, np.random.default_rng(0)):
-        decoded = decode(each.string, ALPHABET)
+    for encoded in random_strings(types, edges, ALPHABET, 20, np.random.default_rng(0)):
+        decoded = decode(encoded.string, ALPHABET)
         for node in range(9):
             behind = [token for token in decoded.tokens if token.kind == "cycle" and token.node == node]
             partners = [int(decoded.edges[token.edge].sum()) - node for token in behind]
@@ -150,9 +155,9 @@ def test_closing_numbers_come_first_and_opening_ones_follow_in_order_of_their_en
 def test_the_last_subtree_of_a_node_has_no_parentheses() -> None:
     rng = np.random.default_rng(0)
     graph = arrays(nx.balanced_tree(3, 3), rng.integers(0, 6, 40))
-    found = [each.string for each in random_strings(*graph, ALPHABET, 50, rng)]
+    found = [encoded.string for encoded in random_strings(*graph, ALPHABET, 50, rng)]
     assert len(found) == 50
-    assert not any("))" in each or each.endswith(")") for each in found)
+    assert not any("))" in string or string.endswith(")") for string in found)
 
 
 def test_chains_and_rings_of_5000_nodes_are_encoded() -> None:
@@ -200,7 +205,7 @@ def assert_spans(encoded: Encoded, graph: Graph) -> None:
     found = nx.Graph(encoded.nodes[decoded.edges].tolist())
     found.add_nodes_from(range(len(types)))
     assert nx.is_tree(found)
-    assert {frozenset(each) for each in found.edges} <= {frozenset(each) for each in edges.tolist()}
+    assert {frozenset(edge) for edge in found.edges} <= {frozenset(edge) for edge in edges.tolist()}
     assert not set("0123456789%") & set(encoded.string)
 
 
@@ -220,13 +225,17 @@ def test_a_tree_has_the_same_strings_with_and_without_cycles(graph: Graph, seed:
     decoded = decode(encode(*graph, ALPHABET, np.random.default_rng(seed), cycles=False).string, ALPHABET)
     tree = decoded.types, decoded.edges
     for cycles in (True, False):
-        one, other = (encode(*tree, ALPHABET, np.random.default_rng(seed), each) for each in (True, cycles))
+        one, other = (
+            encode(*tree, ALPHABET, np.random.default_rng(seed), with_cycles) for with_cycles in (True, cycles)
+        )
         assert one.string == other.string
         assert canonical_string(*tree, ALPHABET, cycles).string == canonical_string(*tree, ALPHABET).string
 
 
 def test_all_trees_of_a_triangle_are_encoded() -> None:
     graph = (np.array([0, 1, 2], dtype=np.int16), np.array([[0, 1], [0, 2], [1, 2]], dtype=np.int32))
-    found = {each.string for each in random_strings(*graph, ALPHABET, 50, np.random.default_rng(0), (), cycles=False)}
+    found = {
+        encoded.string for encoded in random_strings(*graph, ALPHABET, 50, np.random.default_rng(0), (), cycles=False)
+    }
     chains = {"ABC", "ACB", "BAC", "BCA", "CAB", "CBA"}
     assert found == chains | {"A(B)C", "A(C)B", "B(A)C", "B(C)A", "C(A)B", "C(B)A"}

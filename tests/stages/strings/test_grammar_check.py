@@ -26,7 +26,7 @@ CASTLE = Grammar(
 
 @pytest.mark.parametrize("string", ["A0DADAD0", "A0(C)DADAD0", "CA0DADBDAD0"])
 def test_rings_within_the_grammar_pass(string: str) -> None:
-    assert len(check_string(string, ALPHABET, CASTLE).types) == sum(each.isalpha() for each in string)
+    assert len(check_string(string, ALPHABET, CASTLE).types) == sum(character.isalpha() for character in string)
 
 
 @pytest.mark.parametrize(

@@ -35,10 +35,14 @@ def grammar_of(*strings: str, strictness: Strictness = "multiset", hubs: tuple[i
         decoded = decode(string, AB)
         for node, kind in enumerate(decoded.types.tolist()):
             others = [int(decoded.types[i + j - node]) for i, j in decoded.edges.tolist() if node in (i, j)]
-            dockings += [Docking(min(kind, each), max(kind, each), np.eye(4), "face", 1, 0.0) for each in others]
-            kept = [each for each in others if each not in hubs]
+            dockings += [
+                Docking(min(kind, neighbor), max(kind, neighbor), np.eye(4), "face", 1, 0.0) for neighbor in others
+            ]
+            kept = [neighbor for neighbor in others if neighbor not in hubs]
             if kind not in hubs:
-                around.setdefault(kind, {})[tuple((each, kept.count(each)) for each in sorted(set(kept)))] = 1
+                around.setdefault(kind, {})[
+                    tuple((neighbor, kept.count(neighbor)) for neighbor in sorted(set(kept)))
+                ] = 1
     return Grammar(around, tuple(dockings), {}, strictness, hubs)
 
 
@@ -199,11 +203,11 @@ def test_partial_grammars_admit_parts_with_missing_neighbors(seed: int, name: st
     counts = np.random.default_rng(seed).integers(0, 3, 3)
     kind = int(np.random.default_rng(seed).integers(3))
     wider = [counts + more for more in np.ndindex(4, 4, 4)]
-    whole = [tuple((other, int(count)) for other, count in enumerate(each) if count) for each in wider]
+    whole = [tuple((other, int(count)) for other, count in enumerate(counts) if count) for counts in wider]
     docked = all(
         compiled.high[compiled.first[kind] : compiled.first[kind + 1], other].any() for other in np.flatnonzero(counts)
     )
-    wanted = docked and any(admits(grammar, kind, each) for each in whole)
+    wanted = docked and any(admits(grammar, kind, multiset) for multiset in whole)
     assert (tokens_to_complete(compiled, kind, counts, 0, True) < NO_COMPLETION) == wanted
 
 

@@ -83,7 +83,7 @@ def test_faces_stay_and_other_contacts_only_to_connect_the_shape(name: str) -> N
 
 def test_lines_are_preferred_to_points_where_faces_do_not_connect_cubes() -> None:
     kit = kit_of("cubes")
-    block, stairs = (each.assembly for each in kit.exemplars)
+    block, stairs = (exemplar.assembly for exemplar in kit.exemplars)
     writer = KitStrings(kit, "faces")
     assert (len(block.edges), len(writer.graph(block).edges)) == (12 + 12 + 4, 12)
     assert pairs(stairs.edges) == pairs(writer.graph(stairs).edges) == {(0, 1), (1, 2), (2, 3), (3, 4), (4, 5)}
@@ -107,10 +107,10 @@ def test_strings_decode_to_the_graph_of_their_edges(name: str, edges: str) -> No
     assembly = kit.exemplars[0].assembly
     graph = writer.graph(assembly)
     strings = writer.strings(graph, 5, np.random.default_rng(1))
-    assert len({each.string for each in strings}) == 6
-    for each in strings:
-        assert writer.represents(each, graph)
-        decoded = decode(each.string, writer.alphabet)
+    assert len({encoded.string for encoded in strings}) == 6
+    for encoded in strings:
+        assert writer.represents(encoded, graph)
+        decoded = decode(encoded.string, writer.alphabet)
         assert len(decoded.edges) == (len(assembly) - 1 if edges == "tree" else len(graph.edges))
     swapped = strings[0].nodes.copy()
     other = next(place for place in range(len(swapped)) if graph.types[swapped[place]] != graph.types[swapped[0]])

@@ -56,7 +56,9 @@ def plan_kits(plan: Plan) -> list[Shard]:
 
 def make_kit(task: Task) -> Outcome:
     name = task.shard.name
-    kit = Kit(name, tuple(box(each) for each in KITS[name]), (), Grammar({}, (), {}), 0.001, 0.001, ("face",), "z")
+    kit = Kit(
+        name, tuple(box(part_name) for part_name in KITS[name]), (), Grammar({}, (), {}), 0.001, 0.001, ("face",), "z"
+    )
     with task.output(f"{name}.json") as text, task.output(f"{name}.tar") as tar:
         write_kit(kit, text, tar)
     return Outcome(1)
@@ -123,7 +125,7 @@ def make_here(wanted: Config, out: Path, stages: Sequence[str] = tuple(STAGES)) 
     for name in stages:
         places.stage(name).make()
         surveyed = survey.stage(name)
-        while fresh := [each for each in surveyed.missing if each.name not in failed]:
+        while fresh := [shard for shard in surveyed.missing if shard.name not in failed]:
             for shard in fresh:
                 report = make_shard(survey.job(name, shard))
                 if report.status != "done":
@@ -148,7 +150,7 @@ def lines(out: Path, file: str) -> list[str]:
 def test_samples_have_a_canonical_string_and_distinct_random_strings(made: Path) -> None:
     work = DatasetPaths(made, "toys").work
     for shard in SPLITS:
-        samples = {each.key: each for each in read_samples(work / "variations" / f"{shard}.tar")}
+        samples = {sample.key: sample for sample in read_samples(work / "variations" / f"{shard}.tar")}
         written = dict(read_shard(work / "strings" / f"{shard}.tar"))
         assert list(written) == list(samples)
         for key, members in written.items():
@@ -160,8 +162,8 @@ def test_samples_have_a_canonical_string_and_distinct_random_strings(made: Path)
             # a chain is walked from either end, or from a node between them in two orders
             assert len(strings) == (min(9, 2 * len(sample.assembly) - 2) if is_chain else 9)
             alphabet = make_alphabet(KITS[sample.kit])
-            for each in strings:
-                decoded = decode(each, alphabet)
+            for string in strings:
+                decoded = decode(string, alphabet)
                 assert graph_digest(decoded.types, decoded.edges) == sample.graph
 
 
@@ -176,7 +178,7 @@ def test_shapes_with_equal_graphs_have_equal_canonical_strings(made: Path) -> No
 
 
 def test_corpora_have_each_string_once_by_kit_and_split(made: Path) -> None:
-    files = {each.name for each in (made / "toys-corpus").iterdir()}
+    files = {file.name for file in (made / "toys-corpus").iterdir()}
     corpus = {f"{kit}-{split}.txt" for kit in KITS for split in ("train", "val")}
     assert files == corpus | {"vocabulary.json", "statistics.json"}
     work = DatasetPaths(made, "toys").work
@@ -206,11 +208,11 @@ def test_the_statistics_agree_with_the_files(made: Path) -> None:
     for kit, of_splits in statistics.items():
         for split, described in of_splits.items():
             strings = lines(made, f"{kit}-{split}.txt")
-            figures = [measure_string(each) for each in strings]
+            figures = [measure_string(string) for string in strings]
             assert described["strings"] == len(strings) == sum(described["cycles"]["histogram"].values())
             assert described["characters"]["most"] == max(map(len, strings))
-            assert described["tokens"]["mean"] == round(sum(each.tokens for each in figures) / len(figures), 3)
-            assert described["cycles"]["most"] == max(each.cycles for each in figures)
+            assert described["tokens"]["mean"] == round(sum(figure.tokens for figure in figures) / len(figures), 3)
+            assert described["cycles"]["most"] == max(figure.cycles for figure in figures)
     castle = statistics["castle"]["train"]
     assert (castle["shapes"], castle["graphs"]) == (4, 3)
     assert castle["strings"] + castle["duplicates_dropped"] == 4 * 9
@@ -281,10 +283,10 @@ def trees(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_strings_of_trees_have_no_cycles(trees: Path) -> None:
     work = DatasetPaths(trees, "toys").work
     for shard in SPLITS:
-        samples = {each.key: each for each in read_samples(work / "variations" / f"{shard}.tar")}
+        samples = {sample.key: sample for sample in read_samples(work / "variations" / f"{shard}.tar")}
         for key, members in read_shard(work / "strings" / f"{shard}.tar"):
-            for each in members["txt"].decode().splitlines():
-                decoded = decode(each, make_alphabet(KITS[samples[key].kit]))
+            for string in members["txt"].decode().splitlines():
+                decoded = decode(string, make_alphabet(KITS[samples[key].kit]))
                 assert sorted(decoded.types) == sorted(samples[key].assembly.types)
                 assert len(decoded.edges) == len(decoded.types) - 1
     vocabulary = json.loads(corpus_file(trees, "vocabulary.json"))

@@ -22,8 +22,8 @@ def test_lengths_of_strings_are_in_tokens(string: str, figures: StringFigures) -
 
 def test_statistics_count_values_and_tokens() -> None:
     statistics = StringStatistics()
-    for each in ("AB", "A0AA0", "BA"):
-        statistics.add(each)
+    for string in ("AB", "A0AA0", "BA"):
+        statistics.add(string)
     assert statistics.seen == Counter({"A": 5, "B": 2, "0": 2})
     described = statistics.describe()
     assert described["strings"] == 3

@@ -45,7 +45,7 @@ def ungoverned(roads: Instantiator) -> Instantiator:
 
 
 def labels(kit: Kit, names: Sequence[str]) -> np.ndarray:
-    return np.array([kit.labels.index(each) for each in names], dtype=np.int16)
+    return np.array([kit.labels.index(name) for name in names], dtype=np.int16)
 
 
 def cycle(count: int) -> IntArray:
@@ -58,7 +58,7 @@ def path(count: int) -> IntArray:
 
 def loop(width: int, depth: int) -> list[str]:
     """The tiles along a ring."""
-    return [each for side in (width, depth) * 2 for each in ("corner", *["straight"] * side)]
+    return [name for side in (width, depth) * 2 for name in ("corner", *["straight"] * side)]
 
 
 def instantiate_names(
@@ -148,7 +148,7 @@ def test_strings_of_exemplars_become_shapes_with_any_edges(roads: Instantiator) 
 def test_earlier_graphs_do_not_change_a_result(roads: Instantiator) -> None:
     fresh = Instantiator(ContactOracle(roads.kit))
     names = loop(3, 2)
-    one, other = (instantiate_names(each, names, cycle(len(names)), seed=3) for each in (roads, fresh))
+    one, other = (instantiate_names(kit, names, cycle(len(names)), seed=3) for kit in (roads, fresh))
     assert one.placements == other.placements
     assert one.assembly is not None
     assert other.assembly is not None
@@ -161,7 +161,7 @@ def test_room_depends_on_the_graph_alone(roads: Instantiator, monkeypatch: pytes
     fresh, used = (Instantiator(ContactOracle(roads.kit)) for _ in range(2))
     used._make_room(400)
     names = loop(3, 2)
-    reasons = {instantiate_names(each, names, cycle(len(names)), seed=3).reason for each in (fresh, used)}
+    reasons = {instantiate_names(kit, names, cycle(len(names)), seed=3).reason for kit in (fresh, used)}
     assert reasons == {"too many placements"}
 
 
@@ -221,9 +221,9 @@ def test_random_assembly_is_rarely_a_shape(roads: Instantiator) -> None:
     at_random = SolverMethod(checked=False, constrained=False, backtracks=False, closes=False, budget=16)
     names = loop(2, 2)
     found = [instantiate_names(roads, names, cycle(len(names)), at_random, seed) for seed in range(40)]
-    assert sum(each.assembly is not None for each in found) <= 4
-    assert {each.reason for each in found if each.assembly is None} == {"contacts are not the edges"}
-    assert all(each.placements == len(names) for each in found)
+    assert sum(attempt.assembly is not None for attempt in found) <= 4
+    assert {attempt.reason for attempt in found if attempt.assembly is None} == {"contacts are not the edges"}
+    assert all(attempt.placements == len(names) for attempt in found)
 
 
 def test_budget_limits_placements(roads: Instantiator) -> None:
@@ -240,7 +240,7 @@ def arrangements(kit: Kit, kinds: list[int], edges: IntArray) -> Iterator[Assemb
         for docking in kit.grammar.dockings:
             for a, b, at in ((docking.a, docking.b, docking.pose), (docking.b, docking.a, invert(docking.pose))):
                 if (a, b) == (kinds[parent], kinds[child]):
-                    poses += [(parent, each) for each in symmetric_images(kit.types[a], kit.types[b], at)]
+                    poses += [(parent, pose) for pose in symmetric_images(kit.types[a], kit.types[b], at)]
         places.append(poses)
     for chosen in product(*places):
         poses = np.tile(np.eye(4), (len(kinds), 1, 1))
@@ -258,9 +258,9 @@ def test_solver_agrees_with_brute_force(ungoverned: Instantiator, names: list[st
     kinds = labels(kit, names).tolist()
     contact, table = ContactTest(kit.types, kit.contact_tolerance), DockingTable.of(kit)
     possible = any(
-        contact.contacts(each.types, each.poses).tolist() == edges.tolist()
-        and (table.label_edges(each.types, each.poses, edges) >= 0).all()
-        for each in arrangements(kit, kinds, edges)
+        contact.contacts(assembly.types, assembly.poses).tolist() == edges.tolist()
+        and (table.label_edges(assembly.types, assembly.poses, edges) >= 0).all()
+        for assembly in arrangements(kit, kinds, edges)
     )
     found = ungoverned.instantiate(np.array(kinds, dtype=np.int16), edges, np.random.default_rng(0))
     assert (found.reason == "") == possible
