@@ -62,18 +62,7 @@ def find_docking_sites(
     count, count_back = int(regions.max(initial=-1)) + 1, int(regions_back.max(initial=-1)) + 1
     if not kept.any() or not count or not count_back:
         return []
-    links, border = _links(
-        kept,
-        regions,
-        regions_back,
-        grid.neighbours,
-        grid.points,
-        grid.starts,
-        transform,
-        grid.origin,
-        grid.cell_size,
-        grid.keys,
-    )
+    links, border = _links(kept, regions, regions_back, grid.neighbours, transform, grid.items)
     of_region, of_image = _members(regions, count), _members(regions_back, count_back)
     of_border = _members(border[:, 1], count)
     sites = []
@@ -154,12 +143,13 @@ def _regions(chosen, neighbours):
 
 
 @numba.njit(cache=True)
-def _links(kept, regions, regions_back, neighbours, points, starts, transform, origin, size, keys):
+def _links(kept, regions, regions_back, neighbours, transform, items):
     """Link regions of the surface to regions of its image.
 
     Returns int64 (l, 2), pairs of a region and a region of the image whose borders the transform takes onto each other,
     and int64 (b, 2), pairs of an r-symmetric cell and a region next to it.
     """
+    origin, size, keys, starts, points = items.origin, items.size, items.keys, items.starts, items.points
     links, border = [(0, 0) for _ in range(0)], [(0, 0) for _ in range(0)]
     at, cell = np.empty(3), np.empty(3, dtype=np.int64)
     for n in range(len(kept)):

@@ -45,13 +45,13 @@ def _without(grid: SurfaceGrid, lost: np.ndarray, lost_back: np.ndarray, back: F
     """
     cells = np.ones(len(grid), dtype=bool)
     cells[grid.item_cell[lost]] = False
-    _clear_cells_at(cells, grid.points[lost_back], back, grid.origin, grid.cell_size, grid.keys, grid.tolerance)
+    _clear_cells_at(cells, grid.points[lost_back], back, grid.items)
     return cells
 
 
 def _lands_on_surface(grid: SurfaceGrid, transform: FloatArray, items: np.ndarray) -> BoolArray:
     """Return whether a transform takes each item to an occupied cell or a neighbour of one, bool (i,)."""
-    lands: BoolArray = _near_cells(grid.points[items], transform, grid.origin, grid.cell_size, grid.keys)
+    lands: BoolArray = _near_cells(grid.points[items], transform, grid.items)
     return lands
 
 
@@ -76,10 +76,7 @@ def matched_items(grid: SurfaceGrid, transform: FloatArray, items: np.ndarray | 
     items: indices; all items of the grid if None
     """
     queried = np.arange(len(grid.points)) if items is None else items
-    matched: BoolArray = _matched(
-        queried, transform, grid.origin, grid.cell_size, grid.keys, grid.starts, grid.points, grid.directions,
-        grid.is_line, grid.tolerance, grid.same_angle,
-    )  # fmt: skip
+    matched: BoolArray = _matched(queried, transform, grid.items)
     return matched if grid.weak is None else matched | grid.weak[queried]
 
 
@@ -128,8 +125,9 @@ def cells_within(grid: SurfaceGrid, cells: IntArray, max_distance: float) -> Int
 
 
 @numba.njit(cache=True)
-def _matched(queried, transform, origin, size, keys, starts, points, directions, is_line, tolerance, same_angle):
-    """Return whether each queried item, transformed, lies on an item of the same kind; the rest is of the grid."""
+def _matched(queried, transform, items):
+    """Return whether each queried item, transformed, lies on an item of the same kind, bool (i,); `GridItems`."""
+    origin, size, keys, starts, points, directions, is_line, tolerance, same_angle = items
     matched = np.zeros(len(queried), dtype=np.bool_)
     at, along = np.empty(3), np.empty(3)
     low, high = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
@@ -175,7 +173,7 @@ def _matched(queried, transform, origin, size, keys, starts, points, directions,
 
 
 @numba.njit(cache=True)
-def _near_cells(points, transform, origin, size, keys):
+def _near_cells(points, transform, items):
     """Return whether a transform takes each point (n, 3) to an occupied cell or a neighbour of one, bool (n,)."""
     near = np.zeros(len(points), dtype=np.bool_)
     at, cell = np.empty(3), np.empty(3, dtype=np.int64)
@@ -184,11 +182,11 @@ def _near_cells(points, transform, origin, size, keys):
             at[d] = transform[d, 3]
             for e in range(3):
                 at[d] += transform[d, e] * points[place, e]
-        cell_of(at, origin, size, cell)
+        cell_of(at, items.origin, items.size, cell)
         for x in range(-1, 2):
             for y in range(-1, 2):
                 for z in range(-1, 2):
-                    if not near[place] and cell_index(keys, cell[0] + x, cell[1] + y, cell[2] + z) >= 0:
+                    if not near[place] and cell_index(items.keys, cell[0] + x, cell[1] + y, cell[2] + z) >= 0:
                         near[place] = True
     return near
 
@@ -219,7 +217,7 @@ def _filled(symmetric, differs, neighbours, max_cells, max_differing):
 
 
 @numba.njit(cache=True)
-def _clear_cells_at(cells, points, transform, origin, size, keys, tolerance):
+def _clear_cells_at(cells, points, transform, items):
     """Set `cells`, bool (n,), to False where a transform takes points."""
     at, low, high = np.empty(3), np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
     for place in range(len(points)):
@@ -227,12 +225,12 @@ def _clear_cells_at(cells, points, transform, origin, size, keys, tolerance):
             at[d] = transform[d, 3]
             for e in range(3):
                 at[d] += transform[d, e] * points[place, e]
-        cell_of(at - tolerance, origin, size, low)
-        cell_of(at + tolerance, origin, size, high)
+        cell_of(at - items.tolerance, items.origin, items.size, low)
+        cell_of(at + items.tolerance, items.origin, items.size, high)
         for i in range(low[0], high[0] + 1):
             for j in range(low[1], high[1] + 1):
                 for k in range(low[2], high[2] + 1):
-                    n = cell_index(keys, i, j, k)
+                    n = cell_index(items.keys, i, j, k)
                     if n >= 0:
                         cells[n] = False
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -26,6 +28,20 @@ MIN_HEIGHT_SHARE = 1e-7
 """A triangle of less height, as a share of its longest side, has no area."""
 LATTICE_OFFSET_CELLS = (0.3819660113, 0.2360679775, 0.1458980338)
 """Position of the lowest corner in its cell: planes of models lie at round numbers, borders of cells should not."""
+
+
+class GridItems(NamedTuple):
+    """The items of a `SurfaceGrid` as its kernels take them; fields as there."""
+
+    origin: FloatArray
+    size: float
+    keys: np.ndarray
+    starts: np.ndarray
+    points: FloatArray
+    directions: FloatArray
+    is_line: np.ndarray
+    tolerance: float
+    same_angle: float
 
 
 @dataclass(frozen=True)
@@ -75,6 +91,21 @@ class SurfaceGrid:
 
     def __len__(self) -> int:
         return len(self.keys)
+
+    @cached_property
+    def items(self) -> GridItems:
+        """What kernels look up."""
+        return GridItems(
+            self.origin,
+            self.cell_size,
+            self.keys,
+            self.starts,
+            self.points,
+            self.directions,
+            self.is_line,
+            self.tolerance,
+            self.same_angle,
+        )
 
     @property
     def slack(self) -> float:
