@@ -57,12 +57,8 @@ def place(problem, state, placement):
     counts = state.counts
     counts[WORK_DONE] += counts[N_PLACEMENTS] // LIGHT_CHECKS_PER_WORK
     room, slack = True, 1.1 * kit.limits[1]
-    boxes, first_links, link_parts, link_counts = (
-        state.placement_boxes,
-        state.first_links,
-        state.link_parts,
-        state.link_counts,
-    )
+    boxes, first_links, link_parts = state.placement_boxes, state.first_links, state.link_parts
+    link_counts = state.link_counts
     blockers, placed_parts, newly_blocked = state.blockers, state.placed_parts, state.newly_blocked
     for other in range(counts[N_PLACEMENTS]):
         if other == placement or not boxes_meet(boxes, placement, other, slack):
@@ -189,23 +185,16 @@ def _add_candidate(problem, state, part, pattern, turn, touching):
     placement = state.part_placements[part]
     rotation, translation = state.placement_rotations[placement], state.placement_translations[placement]
     there, turned, place_there = np.empty(3), np.empty((3, 3)), np.empty(3)
-    first_links, link_parts, link_next, link_counts = (
-        state.first_links,
-        state.link_parts,
-        state.link_next,
-        state.link_counts,
-    )
+    first_links, link_parts, link_next = state.first_links, state.link_parts, state.link_next
+    link_counts = state.link_counts
     members = state.members
     types, turns, places = patterns.types, patterns.rotations, patterns.translations
     symmetry_starts, symmetries, boxes, reach = kit.symmetry_starts, kit.symmetries, kit.boxes, kit.reach
-    placement_types, placement_rotations, placement_translations = (
-        state.placement_types,
-        state.placement_rotations,
-        state.placement_translations,
-    )
+    placement_types, placement_rotations = state.placement_types, state.placement_rotations
+    placement_translations = state.placement_translations
     buckets, bucket_next, tolerance = state.buckets, state.bucket_next, kit.limits[0]
     start = state.counts[N_MEMBERS]
-    end, key, standing = start, np.uint64(0), 0
+    end, key, matched = start, np.uint64(0), 0
     for member in range(patterns.starts[pattern], patterns.starts[pattern + 1]):
         if end == len(members):
             return False
@@ -228,13 +217,13 @@ def _add_candidate(problem, state, part, pattern, turn, touching):
         if link < 0 or link_counts[link] == LINK_FORBIDS:
             return True
         if state.placed_parts[other] >= 0:
-            standing += 1
+            matched += 1
         elif state.blockers[other] > 0:
             return True
         members[end] = other
         end += 1
         key += mix(np.uint64(other) + np.uint64(1))
-    if standing != touching:
+    if matched != touching:
         return True
     for known in range(state.first_candidates[part], state.counts[N_CANDIDATES]):
         if state.candidate_keys[known] == key:
@@ -299,19 +288,10 @@ def prune(state, candidate):
     state.domain_sizes[part] -= 1
     state.changed[part] = True
     push_pruned(state, candidate)
-    first_links, link_parts, link_next, link_counts = (
-        state.first_links,
-        state.link_parts,
-        state.link_next,
-        state.link_counts,
-    )
-    members, blockers, placed_parts, newly_blocked, counts = (
-        state.members,
-        state.blockers,
-        state.placed_parts,
-        state.newly_blocked,
-        state.counts,
-    )
+    first_links, link_parts, link_next = state.first_links, state.link_parts, state.link_next
+    link_counts = state.link_counts
+    members, blockers, placed_parts = state.members, state.blockers, state.placed_parts
+    newly_blocked, counts = state.newly_blocked, state.counts
     for k in range(state.member_starts[candidate], state.member_starts[candidate + 1]):
         placement = members[k]
         link = find_link(first_links, link_parts, link_next, placement, part)
@@ -383,12 +363,8 @@ def _prune_all_with(state, placement):
 def _forced(state, part):
     """Return a placement that all candidates of a part have and where no part is placed, or -1."""
     candidate, in_domain, count = state.first_candidates[part], state.in_domain, state.domain_sizes[part]
-    first_links, link_parts, link_next, link_counts = (
-        state.first_links,
-        state.link_parts,
-        state.link_next,
-        state.link_counts,
-    )
+    first_links, link_parts, link_next = state.first_links, state.link_parts, state.link_next
+    link_counts = state.link_counts
     members, placed_parts = state.members, state.placed_parts
     while not in_domain[candidate]:
         candidate += 1
@@ -404,19 +380,10 @@ def _forced(state, part):
 @numba.njit(cache=True)
 def undo(state, length):
     """Undo everything since the trail had that length."""
-    first_links, link_parts, link_next, link_counts = (
-        state.first_links,
-        state.link_parts,
-        state.link_next,
-        state.link_counts,
-    )
-    members, member_starts, blockers, placed_parts, counts = (
-        state.members,
-        state.member_starts,
-        state.blockers,
-        state.placed_parts,
-        state.counts,
-    )
+    first_links, link_parts, link_next = state.first_links, state.link_parts, state.link_next
+    link_counts = state.link_counts
+    members, member_starts, blockers = state.members, state.member_starts, state.blockers
+    placed_parts, counts = state.placed_parts, state.counts
     counts[N_NEWLY_BLOCKED] = 0
     while counts[TRAIL_LENGTH] > length:
         counts[TRAIL_LENGTH] -= 1
@@ -440,12 +407,8 @@ def undo(state, length):
 @numba.njit(cache=True)
 def _take_off(state, part):
     """Remove the newest part from its placement, with its links and candidates."""
-    first_links, link_parts, link_next, link_counts = (
-        state.first_links,
-        state.link_parts,
-        state.link_next,
-        state.link_counts,
-    )
+    first_links, link_parts, link_next = state.first_links, state.link_parts, state.link_next
+    link_counts = state.link_counts
     blockers, placed_parts, counts = state.blockers, state.placed_parts, state.counts
     for other in range(counts[N_PLACEMENTS]):
         link = first_links[other]

@@ -7,33 +7,22 @@ from typing import NamedTuple
 
 class _Outcomes(NamedTuple):
     OK: int = 0
-    WHOLE: int = 1
-    """The cut took the whole shape."""
-    NO_SUCH_PART: int = 2
-    """A boundary part has no counterpart in the other shape."""
+    WHOLE: int = 1  # the cut took the whole shape
+    NO_SUCH_PART: int = 2  # A boundary part has no counterpart in the other shape
     NO_MATCH: int = 3
     NOTHING_ATTACHED: int = 4
     TOO_SMALL: int = 5
     TOO_LARGE: int = 6
     CLASH: int = 7
-    GRAMMAR: int = 8
-    """The grammar does not admit a neighbourhood."""
-    UNKNOWN: int = 9
-    """Contacts must be asked of the oracle first."""
-    ASKEW: int = 10
-    """The boundaries are rotated against each other."""
-    KNOWN: int = 11
-    """The shape was found before."""
-    CONFLICT: int = 12
-    """A domain is empty: the last decision must be undone."""
-    NO_ROOM: int = 13
-    """An array is full."""
-    SOLVED: int = 14
-    """Every node of a graph is placed."""
-    IMPOSSIBLE: int = 15
-    """The search space is exhausted."""
-    BUDGET: int = 16
-    """The work allowed is used up."""
+    GRAMMAR: int = 8  # the grammar does not admit a neighbourhood
+    UNKNOWN: int = 9  # contacts must be asked of the oracle first
+    ASKEW: int = 10  # the boundaries are rotated against each other
+    KNOWN: int = 11  # the shape was found before
+    CONFLICT: int = 12  # a domain is empty: the last decision must be undone
+    NO_ROOM: int = 13  # an array is full
+    SOLVED: int = 14  # every node of a graph is placed
+    IMPOSSIBLE: int = 15  # the search space is exhausted
+    BUDGET: int = 16  # the work allowed is used up
 
 
 Outcome = _Outcomes()

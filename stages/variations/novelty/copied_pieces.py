@@ -25,7 +25,7 @@ left out; `largest` may then be too small and `pieces` too large.
 class CopiedPieces:
     """How much of a shape is a verbatim copy.
 
-    A piece is a connected set of parts that stand so in one exemplar: one rigid transform, no reflection, lays each
+    A piece is a connected set of parts that lie so in one exemplar: one rigid transform, no reflection, lays each
     part on one that looks the same, and the contacts that connect the parts are contacts there too.
 
     largest: share of the shape's parts in its largest piece, 0 to 1
@@ -201,7 +201,7 @@ def _dockings(kit: Kit, groups: Groups) -> Dockings:
         place_counts[a] += places.max() + 1
     lengths = groups.orders[ends[:, 0]] + 1
     joined_places = np.concatenate(place_numbers)
-    # The last place around a type stands for nowhere.
+    # The last place around a type means nowhere.
     joined_places = np.where(joined_places < 0, place_counts[np.repeat(ends[:, 0], lengths)], joined_places)
     return Dockings(
         ends=ends,

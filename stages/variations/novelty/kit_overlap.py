@@ -57,7 +57,7 @@ def overlap_sentence(shared: Mapping[str, Any], strictness: str, crossings: Mapp
     """Return `kit_overlap` in words, with the outcomes of tries to join pieces of different ancestry."""
     text = (
         f"the exemplars share {shared['types']} of {shared['all_types']} part types and {shared['neighbourhoods']:,} "
-        f"of {shared['all_neighbourhoods']:,} neighbourhoods; {shared['joints']:,} pairs of others might stand side "
+        f"of {shared['all_neighbourhoods']:,} neighbourhoods; {shared['joints']:,} pairs of others might be side "
         "by side"
     )
     if not shared["mixable"] and strictness == "multiset":

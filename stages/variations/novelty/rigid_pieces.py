@@ -1,4 +1,4 @@
-"""The largest pieces of a shape that stand rigidly so in an exemplar, and a greedy cover of the shape by them.
+"""The largest pieces of a shape that one rigid transform lays on an exemplar, and a greedy cover of the shape by them.
 
 A part p lies on a part q of an exemplar by symmetry s under the transform that lays pose(p) on pose(q) * s. The
 transform is rigid, so each neighbour of p lies on at most one neighbour of q, by one symmetry. A piece is everything
@@ -64,7 +64,7 @@ class Target(NamedTuple):
     joints: Joints
     undo_near: np.ndarray  # int64 (2 m,): inverses of `joints.near`
     undo_far: np.ndarray  # int64 (2 m,): inverses of `joints.far`
-    at: np.ndarray  # int32 (c,): joint to what stands at each place around a part, or -1
+    at: np.ndarray  # int32 (c,): joint to the part at each place around a part, or -1
     at_starts: np.ndarray  # int64 (n,)
     tails: np.ndarray  # int64 (2 m,): part that each joint is seen from
     by_label: np.ndarray  # int64 (2 m,): joints in order of their labels
@@ -197,7 +197,7 @@ def _seeds(groups, dockings, types, handed, tails, joints, target, budget):
 
 @numba.njit(cache=True)
 def rigid_pieces(groups, dockings, types, handed, tails, joints, target, budget):
-    """Return the largest connected pieces, of two parts and more, of a shape that stand so in an exemplar.
+    """Return the largest connected pieces, of two parts and more, that one rigid transform lays on an exemplar.
 
     They grow breadth first from the rarest dockings until `budget` contacts have been looked at; no clock decides.
     types, handed, tails, joints: of the shape, as those of `target`

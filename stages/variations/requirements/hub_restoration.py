@@ -239,7 +239,7 @@ def _has_most(kit: Kit, hub: int, around: np.ndarray) -> bool:
 
 
 def _look_same(part_type: PartType, poses: FloatArray, pose: FloatArray, tolerance: float) -> np.ndarray:
-    """Return which of the parts at `poses` (k, 4, 4) look as if they stood at `pose`, bool (k,)."""
+    """Return which of the parts at `poses` (k, 4, 4) look as if they were at `pose`, bool (k,)."""
     images = pose @ part_type.symmetries
     length = part_type.diagonal / 2
     gaps = pose_vectors(images, length)[:, None] - pose_vectors(poses, length)[None]

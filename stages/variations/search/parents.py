@@ -21,18 +21,13 @@ RIVALS_DRAWN = 6
 class Parent:
     """A shape that pieces are cut from and docked to."""
 
-    name: str
-    """Name of an exemplar, or of a variant in the pool."""
+    name: str  # name of an exemplar, or of a variant in the pool
     assembly: Assembly
-    labels: IntArray
-    """int32 (m, 2), directed docking labels of its edges."""
+    labels: IntArray  # int32 (m, 2), directed docking labels of its edges
     tables: ShapeTables
-    origins: np.ndarray
-    """int8 (n,), the exemplar that each part came from."""
-    shares: FloatArray
-    """float64 (exemplars,), share of parts from each."""
-    place: Place
-    """Its place in the archive."""
+    origins: np.ndarray  # int8 (n,), the exemplar that each part came from
+    shares: FloatArray  # float64 (exemplars,), share of parts from each
+    place: Place  # its place in the archive
 
 
 class Parents:

@@ -146,18 +146,12 @@ class FoundVariants:
 class PoolIndex:
     """What the pools of a kit have kept, in order."""
 
-    searches: tuple[str, ...]
-    """Names of search shards."""
-    rows: np.ndarray
-    """int64 (k, 2), index in `searches` of each variant, and index there."""
-    counts: np.ndarray
-    """int32 (k, types), parts by type."""
-    features: np.ndarray
-    """float32 (k, 10)."""
-    keys: np.ndarray
-    """uint64 (k, 2)."""
-    digests: np.ndarray
-    """uint8 (k, 2, 32)."""
+    searches: tuple[str, ...]  # names of search shards
+    rows: np.ndarray  # int64 (k, 2), index in `searches` of each variant, and index there
+    counts: np.ndarray  # int32 (k, types), parts by type
+    features: np.ndarray  # float32 (k, 10)
+    keys: np.ndarray  # uint64 (k, 2)
+    digests: np.ndarray  # uint8 (k, 2, 32)
 
     @classmethod
     def of(cls, task: Task, kit: str, types: int) -> PoolIndex:

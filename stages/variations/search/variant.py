@@ -36,7 +36,7 @@ REPLACEMENT_REASONS = {
     Outcome.NO_MATCH: "replaced: no embedding",
     Outcome.NOTHING_ATTACHED: "replaced: only a gap to close",
     Outcome.KNOWN: DUPLICATE,
-    Outcome.ASKEW: "deformed: boundaries stand at other angles",
+    Outcome.ASKEW: "deformed: boundaries have other angles",
     **{outcome: f"replaced: {REASONS[outcome]}" for outcome in (Outcome.TOO_SMALL, Outcome.TOO_LARGE, Outcome.GRAMMAR)},
 }
 EARLY_REASONS = {REASONS[outcome] for outcome in (Outcome.WHOLE, Outcome.NO_SUCH_PART, Outcome.NO_MATCH)}
@@ -48,18 +48,12 @@ class Variant:
     """A valid new shape."""
 
     assembly: Assembly
-    labels: IntArray
-    """int32 (m, 2), directed docking labels of its edges."""
-    graph: int
-    """Key of its graph by colour refinement."""
-    docked: int
-    """The same with docking labels."""
-    origins: np.ndarray
-    """int8 (n,), the exemplar that each part came from."""
-    features: Float32Array
-    """float32 (10,), see `FeatureExtractor.features`."""
+    labels: IntArray  # int32 (m, 2), directed docking labels of its edges
+    graph: int  # key of its graph by colour refinement
+    docked: int  # the same with docking labels
+    origins: np.ndarray  # int8 (n,), the exemplar that each part came from
+    features: Float32Array  # float32 (10,), see `FeatureExtractor.features`
     cell: Cell
-    histogram: int
-    """A hash of its type histogram."""
+    histogram: int  # A hash of its type histogram
     lineage: dict[str, Any]
     """Parents, number of parts from each, boundary, docking transform and verbatim copies, as JSON."""

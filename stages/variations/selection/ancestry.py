@@ -18,8 +18,7 @@ Ancestor = int | str
 class Ancestry:
     """The ancestors of the variants of a pool."""
 
-    parents: Sequence[tuple[Ancestor, ...]]
-    """For each variant the nearest ancestors in the pool or among the exemplars."""
+    parents: Sequence[tuple[Ancestor, ...]]  # for each variant the nearest ancestors in the pool or among the exemplars
     cuts: Sequence[str]
     """For each variant its cut: the same for pieces cut alike from one variant and docked to the same other one, empty
     for cuts of exemplars docked to exemplars."""

@@ -45,8 +45,7 @@ class Cut:
 
     split_of: npt.NDArray[np.int8]
     """int8 (n,), index of each variant's split in SPLITS, or DISCARDED; train may have more than asked for."""
-    regions: int
-    """Number of regions in val and test."""
+    regions: int  # number of regions in val and test
 
     def sizes(self, wanted: Mapping[str, int]) -> dict[str, int]:
         """Return how many of the wanted variants of each split there are."""

@@ -29,14 +29,10 @@ Indices = npt.NDArray[np.int64]
 class SelectedSamples:
     """The samples of a kit."""
 
-    variants: Indices
-    """int64 (k,), numbers in the pool, the most diverse first."""
-    split_of: Indices
-    """int64 (k,), indices into SPLITS."""
-    discarded: int
-    """Number of variants of the pool that are too near to another split."""
-    nearness: dict[str, dict[str, float]]
-    """See `nearness_of`."""
+    variants: Indices  # int64 (k,), numbers in the pool, the most diverse first
+    split_of: Indices  # int64 (k,), indices into SPLITS
+    discarded: int  # number of variants of the pool that are too near to another split
+    nearness: dict[str, dict[str, float]]  # see `nearness_of`
 
 
 def packed_shapes(task: Task, kit: Kit, pool: PoolIndex, variants: Indices) -> PackedShapes:

@@ -21,10 +21,8 @@ Chosen = npt.NDArray[np.bool_]
 class Exchanged:
     """The parts that a substitution or replacement exchanges."""
 
-    taken: Chosen
-    """bool (n,), parts of the base that leave."""
-    piece: Chosen
-    """bool (m,), parts of the giver that come."""
+    taken: Chosen  # bool (n,), parts of the base that leave
+    piece: Chosen  # bool (m,), parts of the giver that come
 
 
 def draw_pieces(rng: np.random.Generator, base: Assembly, giver: Assembly) -> Exchanged | None:

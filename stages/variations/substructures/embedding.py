@@ -31,8 +31,7 @@ class Side:
 class Embedding:
     """The result of an embedding."""
 
-    transform: FloatArray
-    """float64 (4, 4), moves the piece of the giver into the base."""
+    transform: FloatArray  # float64 (4, 4), moves the piece of the giver into the base
     poses: FloatArray
     """float64 (n, 4, 4), poses of the parts of the base afterwards; those that are taken out keep theirs."""
 

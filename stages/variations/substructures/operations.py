@@ -45,15 +45,12 @@ class Operations:
     of an operation are its boundary. A row (d, -1) or (-1, e) is a dart that a dummy edge passes over: it loses its
     end.
     """
-    starts: np.ndarray
-    """int64 (k + 1,), the rows of each of k operations."""
-    plain: int
-    """Number of operations, the first ones, without dummy edges."""
+    starts: np.ndarray  # int64 (k + 1,), the rows of each of k operations
+    plain: int  # number of operations, the first ones, without dummy edges
     meetings: int
     """Lower bound of how often these are met from all pairs of darts that are alike: the tries without factoring out
     equivalent operations."""
-    work: int
-    """Number of darts looked at."""
+    work: int  # number of darts looked at
     is_whole: bool
     """Whether these are all; otherwise the limit on dummy edges was met, and only the plain ones are complete."""
 

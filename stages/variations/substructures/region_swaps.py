@@ -24,14 +24,10 @@ MAX_COMPOSITIONS_PER_REGION = 16
 class RegionSwap(NamedTuple):
     """One replacement along an alignment."""
 
-    taken: np.ndarray
-    """bool (n,), what leaves the base."""
-    piece: np.ndarray
-    """bool (m,), what comes of the giver."""
-    image: np.ndarray
-    """int16 (m,), part of the base that each part of the giver coincides with, or -1."""
-    transform: FloatArray
-    """float64 (4, 4), brings the giver to the base."""
+    taken: np.ndarray  # bool (n,), what leaves the base
+    piece: np.ndarray  # bool (m,), what comes of the giver
+    image: np.ndarray  # int16 (m,), part of the base that each part of the giver coincides with, or -1
+    transform: FloatArray  # float64 (4, 4), brings the giver to the base
 
     def docked(self, giver: OrderedGraph, poses: FloatArray) -> Docked:
         """Return the parts of the piece at its boundary, the part of the base that each docks to, and its pose in the
@@ -59,21 +55,16 @@ class RegionSwap(NamedTuple):
 class RegionSwaps:
     """Swaps of regions between a base and a giver along q alignments."""
 
-    transforms: FloatArray
-    """float64 (q, 4, 4), bring the giver to the base."""
+    transforms: FloatArray  # float64 (q, 4, 4), bring the giver to the base
     regions: np.ndarray
     """int16 (q, n + m), first part of the region of each part of the base, then of the giver; -1 where it coincides."""
-    images: np.ndarray
-    """int16 (q, m), part of the base that each part of the giver coincides with, or -1."""
-    listed: np.ndarray
-    """int32 (k, 2), alignment and region of each swap of one region."""
+    images: np.ndarray  # int16 (q, m), part of the base that each part of the giver coincides with, or -1
+    listed: np.ndarray  # int32 (k, 2), alignment and region of each swap of one region
     meetings: int
     """How often these are met from all pairs of equal parts and their symmetries: the tries without factoring out
     equivalent replacements."""
-    work: int
-    """Number of parts laid on others."""
-    is_whole: bool
-    """Whether the list is complete; otherwise a limit cut it short."""
+    work: int  # number of parts laid on others
+    is_whole: bool  # whether the list is complete; otherwise a limit cut it short
 
     def __len__(self) -> int:
         return len(self.listed)

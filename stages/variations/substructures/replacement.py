@@ -15,12 +15,9 @@ class Replacement:
     """The result of an operation."""
 
     graph: OrderedGraph
-    from_base: np.ndarray
-    """int64 (a.n,), node of the result for each node of the base, or -1."""
-    from_giver: np.ndarray
-    """int64 (b.n,), the same for the giver."""
-    darts_of_giver: dict[int, int]
-    """Dart of the result for each dart of the giver that was copied."""
+    from_base: np.ndarray  # int64 (a.n,), node of the result for each node of the base, or -1
+    from_giver: np.ndarray  # int64 (b.n,), the same for the giver
+    darts_of_giver: dict[int, int]  # dart of the result for each dart of the giver that was copied
 
 
 def piece_of(graph: OrderedGraph, cut: np.ndarray) -> np.ndarray:

@@ -39,14 +39,10 @@ class DrawnReplacement:
 
     base: Named
     giver: Named
-    taken: BoolArray
-    """bool (n,), parts of the base that leave."""
-    piece: BoolArray
-    """bool (m,), parts of the giver that come."""
-    result: Assembly
-    """In the pose of the base."""
-    came: BoolArray
-    """bool (k,), parts of the result that are the giver's."""
+    taken: BoolArray  # bool (n,), parts of the base that leave
+    piece: BoolArray  # bool (m,), parts of the giver that come
+    result: Assembly  # in the pose of the base
+    came: BoolArray  # bool (k,), parts of the result that are the giver's
 
 
 def replacements_sheet(kit: Kit, samples: Sequence[Sample]) -> bytes | None:

@@ -68,14 +68,12 @@ class OpenPair:
     """Two shapes and what can be replaced between them: region swaps first, operations when no swap is left."""
 
     planned: PlannedTry
-    sides: tuple[Side, Side]
-    """Base and giver."""
+    sides: tuple[Side, Side]  # base and giver
     left: list[int]
     """Numbers of region swaps that are left, or of operations once they are listed. Within one shape the second half of
     the operations is the other way round."""
     swaps: RegionSwaps | None = None
-    max_work: int = FIRST_WORK // WORK_FACTOR
-    """Parts laid on others at most when swaps were listed."""
+    max_work: int = FIRST_WORK // WORK_FACTOR  # parts laid on others at most when swaps were listed
     operations: Operations | None = None
 
     @property

@@ -118,13 +118,13 @@ def test_user_constraint_is_found_and_its_code_counts(tmp_path: Path) -> None:
     folder = tmp_path / "stages/variations/constraints"
     folder.mkdir(parents=True)
     (folder / "small.py").write_text(
-        "from stages.variations.constraint import Constraint\n"
-        "CONSTRAINT = Constraint((), (), lambda kit, labels: lambda shape: None if len(shape) < 3 else 'large')\n"
+        "from stages.variations.constraint import GlobalConstraint\n"
+        "CONSTRAINT = GlobalConstraint((), (), lambda kit, labels: lambda shape: None if len(shape) < 3 else 'large')\n"
     )
     asked = (
-        "from pipeline.code import reached\n"
+        "from pipeline.code import transitive_imports\n"
         "from stages.variations.constraint import find_constraints, module_of\n"
-        "print(*find_constraints(), *reached([module_of('small')]))\n"
+        "print(*find_constraints(), *transitive_imports([module_of('small')]))\n"
     )
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     done = subprocess.run([sys.executable, "-c", asked], cwd=ROOT, env=environment, capture_output=True, text=True)
