@@ -24,8 +24,8 @@ def build(values: Values) -> list[Part]:
     ]
 
 
-WITH_OPEN_COLUMNS, WITH_CLOSED_COLUMNS = "open_columns > 0", "open_columns < column_count"
-WITH_DRAWERS = "drawer_rows > 0 and open_columns < column_count"
+OPEN, CLOSED = "open_columns > 0", "open_columns < column_count"
+DRAWERS = "drawer_rows > 0 and open_columns < column_count"
 
 PARAMETERS = (
     continuous("column_width", 0.3, 0.7, 5, 0.5, "case", "Width of each column between its boards, in metres."),
@@ -44,17 +44,15 @@ PARAMETERS = (
     continuous("leg_roundness", 0, 1, 3, 1, "base", "Section of the legs, from square to round.", "base_kind == 1"),
     discrete("column_count", 1, 4, 3, "columns", "Number of columns."),
     discrete("open_columns", 0, 3, 1, "columns", "How many of them have no fronts."),
-    discrete("shelf_count", 0, 4, 2, "columns", "Number of shelves in each open column.", WITH_OPEN_COLUMNS),
-    discrete("drawer_rows", 0, 4, 2, "fronts", "Number of drawers in each closed column.", WITH_CLOSED_COLUMNS),
-    continuous("drawer_share", 0, 1, 5, 0.25, "fronts", "How much of the column the drawers fill.", WITH_DRAWERS),
-    binary("has_drawers_on_top", True, "fronts", "Whether drawers are above the doors, or below.", WITH_DRAWERS),
-    discrete("door_style", 0, 3, 1, "fronts", "Doors: plain, framed, with slats, or glazed.", WITH_CLOSED_COLUMNS),
-    binary(
-        "has_inset_fronts", False, "fronts", "Whether fronts lie within the case, or cover it.", WITH_CLOSED_COLUMNS
-    ),
-    discrete("handle_type", 0, 2, 1, "handles", "Handles: a knob, a bar, or a bow.", WITH_CLOSED_COLUMNS),
-    continuous("handle_size", 0, 1, 5, 0.25, "handles", "Size of the handles.", WITH_CLOSED_COLUMNS),
-    continuous("handle_height", 0, 1, 5, 0.5, "handles", "How high on its door a handle sits.", WITH_CLOSED_COLUMNS),
+    discrete("shelf_count", 0, 4, 2, "columns", "Number of shelves in each open column.", OPEN),
+    discrete("drawer_rows", 0, 4, 2, "fronts", "Number of drawers in each closed column.", CLOSED),
+    continuous("drawer_share", 0, 1, 5, 0.25, "fronts", "How much of the column the drawers fill.", DRAWERS),
+    binary("has_drawers_on_top", True, "fronts", "Whether drawers are above the doors, or below.", DRAWERS),
+    discrete("door_style", 0, 3, 1, "fronts", "Doors: plain, framed, with slats, or glazed.", CLOSED),
+    binary("has_inset_fronts", False, "fronts", "Whether fronts lie within the case, or cover it.", CLOSED),
+    discrete("handle_type", 0, 2, 1, "handles", "Handles: a knob, a bar, or a bow.", CLOSED),
+    continuous("handle_size", 0, 1, 5, 0.25, "handles", "Size of the handles.", CLOSED),
+    continuous("handle_height", 0, 1, 5, 0.5, "handles", "How high on its door a handle sits.", CLOSED),
 )
 
 PROGRAM = Program(

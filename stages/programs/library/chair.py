@@ -22,12 +22,16 @@ def build(values: Values) -> Sequence[Part]:
     return [*seat_parts(chair), *base_parts(chair), *back_parts(chair), *arm_parts(chair)]
 
 
-WITHOUT_PANEL = "not is_back_rest"
-WITH_CROSS_RAILS = "not is_back_rest and (not is_top_rail or not is_vertical_rail)"
-WITH_VERTICAL_RAILS = "not is_back_rest and is_top_rail and is_vertical_rail"
-WITH_LEGS = "(is_monoleg and is_monoleg_tent) or not is_monoleg"
-WITH_STAR = "is_monoleg and is_monoleg_tent"
-WITH_SUPPORTS = "handles_state == 1 and is_handles_support"
+RAILS = "not is_back_rest"
+CROSS = "not is_back_rest and (not is_top_rail or not is_vertical_rail)"
+VERTICAL = "not is_back_rest and is_top_rail and is_vertical_rail"
+LEGS = "(is_monoleg and is_monoleg_tent) or not is_monoleg"
+STAR = "is_monoleg and is_monoleg_tent"
+SUPPORT = "handles_state == 1 and is_handles_support"
+FREE_ARMS = "handles_state == 1"
+ARMS = "handles_state > 0"
+FOOT = "is_monoleg"
+FOUR_LEGS = "not is_monoleg"
 
 PARAMETERS = (
     continuous("scale x", 0.5, 2.0, 10, 1.0, "size", "Width of the seat, in half metres."),
@@ -36,14 +40,7 @@ PARAMETERS = (
         "scale z", 0.5, 2.0, 10, 1.0, "size", "Height of the posts of the back above the ground, in 0.95 metres."
     ),
     continuous(
-        "bevel_rails",
-        0.0,
-        1.0,
-        3,
-        0.0,
-        "back",
-        "Section of the rails, from square to round and turned.",
-        WITHOUT_PANEL,
+        "bevel_rails", 0.0, 1.0, 3, 0.0, "back", "Section of the rails, from square to round and turned.", RAILS
     ),
     discrete("pillow_state", 0, 2, 1, "seat", "No cushion, a flat one or a puffed one."),
     discrete(
@@ -51,22 +48,13 @@ PARAMETERS = (
     ),
     continuous("seat_shape", 0.0, 1.0, 5, 0.423308789730072, "seat", "The seat from above, from square to round."),
     continuous("seat_pos", 0.2, 1.0, 9, 0.5646687746047974, "seat", "Height of the seat."),
-    discrete("cr_count", 3, 8, 5, "back", "Number of cross rails.", WITH_CROSS_RAILS),
-    continuous("cr_scale_y", 0.5, 1.2, 4, 0.7333, "back", "Thickness of the cross rails.", WITH_CROSS_RAILS),
-    continuous("cr_scale_z", 0.3, 2.0, 6, 0.98, "back", "Height of each cross rail.", WITH_CROSS_RAILS),
+    discrete("cr_count", 3, 8, 5, "back", "Number of cross rails.", CROSS),
+    continuous("cr_scale_y", 0.5, 1.2, 4, 0.7333, "back", "Thickness of the cross rails.", CROSS),
+    continuous("cr_scale_z", 0.3, 2.0, 6, 0.98, "back", "Height of each cross rail.", CROSS),
+    continuous("cr_offset_bottom", 0.15, 0.75, 8, 0.4071, "back", "Where the lowest cross rail begins.", CROSS),
+    continuous("cr_offset_top", 0.35, 0.95, 8, 0.7786, "back", "Where the highest cross rail ends.", CROSS),
     continuous(
-        "cr_offset_bottom", 0.15, 0.75, 8, 0.4071, "back", "Where the lowest cross rail begins.", WITH_CROSS_RAILS
-    ),
-    continuous("cr_offset_top", 0.35, 0.95, 8, 0.7786, "back", "Where the highest cross rail ends.", WITH_CROSS_RAILS),
-    continuous(
-        "cr_shape_1",
-        0.0,
-        2.0,
-        7,
-        0.0,
-        "back",
-        "How far cross rails are arched, and narrow at their ends.",
-        WITH_CROSS_RAILS,
+        "cr_shape_1", 0.0, 2.0, 7, 0.0, "back", "How far cross rails are arched, and narrow at their ends.", CROSS
     ),
     continuous("curvature", 0.0, 1.0, 5, 0.25, "back", "How far the back bows backwards between its posts."),
     binary("is_top_rail", True, "back", "Whether a rail joins the tops of the posts."),
@@ -81,13 +69,9 @@ PARAMETERS = (
         "Whether rails stand on the seat, instead of cross rails.",
         "not is_back_rest and is_top_rail",
     ),
-    discrete("vr_count", 3, 8, 4, "back", "Number of vertical rails.", WITH_VERTICAL_RAILS),
-    continuous(
-        "vr_scale_x", 0.3, 2.0, 6, 0.7799999713897705, "back", "Width of each vertical rail.", WITH_VERTICAL_RAILS
-    ),
-    continuous(
-        "vr_scale_y", 0.2, 1.0, 4, 0.3499999940395355, "back", "Thickness of the vertical rails.", WITH_VERTICAL_RAILS
-    ),
+    discrete("vr_count", 3, 8, 4, "back", "Number of vertical rails.", VERTICAL),
+    continuous("vr_scale_x", 0.3, 2.0, 6, 0.7799999713897705, "back", "Width of each vertical rail.", VERTICAL),
+    continuous("vr_scale_y", 0.2, 1.0, 4, 0.3499999940395355, "back", "Thickness of the vertical rails.", VERTICAL),
     continuous(
         "vr_shape_1",
         0.0,
@@ -96,124 +80,88 @@ PARAMETERS = (
         0.0,
         "back",
         "How far vertical rails bow to the front, and thin at their ends.",
-        WITH_VERTICAL_RAILS,
+        VERTICAL,
     ),
     binary("is_back_rest", False, "back", "Whether an upholstered panel fills the back, instead of rails."),
-    continuous("legs_shape_1", 0.0, 1.0, 3, 1.0, "legs", "Thickness of the legs at the ground.", WITH_LEGS),
-    continuous("legs_shape_2", 0.0, 1.0, 3, 1.0, "legs", "Thickness of the legs at half their height.", WITH_LEGS),
+    continuous("legs_shape_1", 0.0, 1.0, 3, 1.0, "legs", "Thickness of the legs at the ground.", LEGS),
+    continuous("legs_shape_2", 0.0, 1.0, 3, 1.0, "legs", "Thickness of the legs at half their height.", LEGS),
     continuous("legs_bevel", 0.0, 1.0, 3, 0.5, "legs", "Section of legs, foot and posts, from square to round."),
     binary("is_monoleg", False, "legs", "Whether the chair stands on one foot in its middle."),
-    binary("is_monoleg_tent", False, "legs", "Whether that foot is a column on a star of legs.", "is_monoleg"),
-    continuous(
-        "monoleg_tent_pct", 0.2, 0.8, 7, 0.4, "legs", "Height of the star, as a share of the seat's.", WITH_STAR
-    ),
-    discrete("monoleg_tent_count", 3, 8, 4, "legs", "Number of legs of the star.", WITH_STAR),
-    continuous(
-        "monoleg_bezier_start_x_offset", 0.0, 1.0, 6, 0.0, "legs", "Reach of the foot at its top.", "is_monoleg"
-    ),
+    binary("is_monoleg_tent", False, "legs", "Whether that foot is a column on a star of legs.", FOOT),
+    continuous("monoleg_tent_pct", 0.2, 0.8, 7, 0.4, "legs", "Height of the star, as a share of the seat's.", STAR),
+    discrete("monoleg_tent_count", 3, 8, 4, "legs", "Number of legs of the star.", STAR),
+    continuous("monoleg_bezier_start_x_offset", 0.0, 1.0, 6, 0.0, "legs", "Reach of the foot at its top.", FOOT),
     continuous(
         "monoleg_bezier_start_handle_x_offset",
-        0.0,
-        1.0,
+        0,
+        1,
         6,
         0.0,
         "legs",
         "Reach of the upper handle of the foot's curve.",
-        "is_monoleg",
+        FOOT,
     ),
     continuous(
         "monoleg_bezier_start_handle_z_pct",
-        0.0,
-        1.0,
+        0,
+        1,
         6,
         0.4,
         "legs",
         "How far down the upper handle of the foot's curve lies.",
-        "is_monoleg",
+        FOOT,
     ),
     continuous(
-        "monoleg_bezier_end_x_offset",
-        0.0,
-        1.0,
-        6,
-        0.8199999332427979,
-        "legs",
-        "Reach of the foot at the ground.",
-        "is_monoleg",
+        "monoleg_bezier_end_x_offset", 0, 1, 6, 0.8199999332427979, "legs", "Reach of the foot at the ground.", FOOT
     ),
     continuous(
         "monoleg_bezier_end_handle_x_offset",
-        0.0,
-        1.0,
+        0,
+        1,
         6,
         0.4,
         "legs",
         "Reach of the lower handle of the foot's curve.",
-        "is_monoleg",
+        FOOT,
     ),
     continuous(
         "monoleg_bezier_end_handle_z_pct",
-        0.0,
-        1.0,
+        0,
+        1,
         6,
         1.0,
         "legs",
         "How far down the lower handle of the foot's curve lies.",
-        "is_monoleg",
+        FOOT,
     ),
     continuous("back_frame_top_y_offset_pct", 0.0, 1.0, 6, 0.0, "frame", "How far the posts lean back at their tops."),
     continuous("back_frame_mid_y_offset_pct", 0.0, 1.0, 6, 0.0, "frame", "How far the posts bend back half way up."),
     continuous(
         "back_leg_bottom_y_offset_pct",
-        0.0,
-        1.0,
+        0,
+        1,
         6,
         0.0,
         "frame",
         "How far back the back legs stand on the ground.",
-        "not is_monoleg",
+        FOUR_LEGS,
     ),
     continuous(
-        "back_leg_mid_y_offset_pct",
-        0.0,
-        1.0,
-        6,
-        0.0,
-        "frame",
-        "How far the back legs bend back half way down.",
-        "not is_monoleg",
+        "back_leg_mid_y_offset_pct", 0, 1, 6, 0.0, "frame", "How far the back legs bend back half way down.", FOUR_LEGS
     ),
     discrete("handles_state", 0, 2, 0, "arms", "No arms, arms with free ends, or arms that curve down to the seat."),
-    binary("is_handles_support", True, "arms", "Whether a support holds up each arm.", "handles_state == 1"),
-    binary("is_handles_cusion", True, "arms", "Whether there is a pad on each arm.", "handles_state > 0"),
-    continuous("handles_profile_width", 0.5, 1.0, 6, 0.9, "arms", "Width of the arms.", "handles_state > 0"),
-    continuous("handles_profile_height", 0.5, 1.0, 6, 0.9, "arms", "Thickness of the arms.", "handles_state > 0"),
+    binary("is_handles_support", True, "arms", "Whether a support holds up each arm.", FREE_ARMS),
+    binary("is_handles_cusion", True, "arms", "Whether there is a pad on each arm.", ARMS),
+    continuous("handles_profile_width", 0.5, 1.0, 6, 0.9, "arms", "Width of the arms.", ARMS),
+    continuous("handles_profile_height", 0.5, 1.0, 6, 0.9, "arms", "Thickness of the arms.", ARMS),
+    continuous("handles_base_pos_z_pct", 0.15, 0.8, 8, 0.15, "arms", "Where the arms leave the posts.", ARMS),
+    continuous("handles_mid_pos_x_pct", 0.0, 1.0, 7, 0.0, "arms", "How far the arms bow to the sides.", ARMS),
     continuous(
-        "handles_base_pos_z_pct", 0.15, 0.8, 8, 0.15, "arms", "Where the arms leave the posts.", "handles_state > 0"
+        "handles_mid_pos_y_pct", 0.1, 0.9, 7, 0.42329999804496765, "arms", "How far to the front the arms bow.", ARMS
     ),
+    continuous("handles_mid_pos_z_pct", 0.0, 1.0, 7, 0.5, "arms", "How far the arms sag or rise.", ARMS),
     continuous(
-        "handles_mid_pos_x_pct", 0.0, 1.0, 7, 0.0, "arms", "How far the arms bow to the sides.", "handles_state > 0"
-    ),
-    continuous(
-        "handles_mid_pos_y_pct",
-        0.1,
-        0.9,
-        7,
-        0.42329999804496765,
-        "arms",
-        "How far to the front the arms bow.",
-        "handles_state > 0",
-    ),
-    continuous("handles_mid_pos_z_pct", 0.0, 1.0, 7, 0.5, "arms", "How far the arms sag or rise.", "handles_state > 0"),
-    continuous(
-        "handles_edge_pos_x_pct",
-        0.0,
-        1.0,
-        6,
-        0.0,
-        "arms",
-        "How far to the side the free ends of the arms are.",
-        "handles_state == 1",
+        "handles_edge_pos_x_pct", 0, 1, 6, 0.0, "arms", "How far to the side the free ends of the arms are.", FREE_ARMS
     ),
     continuous(
         "handles_bottom_pos_along_seat_pct",
@@ -226,22 +174,15 @@ PARAMETERS = (
         "handles_state == 2 or (handles_state == 1 and is_handles_support == 1)",
     ),
     continuous(
-        "handles_support_mid_x",
-        0.0,
-        1.0,
-        6,
-        0.5800000429153442,
-        "arms",
-        "How far supports bow to the sides.",
-        WITH_SUPPORTS,
+        "handles_support_mid_x", 0.0, 1.0, 6, 0.5800000429153442, "arms", "How far supports bow to the sides.", SUPPORT
     ),
-    continuous("handles_support_mid_y", 0.0, 1.0, 6, 0.0, "arms", "How far supports bow to the front.", WITH_SUPPORTS),
-    continuous("handles_support_top_pos", 0.3, 0.9, 7, 0.5, "arms", "Where supports meet the arms.", WITH_SUPPORTS),
-    continuous("handles_support_thickness", 0.4, 0.9, 7, 0.8167, "arms", "Thickness of the supports.", WITH_SUPPORTS),
+    continuous("handles_support_mid_y", 0.0, 1.0, 6, 0.0, "arms", "How far supports bow to the front.", SUPPORT),
+    continuous("handles_support_top_pos", 0.3, 0.9, 7, 0.5, "arms", "Where supports meet the arms.", SUPPORT),
+    continuous("handles_support_thickness", 0.4, 0.9, 7, 0.8167, "arms", "Thickness of the supports.", SUPPORT),
     continuous(
         "handles_cusion_cover_pct",
-        0.0,
-        1.0,
+        0,
+        1,
         6,
         1.0,
         "arms",

@@ -20,12 +20,12 @@ def build(values: Values) -> list[Part]:
     return [top, *(pedestal_parts(table) if values["is_monoleg"] else leg_parts(table))]
 
 
-WITH_LEGS = "(is_monoleg and is_monoleg_tent) or (not is_monoleg)"
-WITH_FOUR_LEGS = "not is_monoleg"
-WITH_RAILS_X = "(not is_monoleg) and is_std_legs_support_x"
-WITH_RAILS_Y = "(not is_monoleg) and is_std_legs_support_y"
-WITH_TENT = "is_monoleg and is_monoleg_tent"
-WITH_PEDESTAL = "is_monoleg and (not is_monoleg_tent or monoleg_tent_pct < 0.4)"
+LEGS = "(is_monoleg and is_monoleg_tent) or (not is_monoleg)"
+FOUR_LEGS = "not is_monoleg"
+RAILS_X = "(not is_monoleg) and is_std_legs_support_x"
+RAILS_Y = "(not is_monoleg) and is_std_legs_support_y"
+TENT = "is_monoleg and is_monoleg_tent"
+PEDESTAL = "is_monoleg and (not is_monoleg_tent or monoleg_tent_pct < 0.4)"
 
 PARAMETERS = (
     continuous("table_top_scale_x", 0.6, 2.6, 12, 2.6, "top", "Width of the top; 1 is 0.6 metres."),
@@ -37,76 +37,42 @@ PARAMETERS = (
     continuous(
         "table_top_profile_strength", 0, 1, 6, 0, "top", "How deep the edge is cut.", "table_top_profile_state > 0"
     ),
-    continuous("legs_shape_1", 0, 1, 3, 1, "leg_shape", "Thickness of the legs at the ground.", WITH_LEGS),
-    continuous("legs_shape_2", 0, 1, 3, 1, "leg_shape", "Thickness of the legs halfway down.", WITH_LEGS),
-    continuous("legs_bevel", 0, 1, 3, 0, "leg_shape", "Section of the legs, from square to round.", WITH_LEGS),
-    continuous("std_legs_bottom_offset_y", 0, 1, 6, 1, "legs", "How far out the feet stand.", WITH_FOUR_LEGS),
+    continuous("legs_shape_1", 0, 1, 3, 1, "leg_shape", "Thickness of the legs at the ground.", LEGS),
+    continuous("legs_shape_2", 0, 1, 3, 1, "leg_shape", "Thickness of the legs halfway down.", LEGS),
+    continuous("legs_bevel", 0, 1, 3, 0, "leg_shape", "Section of the legs, from square to round.", LEGS),
+    continuous("std_legs_bottom_offset_y", 0, 1, 6, 1, "legs", "How far out the feet stand.", FOUR_LEGS),
+    continuous("std_legs_mid_offset_y", 0, 1, 6, 0, "legs", "How far the legs bend inwards halfway down.", FOUR_LEGS),
+    continuous("std_legs_top_offset_x", 0, 1, 6, 0.27, "legs", "How far from the short sides legs begin.", FOUR_LEGS),
+    continuous("std_legs_top_offset_y", 0, 1, 6, 0, "legs", "How far from the long sides legs begin.", FOUR_LEGS),
     continuous(
-        "std_legs_mid_offset_y", 0, 1, 6, 0, "legs", "How far the legs bend inwards halfway down.", WITH_FOUR_LEGS
+        "std_legs_rotation", 0, 1, 6, 0, "legs", "Turns legs from splaying front and back to sideways.", FOUR_LEGS
     ),
-    continuous(
-        "std_legs_top_offset_x", 0, 1, 6, 0.27, "legs", "How far from the short sides legs begin.", WITH_FOUR_LEGS
-    ),
-    continuous("std_legs_top_offset_y", 0, 1, 6, 0, "legs", "How far from the long sides legs begin.", WITH_FOUR_LEGS),
-    continuous(
-        "std_legs_rotation", 0, 1, 6, 0, "legs", "Turns legs from splaying front and back to sideways.", WITH_FOUR_LEGS
-    ),
-    binary("is_std_legs_support_x", True, "support_x", "Whether rails join left and right legs.", WITH_FOUR_LEGS),
-    continuous("std_legs_support_x_height", 0, 1, 6, 0.72, "support_x", "Height of these rails.", WITH_RAILS_X),
-    continuous("std_legs_support_x_curvature", 0, 1, 6, 0, "support_x", "How high they arch.", WITH_RAILS_X),
-    continuous("std_legs_support_x_profile_width", 0, 1, 5, 1, "support_x", "How thick they are.", WITH_RAILS_X),
-    continuous("std_legs_support_x_profile_height", 0, 1, 5, 0.27, "support_x", "How tall they are.", WITH_RAILS_X),
-    binary("is_std_legs_support_y", True, "support_y", "Whether rails join front and back legs.", WITH_FOUR_LEGS),
-    continuous("std_legs_support_y_height", 0, 1, 6, 0.36, "support_y", "Height of these rails.", WITH_RAILS_Y),
-    continuous("std_legs_support_y_curvature", 0, 1, 6, 0, "support_y", "How high they arch.", WITH_RAILS_Y),
-    continuous("std_legs_support_y_profile_width", 0, 1, 5, 1, "support_y", "How thick they are.", WITH_RAILS_Y),
-    continuous("std_legs_support_y_profile_height", 0, 1, 5, 1, "support_y", "How tall they are.", WITH_RAILS_Y),
+    binary("is_std_legs_support_x", True, "support_x", "Whether rails join left and right legs.", FOUR_LEGS),
+    continuous("std_legs_support_x_height", 0, 1, 6, 0.72, "support_x", "Height of these rails.", RAILS_X),
+    continuous("std_legs_support_x_curvature", 0, 1, 6, 0, "support_x", "How high they arch.", RAILS_X),
+    continuous("std_legs_support_x_profile_width", 0, 1, 5, 1, "support_x", "How thick they are.", RAILS_X),
+    continuous("std_legs_support_x_profile_height", 0, 1, 5, 0.27, "support_x", "How tall they are.", RAILS_X),
+    binary("is_std_legs_support_y", True, "support_y", "Whether rails join front and back legs.", FOUR_LEGS),
+    continuous("std_legs_support_y_height", 0, 1, 6, 0.36, "support_y", "Height of these rails.", RAILS_Y),
+    continuous("std_legs_support_y_curvature", 0, 1, 6, 0, "support_y", "How high they arch.", RAILS_Y),
+    continuous("std_legs_support_y_profile_width", 0, 1, 5, 1, "support_y", "How thick they are.", RAILS_Y),
+    continuous("std_legs_support_y_profile_height", 0, 1, 5, 1, "support_y", "How tall they are.", RAILS_Y),
     binary("is_monoleg", False, "foot", "Whether the table stands on one foot in its middle."),
     binary("is_monoleg_tent", True, "foot", "Whether that foot is a column on a tent of legs.", "is_monoleg"),
+    continuous("monoleg_tent_pct", 0.2, 0.8, 7, 0.665, "foot", "Height of the tent, as a share of the foot's.", TENT),
+    continuous("monoleg_tent_base_radius", 0, 1, 11, 0, "foot", "How far the legs of the tent reach.", TENT),
+    discrete("monoleg_tent_count", 3, 8, 5, "foot", "Number of legs of the tent.", TENT),
     continuous(
-        "monoleg_tent_pct", 0.2, 0.8, 7, 0.665, "foot", "Height of the tent, as a share of the foot's.", WITH_TENT
-    ),
-    continuous("monoleg_tent_base_radius", 0, 1, 11, 0, "foot", "How far the legs of the tent reach.", WITH_TENT),
-    discrete("monoleg_tent_count", 3, 8, 5, "foot", "Number of legs of the tent.", WITH_TENT),
-    continuous(
-        "monoleg_bezier_start_x_offset",
-        0,
-        1,
-        6,
-        0.5273,
-        "pedestal",
-        "Radius of the pedestal at its top.",
-        WITH_PEDESTAL,
+        "monoleg_bezier_start_x_offset", 0, 1, 6, 0.5273, "pedestal", "Radius of the pedestal at its top.", PEDESTAL
     ),
     continuous(
-        "monoleg_bezier_start_handle_x_offset",
-        0,
-        1,
-        6,
-        1,
-        "pedestal",
-        "Radius that its upper part turns to.",
-        WITH_PEDESTAL,
+        "monoleg_bezier_start_handle_x_offset", 0, 1, 6, 1, "pedestal", "Radius that its upper part turns to.", PEDESTAL
     ),
     continuous(
-        "monoleg_bezier_start_handle_z_pct",
-        0,
-        1,
-        6,
-        0.46,
-        "pedestal",
-        "How far down its upper part reaches.",
-        WITH_PEDESTAL,
+        "monoleg_bezier_start_handle_z_pct", 0, 1, 6, 0.46, "pedestal", "How far down its upper part reaches.", PEDESTAL
     ),
     continuous(
-        "monoleg_bezier_end_x_offset",
-        0.2,
-        1,
-        5,
-        0.25,
-        "pedestal",
-        "Radius of the pedestal at the ground.",
-        WITH_PEDESTAL,
+        "monoleg_bezier_end_x_offset", 0.2, 1, 5, 0.25, "pedestal", "Radius of the pedestal at the ground.", PEDESTAL
     ),
     continuous(
         "monoleg_bezier_end_handle_x_offset",
@@ -116,17 +82,10 @@ PARAMETERS = (
         0.11,
         "pedestal",
         "Radius that its lower part turns to.",
-        WITH_PEDESTAL,
+        PEDESTAL,
     ),
     continuous(
-        "monoleg_bezier_end_handle_z_pct",
-        0,
-        1,
-        6,
-        0.21,
-        "pedestal",
-        "How far down its lower part begins.",
-        WITH_PEDESTAL,
+        "monoleg_bezier_end_handle_z_pct", 0, 1, 6, 0.21, "pedestal", "How far down its lower part begins.", PEDESTAL
     ),
 )
 

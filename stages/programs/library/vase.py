@@ -23,7 +23,9 @@ MIN_WALL_THICKNESS = 0.008
 NECK_HEIGHT_PER_THICKNESS = 1.5
 """Additional height of a neck for additional thickness of its wall."""
 
-WITH_CLOSED_HANDLES, WITH_FREE_HANDLES = "handle_count > 0 and hndl_type == 1", "handle_count > 0 and hndl_type == 2"
+HANDLES = "handle_count > 0"
+NECK = "has_neck"
+CLOSED, FREE = "handle_count > 0 and hndl_type == 1", "handle_count > 0 and hndl_type == 2"
 
 
 def build(values: Values) -> Sequence[Part]:
@@ -158,99 +160,63 @@ PROGRAM = Program(
             visible_if="has_body_thickness and not has_lid",
         ),
         discrete("handle_count", 0, 6, 5, "handles", "Number of handles, evenly around the body."),
-        discrete(
-            "hndl_type", 1, 2, 2, "handles", "1: both ends on the body; 2: the upper end free.", "handle_count > 0"
-        ),
-        continuous("hndl_profile_width", 0.0, 1.0, 6, 1.0, "handles", "Width of a handle.", "handle_count > 0"),
-        continuous("hndl_profile_height", 0.0, 1.0, 6, 0.2, "handles", "Thickness of a handle.", "handle_count > 0"),
+        discrete("hndl_type", 1, 2, 2, "handles", "1: both ends on the body; 2: the upper end free.", HANDLES),
+        continuous("hndl_profile_width", 0.0, 1.0, 6, 1.0, "handles", "Width of a handle.", HANDLES),
+        continuous("hndl_profile_height", 0.0, 1.0, 6, 0.2, "handles", "Thickness of a handle.", HANDLES),
         continuous(
-            "hndl_profile_blend",
-            0.0,
-            1.0,
-            6,
-            0.8,
-            "handles",
-            "Profile: from a square strap to a round cord.",
-            "handle_count > 0",
+            "hndl_profile_blend", 0, 1, 6, 0.8, "handles", "Profile: from a square strap to a round cord.", HANDLES
         ),
-        continuous(
-            "hndl_base_z", 0.1, 0.6, 6, 0.47, "handles", "How high up the body a handle starts.", "handle_count > 0"
-        ),
+        continuous("hndl_base_z", 0.1, 0.6, 6, 0.47, "handles", "How high up the body a handle starts.", HANDLES),
         continuous(
             "hndl_base_bezier_handle_angle",
-            0.0,
-            1.0,
+            0,
+            1,
             11,
             0.4,
             "handles",
             "Where a handle heads at its start: from downwards to upwards.",
-            "handle_count > 0",
+            HANDLES,
         ),
         continuous(
-            "hndl_base_bezier_handle_length",
-            0.0,
-            1.0,
-            6,
-            0.2,
-            "handles",
-            "How far a handle goes that way.",
-            "handle_count > 0",
+            "hndl_base_bezier_handle_length", 0, 1, 6, 0.2, "handles", "How far a handle goes that way.", HANDLES
         ),
         continuous(
             "hndl_radius_along_path",
-            0.0,
-            1.0,
+            0,
+            1,
             11,
             0.0,
             "handles",
             "Girth half-way along a handle: from slim to swollen.",
-            "handle_count > 0",
+            HANDLES,
         ),
         continuous(
-            "hndl1_top_z",
-            0.2,
-            0.8,
-            7,
-            0.5,
-            "handles",
-            "How high above its start a handle of type 1 ends.",
-            WITH_CLOSED_HANDLES,
+            "hndl1_top_z", 0.2, 0.8, 7, 0.5, "handles", "How high above its start a handle of type 1 ends.", CLOSED
         ),
         continuous(
             "hndl1_end_bezier_handle_angle",
-            0.0,
-            1.0,
+            0,
+            1,
             11,
             0.2,
             "handles",
             "Where a handle of type 1 comes from at its end: from below to above.",
-            WITH_CLOSED_HANDLES,
+            CLOSED,
         ),
         continuous(
             "hndl1_end_bezier_handle_length",
-            0.0,
-            1.0,
+            0,
+            1,
             6,
             0.6,
             "handles",
             "From how far a handle of type 1 comes that way.",
-            WITH_CLOSED_HANDLES,
+            CLOSED,
         ),
+        continuous("hndl2_end_x", 0.0, 1.0, 11, 0.0, "handles", "How far from the wall the free end is.", FREE),
+        continuous("hndl2_end_z", 0.0, 1.0, 11, 0.41, "handles", "How high above its start the free end is.", FREE),
         continuous(
-            "hndl2_end_x", 0.0, 1.0, 11, 0.0, "handles", "How far from the wall the free end is.", WITH_FREE_HANDLES
-        ),
-        continuous(
-            "hndl2_end_z", 0.0, 1.0, 11, 0.41, "handles", "How high above its start the free end is.", WITH_FREE_HANDLES
-        ),
-        continuous(
-            "hndl2_end_bezier_handle_x",
-            0.0,
-            1.0,
-            11,
-            0.0,
-            "handles",
-            "How far out it comes to the free end.",
-            WITH_FREE_HANDLES,
+            "hndl2_end_bezier_handle_x", 0.0, 1.0, 11, 0.0, "handles", "How far out it comes to the free end.", FREE
         ),
         continuous(
             "hndl2_end_bezier_handle_z",
@@ -260,30 +226,30 @@ PROGRAM = Program(
             0.2,
             "handles",
             "From how high it comes to the free end: from below to above it.",
-            WITH_FREE_HANDLES,
+            FREE,
         ),
         binary("has_neck", True, "neck", "Whether the body has a neck."),
-        continuous("neck_end_x", 0.1, 1.0, 10, 0.8, "neck", "Width of the opening of the neck.", "has_neck"),
-        continuous("neck_end_z", 0.0, 1.0, 11, 0.8, "neck", "Height of the neck.", "has_neck"),
+        continuous("neck_end_x", 0.1, 1.0, 10, 0.8, "neck", "Width of the opening of the neck.", NECK),
+        continuous("neck_end_z", 0.0, 1.0, 11, 0.8, "neck", "Height of the neck.", NECK),
         continuous(
             "neck_end_bezier_handle_x",
-            0.0,
-            1.0,
+            0,
+            1,
             11,
             0.8,
             "neck",
             "Width of the neck where it is narrowest or widest: from a waist to a bulge.",
-            "has_neck",
+            NECK,
         ),
         continuous(
             "neck_end_bezier_handle_z",
-            0.0,
-            1.0,
+            0,
+            1,
             11,
             0.0,
             "neck",
             "How far below the lip that is: from a spread lip to an even one.",
-            "has_neck",
+            NECK,
         ),
         binary("has_base", True, "base", "Whether the body has a foot."),
         continuous("base_start_x", 0.0, 1.0, 11, 0.7, "base", "Width of the foot on the ground.", "has_base"),

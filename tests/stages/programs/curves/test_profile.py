@@ -7,15 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stages.programs.curves import (
-    Profile,
-    circle,
-    polygon,
-    rectangle,
-    rounded_rectangle,
-    square_circle,
-    superellipse,
-)
+from stages.programs.curves import Profile, circle, polygon, rectangle, rounded_rectangle, square_circle, superellipse
 from tests.stages.programs.curves.blocks import ELL, STAR
 
 
