@@ -1,4 +1,4 @@
-"""Workers on other machines: a cluster of dask.distributed, of which the engine uses little.
+"""Workers on other machines: a cluster of dask.distributed.
 
 Each shard is sent to one idle worker, so that a worker that disappears fails one shard. The shard is made there in a
 process of its own with the same environment as here (`pipeline/workers.py`): its bytes are the same, and a crash
@@ -53,7 +53,7 @@ class ClusterWorkers:
         return bool(self._idle())
 
     def submit(self, job: Job) -> None:
-        """Start a job on an idle worker. Raises IndexError when there is none."""
+        """Start a job on an idle worker. Raises IndexError without one."""
         address = self._idle()[0]
         future = self._connected().submit(
             *(_make_here, job, self._connected().id),

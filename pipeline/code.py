@@ -166,7 +166,7 @@ def _reader() -> bytes:
 
 
 def read_note(file: str, subject: str, key: str) -> dict[str, Any] | None:
-    """The note that `write_note` left beside Python's own compiled files under the same key; None without one.
+    """Return the note that `write_note` left under the same key, next to Python's compiled files; None without one.
 
     Parsing all sources takes most of a second, and every start of a stage and every worker needs the result.
     """

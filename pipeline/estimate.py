@@ -99,8 +99,8 @@ def _estimate(
         stage=name,
         shards=costs.shards + costs.other_shards,
         samples=costs.samples,
-        size=costs.samples * costs.bytes_each + costs.bytes_once,
-        seconds=costs.samples * costs.seconds_each + costs.seconds_once,
+        size=costs.samples * costs.bytes_per_sample + costs.bytes_once,
+        seconds=costs.samples * costs.seconds_per_sample + costs.seconds_once,
         warm_up=costs.warm_up,
     )
     if inventory.complete(name) or not costs.samples or producer not in upstream(stages, name):
@@ -115,8 +115,8 @@ def _estimate(
         stage=name,
         shards=len(wanted) + (0 if name == producer else costs.other_shards),
         samples=samples,
-        size=samples * costs.bytes_each + once * costs.bytes_once,
-        seconds=samples * costs.seconds_each + once * costs.seconds_once,
+        size=samples * costs.bytes_per_sample + once * costs.bytes_once,
+        seconds=samples * costs.seconds_per_sample + once * costs.seconds_once,
         warm_up=costs.warm_up,
         grows=name == producer and costs.other_shards > 0,
     )

@@ -34,7 +34,7 @@ class Progress:
     planned: number of shards planned so far
     done: number of finished shards, plus the finished fractions of running ones
     failed: number of quarantined shards
-    work: number of samples that planned shards will hold, where the plan says so; else 0
+    work: number of samples that planned shards will hold, by the plan, where known; else 0
     worked: number of those samples that are made, running shards included
     samples: number of samples in finished shards
     rejects: number of items that finished shards refused

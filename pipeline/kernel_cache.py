@@ -1,10 +1,10 @@
-"""Cache of compiled kernels, addressed by content: checkouts with equal sources share it, in any folder.
+"""Cache of compiled kernels, addressed by content and shared by all checkouts with equal sources.
 
-Numba's own cache hangs on the path and the bytes of a kernel's file, and does not notice an edited callee in another
-file. Here the key of a kernel digests what its code reaches: the functions, classes and constants that it names,
-theirs in turn, across the project's modules, without comments, docstrings and formatting. The file of an entry also
-depends on the types of the arguments (classes and fields of named tuples included), on Python, on Numba and on the CPU.
-So each file has one possible content, and concurrent processes cannot mix their entries.
+Numba's own cache depends on the path and the bytes of a kernel's file, and misses edits of callees in other files. Here
+the key of a kernel is a digest of the functions, classes and constants that it reaches in the project's modules,
+without comments, docstrings and formatting. The file name of an entry also depends on the argument types (with classes
+and fields of named tuples), on Python, Numba and the CPU. So each file has one possible content, and concurrent
+processes cannot mix their entries.
 
 `stages/__init__.py` names `KernelLocator` to Numba in the environment; Numba imports it with the first cached kernel.
 """
@@ -30,14 +30,14 @@ from numba.core import caching, sigutils, types
 from pipeline.code import SourceTree, absolute_name, code_words, is_prose, read_note, write_note
 
 UNUSED_DAYS = 30
-"""Entries that no process has loaded for this long are deleted."""
+"""Entries that no process loads for this long are deleted."""
 
 _DAY_SECONDS = 86_400.0
 _PACKAGES = ("pipeline", "stages", "eval")
 
 
 class KernelLocator(caching._CacheLocator):  # type: ignore[misc]
-    """Says to Numba where the compiled code of a function of the project belongs."""
+    """Tells Numba where to keep the compiled code of a function of the project."""
 
     def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
         self._py_file = py_file
@@ -54,14 +54,14 @@ class KernelLocator(caching._CacheLocator):  # type: ignore[misc]
 
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> KernelLocator | None:
-        """A locator for a function of the project; None for others, which keep Numba's own."""
+        """Return a locator for a function of the project; None for others, which keep Numba's own."""
         return cls(py_func, py_file) if _file(py_func.__module__) == Path(py_file) else None
 
 
 def kernel_folder() -> Path:
-    """The folder of compiled kernels: NUMBA_CACHE_DIR, or `shapemill/kernels` in the user's cache.
+    """Return the folder of compiled kernels: NUMBA_CACHE_DIR, or `shapemill/kernels` in the user's cache.
 
-    Where that cannot be written, it is in the source tree, else a temporary folder that ends with the process.
+    Where that cannot be written, it is in the source tree, else a temporary folder that is deleted at exit.
     """
     if folder := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(folder)
@@ -84,7 +84,7 @@ def _default_folder() -> Path:
 
 
 def _prune(folder: Path, now: float) -> None:
-    """Delete what was not used for UNUSED_DAYS; looks once a day."""
+    """Delete entries unused for UNUSED_DAYS, at most once a day."""
     stamp = folder / ".pruned"
     with suppress(OSError):
         if now - stamp.stat().st_mtime < _DAY_SECONDS:
@@ -100,18 +100,18 @@ def _prune(folder: Path, now: float) -> None:
 
 
 def _entry(store: caching.FunctionCache, signature: Any, codegen: Any) -> caching.IndexDataCacheFile:
-    """The index and data files for one signature on one CPU."""
+    """Return the index and data files for one signature on one CPU."""
     arguments, _ = sigutils.normalize_signature(signature)
-    said = repr((numba.__version__, codegen.magic_tuple(), [_type_words(argument) for argument in arguments]))
-    base = f"{store._impl.filename_base}.{hashlib.sha256(said.encode()).hexdigest()[:16]}"
+    words = repr((numba.__version__, codegen.magic_tuple(), [_type_words(argument) for argument in arguments]))
+    base = f"{store._impl.filename_base}.{hashlib.sha256(words.encode()).hexdigest()[:16]}"
     return caching.IndexDataCacheFile(store.cache_path, base, store._impl.locator.get_source_stamp())
 
 
 def _type_words(argument: Any) -> Any:
-    """What compiled code can depend on in a type; Numba's name of a named tuple leaves out module and fields."""
+    """Return everything in a type that code depends on; Numba's name of a named tuple lacks module and fields."""
     if isinstance(argument, types.BaseTuple):
-        of = getattr(argument, "instance_class", None)
-        layout = (of.__module__, of.__qualname__, argument.fields) if of else ()
+        kind = getattr(argument, "instance_class", None)
+        layout = (kind.__module__, kind.__qualname__, argument.fields) if kind else ()
         return (*layout, [_type_words(item) for item in argument.types])
     if isinstance(argument, types.Dispatcher):
         function = argument.dispatcher.py_func
@@ -130,7 +130,7 @@ def _load(store: caching.FunctionCache, signature: Any, context: Any) -> Any:
             for used in index.parent.glob(f"{index.stem}*"):
                 os.utime(used)
         return compiled
-    except Exception:  # a corrupted entry, which can raise anything: it is compiled again
+    except Exception:  # a corrupted entry can raise anything; the kernel is compiled again
         index.unlink(missing_ok=True)
         return None
 
@@ -166,7 +166,7 @@ class _Statement(NamedTuple):
 
 @cache
 def kernel_key(module: str, name: str) -> str:
-    """A digest of the code that the function `name` of a module reaches."""
+    """Return a digest of the code that a function of a module reaches."""
     reached: set[tuple[str, str]] = set()
     waiting: list[tuple[str, str]] = [(module, name)]
     seen = {("", "")}
@@ -190,7 +190,7 @@ def kernel_key(module: str, name: str) -> str:
 
 @cache
 def _target(dotted: str) -> tuple[str, str]:
-    """Module and name of what an import names; `*`, all names, for a module itself; nothing outside the project."""
+    """Return module and name of an import target: `*` for a whole module, nothing outside the project."""
     if _file(dotted) is not None:
         return dotted, "*"
     module, _, name = dotted.rpartition(".")
@@ -209,7 +209,7 @@ def _tree() -> SourceTree:
 
 @cache
 def _statements(module: str) -> dict[str, list[_Statement]]:
-    """The statements of a module's top level by the names that they bind, and all of them under `*`."""
+    """Return the statements of a module's top level by the names that they bind, and all of them under `*`."""
     file = _file(module)
     if file is None:
         return {}
@@ -221,7 +221,7 @@ def _statements(module: str) -> dict[str, list[_Statement]]:
 
 
 def _read(file: Path, package: str) -> list[_Statement]:
-    """The statements of a file, from a note beside Python's compiled files where there is one."""
+    """Return the statements of a file, from a note next to Python's compiled files where there is one."""
     source = file.read_bytes()
     key = hashlib.sha256(_own_source() + source).hexdigest()
     note = read_note(str(file), "kernels", key)
@@ -240,7 +240,7 @@ def _own_source() -> bytes:
 
 
 def _parsed(node: ast.stmt, package: str) -> Iterator[_Statement]:
-    """A statement; one that only imports is one without digest."""
+    """Yield a statement; one that only imports has no digest."""
     if isinstance(node, ast.Import | ast.ImportFrom):
         imports = list(_imports(node, package))
         yield _Statement([bound for bound, _ in imports], [], imports, "")
@@ -256,7 +256,7 @@ def _parsed(node: ast.stmt, package: str) -> Iterator[_Statement]:
     ]
     if isinstance(node, ast.FunctionDef | ast.ClassDef):
         binds = {node.name}
-    elif isinstance(node, ast.Expr):  # a call may change what it is given
+    elif isinstance(node, ast.Expr):  # a call may change its arguments
         binds = loads
     else:
         binds = {item.id for item in names if isinstance(item.ctx, ast.Store)}
@@ -283,7 +283,7 @@ def _stores(node: ast.Subscript | ast.Attribute) -> bool:
 
 
 def _root(node: ast.expr) -> str:
-    """The name at the base of `name.field[index]`."""
+    """Return the name at the base of `name.field[index]`."""
     while isinstance(node, ast.Subscript | ast.Attribute):
         node = node.value
     return node.id if isinstance(node, ast.Name) else ""

@@ -1,14 +1,14 @@
-"""What commands share: options, panels of `shapemill --help`, and the dataset that `--config` and `--out` name.
+"""Shared by commands: options, panels of `shapemill --help`, and loading the dataset of `--config` and `--out`.
 
-A room adds commands by a file `commands.py` that holds `COMMANDS = typer.Typer()`: each `@COMMANDS.command()` becomes
-a command of `shapemill`, and a Typer with a name a group of commands. It imports what is heavy inside its functions.
+A room adds commands by a file `commands.py` with `COMMANDS = typer.Typer()`: each `@COMMANDS.command()` becomes a
+command of `shapemill`, and a Typer with a name becomes a group. Heavy imports belong inside its functions.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -39,9 +39,6 @@ StallOption = Annotated[
 ]
 ClusterOption = Annotated[str, typer.Option("--cluster", help="scheduler whose workers make the shards: tcp://...")]
 
-PASS_ON = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
-"""Settings of a command that reads its arguments itself."""
-
 
 def load_dataset(
     context: typer.Context, config: Path, out: Path, seed: int | None = None
@@ -53,15 +50,6 @@ def load_dataset(
     for stage in stages.values():
         stage.check(loaded)
     return stages, loaded, DatasetPaths(out, loaded.name)
-
-
-def forward(commands: typer.Typer, name: str, panel: str, text: str, main: Callable[[list[str]], int]) -> None:
-    """Add a command that hands all its arguments to `main` and exits with its code."""
-
-    def command(context: typer.Context) -> None:
-        raise typer.Exit(main(context.args))
-
-    commands.command(name, help=text, rich_help_panel=panel, context_settings=PASS_ON)(command)
 
 
 def run_stages(

@@ -137,7 +137,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a small file completely or not at all, even if the power fails."""
+    """Write a small file completely or never, even if the power fails."""
     temporary = temporary_path(path)
     try:
         with open(temporary, "wb") as stream:

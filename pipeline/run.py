@@ -151,7 +151,7 @@ class _Run:
         return self._result
 
     def _prune(self) -> None:
-        """Prune intermediate files after the last stage, where the config says so."""
+        """Prune intermediate files after the last stage, if the config asks for it."""
         last = not any(self._name in stage.inputs for stage in self._stages.values())
         if last and self._inventory.config.keep == "dataset" and not self._stages[self._name].publishes_incomplete:
             freed = prune_inputs(self._inventory, self._stages, self._name)
@@ -194,7 +194,7 @@ class _Run:
         return [shard for index, shard in enumerate(state.shards) if index in self._part and shard.name in wanted]
 
     def _wanted(self, state: StageInventory) -> set[str]:
-        """Return the requested shards and those that they read. Raises ConfigError where there are none."""
+        """Return the requested shards and those that they read. Raises ConfigError without any."""
         names = [shard.name for shard in state.shards]
         wanted = {name for name in names if not self._only or f"{name}-".startswith(f"{self._only}-")}
         if not wanted and names:

@@ -22,7 +22,7 @@ class Costs:
     """Measured cost of a stage.
 
     samples: number of samples measured
-    seconds_each, bytes_each: cost of a sample
+    seconds_per_sample, bytes_per_sample: cost of a sample
     shards: number of measured shards with samples
     other_shards: number of measured shards without samples
     seconds_once, bytes_once: cost of the shards without samples
@@ -30,8 +30,8 @@ class Costs:
     """
 
     samples: int
-    seconds_each: float
-    bytes_each: float
+    seconds_per_sample: float
+    bytes_per_sample: float
     shards: int
     other_shards: int
     seconds_once: float
@@ -73,8 +73,8 @@ def costs_of(state: StageInventory, seconds: Mapping[str, float], warm_up: float
     samples = sum(record.samples for record in own.values())
     return Costs(
         samples=samples,
-        seconds_each=sum(seconds[name] for name in own) / max(samples, 1),
-        bytes_each=sum(record.bytes_on_disk() for record in own.values()) / max(samples, 1),
+        seconds_per_sample=sum(seconds[name] for name in own) / max(samples, 1),
+        bytes_per_sample=sum(record.bytes_on_disk() for record in own.values()) / max(samples, 1),
         shards=len(own),
         other_shards=len(other),
         seconds_once=sum(seconds[name] for name in other),

@@ -65,7 +65,7 @@ def read_yaml(path: Path) -> tuple[Mapping[str, Any], Mapping[KeyPath, int]]:
         where = f"{path}:{mark.line + 1}" if mark is not None else f"{path}"
         raise ConfigError(f"{where}: is no YAML: {error.problem or error.context}") from error
     except (yaml.YAMLError, ValueError):
-        raise ConfigError(f"{path}: is no YAML: it holds a character or a number that is none") from None
+        raise ConfigError(f"{path}: is no YAML: it holds an invalid character or number") from None
     finally:
         loader.dispose()
 

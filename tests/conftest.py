@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-# As in workers of the mill: with several threads on a busy machine LAPACK is a hundred times slower. Before numpy is
+# As in workers of the engine: with several threads on a busy machine LAPACK is a hundred times slower. Before numpy is
 # imported; torch heeds OMP.
 os.environ.update(dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"))
 

@@ -1,4 +1,4 @@
-"""The rules of the house, read from the source: which way imports run, what nobody uses, how files are called."""
+"""Architecture rules, checked on the source: direction of imports, randomness, types, names of files."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ ROOT = Path(__file__).resolve().parents[1]
 BANNED_NAMES = {"utils", "util", "helpers", "helper", "common", "misc"}
 
 GLOBAL_RANDOMNESS = {"default_rng", "Generator", "SeedSequence", "PCG64", "BitGenerator"}
-"""What `numpy.random` holds that keeps no global state."""
+"""Names of `numpy.random` without global state."""
 
 EXECUTING = {"pickle", "cloudpickle", "dill", "shelve", "marshal"}
-"""Modules that run what they read."""
+"""Modules that execute what they read."""
 
 CLOCKS = {"time.time", "time.time_ns", "datetime.now", "datetime.utcnow", "datetime.today", "date.today"}
 
@@ -31,12 +31,12 @@ def relative(path: Path) -> str:
 
 @cache
 def parsed(path: Path) -> ast.Module:
-    """What stands in a file, read once for all rules."""
+    """Parse a file, once for all rules."""
     return ast.parse(path.read_text())
 
 
 def imports(tree: ast.AST) -> Iterator[str]:
-    """Every module that a file imports, `from a import b` as both `a` and `a.b`."""
+    """Yield every imported module, `from a import b` as both `a` and `a.b`."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -47,19 +47,19 @@ def imports(tree: ast.AST) -> Iterator[str]:
 
 
 def calls(tree: ast.AST) -> Iterator[tuple[str, ast.Call]]:
-    """Every call, with the dotted name that is called."""
+    """Yield every call with its dotted name."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Call):
             yield ast.unparse(node.func), node
 
 
 def faults(rule: Callable[[Path], Iterator[str]], files: list[Path]) -> list[str]:
-    """What a rule finds in each of the files, with the file's name."""
+    """Return the findings of a rule in files, with the file names."""
     return [f"{relative(path)}: {fault}" for path in files for fault in rule(path)]
 
 
 def allowed(path: Path, module: str) -> bool:
-    """Whether the arrows of the house let the file `path` import `module`."""
+    """Whether a file may import a module."""
     target = module.split(".")
     if target[0] not in {"pipeline", "stages", "eval", "tests"}:
         return True
@@ -75,16 +75,16 @@ def allowed(path: Path, module: str) -> bool:
     return target[0] == "stages" and (place[1] != "shape" or target[1] == "shape")
 
 
-def against_the_way(path: Path) -> Iterator[str]:
+def forbidden_imports(path: Path) -> Iterator[str]:
     yield from (f"may not import {item}" for item in imports(parsed(path)) if not allowed(path, item))
 
 
-def test_imports_run_along_the_way_of_the_data() -> None:
+def test_imports_follow_the_data_flow() -> None:
     files = [path for path in CODE if path.parent != ROOT / "stages"]
-    assert faults(against_the_way, files) == []
+    assert faults(forbidden_imports, files) == []
 
 
-def test_folders_of_stages_do_not_import_each_other_in_a_circle() -> None:
+def test_rooms_do_not_import_in_a_circle() -> None:
     """Every folder may import those below it: the vocabulary is at the bottom; only verification imports package."""
     reads: dict[str, set[str]] = {}
     for path in CODE:
@@ -98,8 +98,8 @@ def test_folders_of_stages_do_not_import_each_other_in_a_circle() -> None:
     assert [room for room, read in reads.items() if "package" in read] == ["verification"]
 
 
-def uncertain(path: Path) -> Iterator[str]:
-    """What in a file takes bytes from the moment, the machine or a state that anybody changes."""
+def nondeterministic(path: Path) -> Iterator[str]:
+    """Yield uses of clocks, of the machine or of global state."""
     tree = parsed(path)
     yield from {item for item in imports(tree) if item.split(".")[0] in {"random", "uuid", "secrets"}}
     for name, call in calls(tree):
@@ -113,16 +113,16 @@ def uncertain(path: Path) -> Iterator[str]:
 
 
 def test_bytes_depend_on_no_global_randomness_no_clock_no_uuid() -> None:
-    assert faults(uncertain, CODE) == []
+    assert faults(nondeterministic, CODE) == []
 
 
-def test_bytes_depend_on_no_file_that_a_fingerprint_does_not_know() -> None:
+def test_stages_hold_only_files_that_fingerprints_cover() -> None:
     files = (path for path in (ROOT / "stages").rglob("*") if path.is_file() and "__pycache__" not in path.parts)
     assert {path.suffix for path in files} <= {".py", ".md"}, "pipeline/code.py digests Python alone"
 
 
 def executing(path: Path) -> Iterator[str]:
-    """What in a file would run what it reads."""
+    """Yield code that would execute what it reads."""
     tree = parsed(path)
     yield from {item for item in imports(tree) if item.split(".")[0] in EXECUTING}
     for name, call in calls(tree):
@@ -153,12 +153,12 @@ def defaulted_streams(path: Path) -> Iterator[str]:
                 yield f"line {node.lineno}"
 
 
-def test_random_streams_are_handed_in_and_never_a_default() -> None:
+def test_random_streams_are_arguments_without_default() -> None:
     assert faults(defaulted_streams, CODE) == []
 
 
 def kernels(tree: ast.Module) -> list[ast.FunctionDef]:
-    """The functions that numba compiles."""
+    """Return the functions that numba compiles."""
     return [
         node
         for node in tree.body
@@ -167,16 +167,16 @@ def kernels(tree: ast.Module) -> list[ast.FunctionDef]:
     ]
 
 
-def test_types_are_asked_for_everywhere_but_in_files_with_kernels() -> None:
+def test_untyped_definitions_are_allowed_only_in_files_with_kernels() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mypy"]
     assert settings["strict"]
-    spared = [setting["module"] for setting in settings["overrides"] if setting.get("disallow_untyped_defs") is False]
+    exempt = [setting["module"] for setting in settings["overrides"] if setting.get("disallow_untyped_defs") is False]
     files = [path for path in CODE if kernels(parsed(path))]
-    assert spared == [[relative(path).removesuffix(".py").replace("/", ".") for path in files]]
+    assert exempt == [[relative(path).removesuffix(".py").replace("/", ".") for path in files]]
 
 
 def untyped(path: Path) -> Iterator[str]:
-    """The functions of a file, but for kernels, that do not say all their types."""
+    """Yield the functions without all types, except kernels."""
     tree = parsed(path)
     compiled = kernels(tree)
     for node in ast.walk(tree):
@@ -189,23 +189,23 @@ def untyped(path: Path) -> Iterator[str]:
                 yield f"line {node.lineno}: {node.name} has {', '.join(without)} without a type"
 
 
-def test_every_function_but_kernels_says_its_types() -> None:
+def test_every_function_but_kernels_is_typed() -> None:
     assert faults(untyped, CODE) == []
 
 
 def misnamed(path: Path) -> Iterator[str]:
-    """What a file does not say in its name and its first lines."""
+    """Yield what is wrong with the name and the first lines of a file."""
     names = {path.stem, *path.relative_to(ROOT).parts} & BANNED_NAMES
     if names:
         yield f"is called {', '.join(names)}"
     text = path.read_text()
     if text and path in CODE and not ast.get_docstring(parsed(path)):
-        yield "a file begins with what it is for"
+        yield "has no docstring"
     if "import " in text and "from __future__ import annotations" not in text:
-        yield "has no annotations of the future"
+        yield "lacks `from __future__ import annotations`"
 
 
-def test_every_file_says_its_subject_in_its_name_and_its_first_line() -> None:
+def test_every_file_has_a_specific_name_and_a_docstring() -> None:
     assert faults(misnamed, ALL) == []
 
 
@@ -215,23 +215,23 @@ def test_every_stage_file_holds_the_stage_of_its_folder() -> None:
     folders = {path.parent.name for path in (ROOT / "stages").glob("*/stage.py")}
     stages = find_stages()
     assert set(stages) == folders
-    for place, stage in enumerate(stages.values()):
-        assert set(stage.inputs) <= set(list(stages)[:place]), "a stage comes after the stages that it reads"
+    for index, stage in enumerate(stages.values()):
+        assert set(stage.inputs) <= set(list(stages)[:index]), "a stage comes after the stages that it reads"
 
 
-def test_every_config_key_says_what_it_is() -> None:
+def test_every_config_key_has_a_description() -> None:
     from pipeline.config import DatasetFacts, StrictModel
     from pipeline.registry import find_stages
 
     models: list[type[StrictModel]] = [DatasetFacts, *(stage.config for stage in find_stages().values())]
     for model in models:
         schema = model.model_json_schema()
-        for described in [schema, *schema.get("$defs", {}).values()]:
-            for key, field in described.get("properties", {}).items():
-                assert field.get("description") or "$ref" in field, f"{described['title']}.{key} has no description"
+        for model_schema in [schema, *schema.get("$defs", {}).values()]:
+            for key, field in model_schema.get("properties", {}).items():
+                assert field.get("description") or "$ref" in field, f"{model_schema['title']}.{key} has no description"
 
 
-def test_pages_of_config_keys_are_what_the_models_say() -> None:
+def test_pages_of_config_keys_match_the_models() -> None:
     from pipeline.config_docs import outdated_pages
     from pipeline.registry import find_stages
 

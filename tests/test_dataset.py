@@ -103,7 +103,7 @@ def test_two_workers_make_the_same_folder(made: tuple[Path, Path]) -> None:
     assert digests(two) == digests(one)
 
 
-def test_a_kill_in_each_stage_and_another_go_make_the_same_folder(made: tuple[Path, Path]) -> None:
+def test_a_kill_in_every_stage_and_another_go_make_the_same_folder(made: tuple[Path, Path]) -> None:
     config, one = made
     killed = one.with_name("killed")
     alive = []

@@ -1,4 +1,4 @@
-"""Large datasets as the mill sees them: plans, records and `make status`, without any sample."""
+"""Large datasets in the engine: plans, records and `make status`, without samples."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STAGES = ("programs", "points", "sketches", "validity", "package")
 
 
 def dataset_of(samples: int, folder: Path) -> tuple[Config, Mapping[str, Stage]]:
-    """The config of a sweep of so many chairs."""
+    """Return the config of a dataset with that many chairs."""
     path, stages = folder / "big.yaml", find_stages()
     programs = {"program": "chair", "mode": "random", "random": {"samples": samples}}
     path.write_text(yaml.safe_dump({"name": "big", "programs": programs}))
@@ -40,8 +40,8 @@ def finish(surveyed: StageInventory) -> int:
 
 def record_of(surveyed: StageInventory, shard: Shard) -> ShardRecord:
     samples, split = int(shard.params.get("samples", 0)), shard.params.get("split")
-    told: dict[str, Any] = {"split": split, "samples": samples, "tried": samples, "backend": "none", "renderer": "none"}
-    told |= {"rooted": samples, "stable": samples, "path": f"{shard.name}.tar", "members": ["glb"], "bytes": 1}
+    rows: dict[str, Any] = {"split": split, "samples": samples, "tried": samples, "backend": "none", "renderer": "none"}
+    rows |= {"rooted": samples, "stable": samples, "path": f"{shard.name}.tar", "members": ["glb"], "bytes": 1}
     return ShardRecord(
         stage=surveyed.stage.name,
         shard=shard.name,
@@ -53,18 +53,18 @@ def record_of(surveyed: StageInventory, shard: Shard) -> ShardRecord:
         rejects={},
         seconds=1.0,
         peak_bytes=1,
-        summary=told,
+        summary=rows,
     )
 
 
 @pytest.mark.slow
-def test_status_of_a_hundred_thousand_samples_is_told_from_records_in_seconds(tmp_path: Path) -> None:
+def test_status_of_a_hundred_thousand_samples_is_read_from_records_in_seconds(tmp_path: Path) -> None:
     config, stages = dataset_of(100_000, tmp_path)
     places = DatasetPaths(tmp_path, config.name)
-    survey = Inventory(config, stages, places)
+    inventory = Inventory(config, stages, places)
     for name in STAGES:
-        while finish(survey.stage(name)):
-            survey.refresh(name)
+        while finish(inventory.stage(name)):
+            inventory.refresh(name)
     start = time.process_time()
     rows = {line.split()[0]: line.split() for line in status_lines(config, stages, places, 1)}
     assert time.process_time() - start < 5

@@ -11,7 +11,6 @@ from pipeline.paths import file_digest
 from pipeline.stage import Outcome, Task
 from stages.package.card import CardText, card, citation
 from stages.package.classes import count_classes, table_bytes
-from stages.package.croissant import croissant
 from stages.package.hashing import HashingStream
 from stages.package.index import column_kinds, read_rows, write_index
 from stages.package.layout import CARD, CHECKSUMS, CLASSES, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
@@ -38,6 +37,8 @@ def compose_dataset(task: Task) -> Outcome:
     preview: the shard with the preview picture
     software: versions of code and libraries
     """
+    from stages.package.croissant import croissant  # imports mlcroissant, which takes seconds
+
     params = task.shard.params
     shards, facts, members = params["shards"], params["facts"], params["members"]
     rows = read_rows(task.input("package", f"{shard['name']}.jsonl") for shard in shards)

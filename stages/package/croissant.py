@@ -1,64 +1,24 @@
-"""`croissant.json`: the dataset in Croissant 1.1 (MLCommons), for loaders that know no WebDataset.
+"""`croissant.json`: the dataset in Croissant 1.1 (MLCommons), for loaders that do not read WebDataset.
 
-Each member is a record set of its own, with the sample's key and the member's content. `samples` are the rows of the
-index, typed, with the split of each. `<member>-of-samples` joins the two. Measured with mlcroissant: it joins two
-sources and no more, and only fields of record sets (a file set in a tar is lost to a join when the tar has others);
-what lies in a tar it reads as it is, so fields of the JSON member cannot be had by their paths, nor arrays as arrays.
-An array is therefore declared twice: as text, the bytes of an `.npy` that come out, and by the type and shape of what
-they hold.
+Each member is a record set with the sample's key and the member's content. `samples` are the rows of the index, typed,
+with the split of each. `<member>-of-samples` joins the two. mlcroissant joins two sources at most, and only fields of
+record sets. It reads files in a tar as they are: fields of the JSON member and arrays cannot be addressed. So an array
+is declared twice: as text, the bytes of an `.npy`, and by the type and shape of its content.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from datetime import datetime
 from typing import Any
 
-from stages.package.layout import CLASSES
+import mlcroissant as mlc
 
-VOCABULARY = {
-    "@language": "en",
-    "@vocab": "https://schema.org/",
-    "arrayShape": "cr:arrayShape",
-    "citeAs": "cr:citeAs",
-    "column": "cr:column",
-    "conformsTo": "dct:conformsTo",
-    "containedIn": "cr:containedIn",
-    "cr": "http://mlcommons.org/croissant/",
-    "data": {"@id": "cr:data", "@type": "@json"},
-    "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
-    "dct": "http://purl.org/dc/terms/",
-    "description": {"@container": "@language"},
-    "equivalentProperty": "cr:equivalentProperty",
-    "examples": {"@id": "cr:examples", "@type": "@json"},
-    "extract": "cr:extract",
-    "field": "cr:field",
-    "fileObject": "cr:fileObject",
-    "fileProperty": "cr:fileProperty",
-    "fileSet": "cr:fileSet",
-    "format": "cr:format",
-    "includes": "cr:includes",
-    "isArray": "cr:isArray",
-    "isLiveDataset": "cr:isLiveDataset",
-    "jsonPath": "cr:jsonPath",
-    "key": "cr:key",
-    "md5": "cr:md5",
-    "name": {"@container": "@language"},
-    "parentField": "cr:parentField",
-    "path": "cr:path",
-    "rai": "http://mlcommons.org/croissant/RAI/",
-    "recordSet": "cr:recordSet",
-    "references": "cr:references",
-    "regex": "cr:regex",
-    "repeated": "cr:repeated",
-    "replace": "cr:replace",
-    "samplingRate": "cr:samplingRate",
-    "sc": "https://schema.org/",
-    "separator": "cr:separator",
-    "source": "cr:source",
-    "subField": "cr:subField",
-    "transform": "cr:transform",
-}
+from stages.package.layout import CLASSES, INDEX
 
+VERSION = "http://mlcommons.org/croissant/1.1"
+TERMS = {name: f"cr:{name}" for name in ("arrayShape", "containedIn", "isArray")}
+"""Terms of version 1.1 that mlcroissant leaves out of the context."""
 FORMATS = {
     "glb": "model/gltf-binary",
     "npy": "application/octet-stream",
@@ -69,8 +29,13 @@ FORMATS = {
 ELEMENTS = {"float32": "cr:Float32", "float64": "cr:Float64", "int16": "cr:Int16", "int32": "cr:Int32"}
 ELEMENTS |= {"uint8": "cr:UInt8"}
 KINDS = {"string": "sc:Text", "bool": "sc:Boolean", "int32": "sc:Integer", "int64": "sc:Integer", "float64": "sc:Float"}
-URLS = {"train": "cr:TrainingSplit", "val": "cr:ValidationSplit", "test": "cr:TestSplit"}
-INDEX = "index"
+SPLIT_URLS = {"train": "cr:TrainingSplit", "val": "cr:ValidationSplit", "test": "cr:TestSplit"}
+CLASS_FIELDS = {
+    "id": ("sc:Integer", "Label of points and class of parts."),
+    "name": ("sc:Text", "Part label."),
+    "kit": ("sc:Text", "Kit, program or category of the label."),
+    "color": ("sc:Text", "Display colour, sRGB."),
+}
 
 
 def croissant(
@@ -82,227 +47,189 @@ def croissant(
     origins: Sequence[Mapping[str, Any]],
     citation: str,
 ) -> dict[str, Any]:
-    """The document. `facts` has name, version, title, description, license, creator and published; `shards` are the
-    summaries of the package's shards; `members` has name, sentence, dtype and shape of each; `index` has path, bytes,
-    sha256 and columns (their Arrow types by name); `classes` has the sha256 of the file of that name; `origins` are
-    what the dataset was made from."""
-    splits = list(dict.fromkeys(str(shard["split"]) for shard in shards))
-    return {
-        "@context": VOCABULARY,
-        "@type": "sc:Dataset",
-        "conformsTo": "http://mlcommons.org/croissant/1.1",
-        "name": facts["name"],
-        "description": facts["description"],
-        "version": facts["version"],
-        "license": _license(str(facts["license"])),
-        "creator": {"@type": "sc:Organization", "name": facts["creator"]},
-        "datePublished": facts["published"],
-        "citeAs": citation,
-        "keywords": list(facts["tags"]),
-        **({"isBasedOn": [_work(origin) for origin in origins]} if origins else {}),
-        "distribution": [
-            *map(_shard, shards),
-            _index(index),
-            *(_files(member["name"], member["sentence"], shards) for member in members),
-            _class_file(classes),
-        ],
-        "recordSet": [
-            _split_records(splits),
-            _sample_records(index["columns"]),
-            *map(_member_records, members),
-            *map(_joined_records, members),
+    """Return the document.
+
+    facts: name, version, title, description, license, creator, published and tags
+    shards: summaries of the package's shards
+    members: name, sentence, dtype and shape of each
+    index: path, bytes, sha256 and columns (Arrow type by name)
+    classes: sha256 of `classes.json`
+    origins: the files that the dataset was made from
+    """
+    license = str(facts["license"])
+    document: dict[str, Any] = mlc.Metadata(
+        name=facts["name"],
+        description=facts["description"],
+        version=facts["version"],
+        license=[license if license == "unknown" else f"https://spdx.org/licenses/{license}.html"],
+        creators=[mlc.Organization(name=facts["creator"])],
+        date_published=datetime.fromisoformat(facts["published"]),
+        cite_as=citation,
+        keywords=list(facts["tags"]),
+        conforms_to=[VERSION],
+        distribution=[*_files(shards, index, classes), *(_file_set(member, shards) for member in members)],
+        record_sets=[
+            _splits(list(dict.fromkeys(str(shard["split"]) for shard in shards))),
+            _samples(index["columns"]),
+            *(_member_records(member) for member in members),
+            *(_joined_records(member) for member in members),
             _class_records(),
         ],
-    }
-
-
-def _license(spdx: str) -> str:
-    return spdx if spdx == "unknown" else f"https://spdx.org/licenses/{spdx}.html"
+        extra_properties={"isBasedOn": [_work(origin) for origin in origins]},
+    ).to_json()
+    document["@context"] |= TERMS
+    return document
 
 
 def _work(origin: Mapping[str, Any]) -> dict[str, Any]:
-    """A file that the dataset was made from, as a schema.org CreativeWork."""
-    work = {"@type": "sc:CreativeWork", "name": origin["file"], "identifier": f"sha256:{origin['sha256']}"}
-    if origin["author"]:
-        work["author"] = {"@type": "sc:Person", "name": origin["author"]}
-    if origin["source"]:
-        work["url"] = origin["source"]
-    if origin["license"]:
-        work["license"] = origin["license"]
-    if origin["notice"]:
-        work["creditText"] = origin["notice"]
-    return work
+    """Return a file that the dataset was made from, as a schema.org CreativeWork."""
+    author = {"@type": "sc:Person", "name": origin["author"]} if origin["author"] else None
+    work = {"url": origin["source"], "author": author, "license": origin["license"], "creditText": origin["notice"]}
+    identity = {"@type": "sc:CreativeWork", "name": origin["file"], "identifier": f"sha256:{origin['sha256']}"}
+    return identity | {key: value for key, value in work.items() if value}
 
 
-def _shard(shard: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        "@type": "cr:FileObject",
-        "@id": shard["path"],
-        "name": str(shard["path"]).rpartition("/")[2],
-        "description": f"{shard['samples']} samples of the split {shard['split']}.",
-        "contentUrl": shard["path"],
-        "contentSize": f"{shard['bytes']} B",
-        "encodingFormat": "application/x-tar",
-        "sha256": shard["sha256"],
-    }
+def _files(
+    shards: Sequence[Mapping[str, Any]], index: Mapping[str, Any], classes: Mapping[str, Any]
+) -> list[mlc.FileObject]:
+    files = [
+        mlc.FileObject(
+            id=shard["path"],
+            name=str(shard["path"]).rpartition("/")[2],
+            description=f"{shard['samples']} samples of the split {shard['split']}.",
+            content_url=shard["path"],
+            content_size=f"{shard['bytes']} B",
+            encoding_formats=["application/x-tar"],
+            sha256=shard["sha256"],
+        )
+        for shard in shards
+    ]
+    files.append(
+        mlc.FileObject(
+            id=INDEX,
+            name=str(index["path"]).rpartition("/")[2],
+            description="One row per sample. Its folder is next to that of the dataset.",
+            content_url=index["path"],
+            content_size=f"{index['bytes']} B",
+            encoding_formats=["application/x-parquet"],
+            sha256=index["sha256"],
+        )
+    )
+    text = "The part labels of the dataset, with the numbers of shapes and parts of each split."
+    kind = [FORMATS["json"]]
+    files.append(
+        mlc.FileObject(
+            id=CLASSES,
+            name=CLASSES,
+            description=text,
+            content_url=CLASSES,
+            encoding_formats=kind,
+            sha256=classes["sha256"],
+        )
+    )
+    return files
 
 
-def _index(index: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        "@type": "cr:FileObject",
-        "@id": INDEX,
-        "name": str(index["path"]).rpartition("/")[2],
-        "description": "One row a sample. Its folder is next to that of the dataset.",
-        "contentUrl": index["path"],
-        "contentSize": f"{index['bytes']} B",
-        "encodingFormat": "application/x-parquet",
-        "sha256": index["sha256"],
-    }
+def _file_set(member: Mapping[str, Any], shards: Sequence[Mapping[str, Any]]) -> mlc.FileSet:
+    name = f"files-{_identifier(member)}"
+    return mlc.FileSet(
+        id=name,
+        name=name,
+        description=f"{member['sentence']} One file per sample.",
+        contained_in=[shard["path"] for shard in shards],
+        encoding_formats=[FORMATS[member["name"].rpartition(".")[2]]],
+        includes=[f"*.{member['name']}"],
+    )
 
 
-def _files(member: str, text: str, shards: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    return {
-        "@type": "cr:FileSet",
-        "@id": f"files-{_identifier(member)}",
-        "name": f"files-{_identifier(member)}",
-        "description": f"{text} One file a sample.",
-        "containedIn": [{"@id": shard["path"]} for shard in shards],
-        "encodingFormat": FORMATS[member.rpartition(".")[2]],
-        "includes": f"*.{member}",
-    }
+def _splits(splits: Sequence[str]) -> mlc.RecordSet:
+    fields = [
+        _field("splits/name", "Name of the split.", "sc:Text"),
+        _field("splits/url", "Purpose of the split.", "sc:URL"),
+    ]
+    data = [{"splits/name": split, "splits/url": SPLIT_URLS[split]} for split in splits]
+    return _record_set(
+        "splits", "The splits of the dataset.", fields, "name", data_types=[_full_name("cr:Split")], data=data
+    )
 
 
-def _split_records(splits: Sequence[str]) -> dict[str, Any]:
-    return {
-        "@type": "cr:RecordSet",
-        "@id": "splits",
-        "name": "splits",
-        "description": "The splits of the dataset.",
-        "dataType": "cr:Split",
-        "key": {"@id": "splits/name"},
-        "field": [
-            _field("splits/name", "Name of the split.", "sc:Text"),
-            _field("splits/url", "What the split is for.", "sc:URL"),
-        ],
-        "data": [{"splits/name": split, "splits/url": URLS[split]} for split in splits],
-    }
-
-
-def _sample_records(columns: Mapping[str, str]) -> dict[str, Any]:
+def _samples(columns: Mapping[str, str]) -> mlc.RecordSet:
     fields = []
     for name, kind in columns.items():
-        source = {"fileObject": {"@id": INDEX}, "extract": {"column": name}}
-        joined = {"references": {"field": {"@id": "splits/name"}}} if name == "split" else {}
-        fields.append(_field(f"samples/{name}", f"Column {name} of the index.", KINDS[kind], source=source, **joined))
-    return _record_set("samples", "One record a sample: the rows of the index.", fields)
+        source = mlc.Source(file_object=INDEX, extract=mlc.Extract(column=name))
+        joined = {"references": mlc.Source(field="splits/name")} if name == "split" else {}
+        text = f"Column {name} of the index."
+        fields.append(_field(f"samples/{name}", text, KINDS[kind], source=source, **joined))
+    return _record_set("samples", "One record per sample: the rows of the index.", fields)
 
 
-def _member_records(member: Mapping[str, Any]) -> dict[str, Any]:
-    name, files = _identifier(member["name"]), {"@id": f"files-{_identifier(member['name'])}"}
-    key = {
-        "fileSet": files,
-        "extract": {"fileProperty": "filename"},
-        "transform": {"regex": r"^([^.]+)\."},
-    }
-    content = {"fileSet": files, "extract": {"fileProperty": "content"}}
+def _member_records(member: Mapping[str, Any]) -> mlc.RecordSet:
+    name = _identifier(member)
+    files = f"files-{name}"
+    file_name = mlc.Source(
+        file_set=files,
+        extract=mlc.Extract(file_property=mlc.FileProperty.filename),
+        transforms=[mlc.Transform(regex=r"^([^.]+)\.")],
+    )
+    content = mlc.Source(file_set=files, extract=mlc.Extract(file_property=mlc.FileProperty.content))
     fields = [
-        _field(f"{name}/key", "The sample's key.", "sc:Text", source=key),
-        _field(f"{name}/content", member["sentence"], source=content, **_content_type(member)),
+        _field(f"{name}/key", "The sample's key.", "sc:Text", source=file_name),
+        _field(f"{name}/content", member["sentence"], *_content_types(member), source=content, **_array(member)),
     ]
     return _record_set(name, member["sentence"], fields)
 
 
-def _joined_records(member: Mapping[str, Any]) -> dict[str, Any]:
-    """The member with the split and the kit of its sample."""
-    own = _identifier(member["name"])
+def _joined_records(member: Mapping[str, Any]) -> mlc.RecordSet:
+    """Return the member with the split and the kit of its sample."""
+    own = _identifier(member)
     name = f"{own}-of-samples"
-    fields = [
-        _field(
-            f"{name}/key",
-            "The sample's key.",
-            "sc:Text",
-            source={"field": {"@id": f"{own}/key"}},
-            references={"field": {"@id": "samples/key"}},
-        ),
-        *(
-            _field(f"{name}/{item}", f"The sample's {item}.", "sc:Text", source={"field": {"@id": f"samples/{item}"}})
-            for item in ("split", "kit")
-        ),
-        _field(
-            f"{name}/content",
-            member["sentence"],
-            source={"field": {"@id": f"{own}/content"}},
-            **_content_type(member),
-        ),
-    ]
+    key, content = (mlc.Source(field=f"{own}/{field}") for field in ("key", "content"))
+    joined = mlc.Source(field="samples/key")
+    fields = [_field(f"{name}/key", "The sample's key.", "sc:Text", source=key, references=joined)]
+    for column in ("split", "kit"):
+        source = mlc.Source(field=f"samples/{column}")
+        fields.append(_field(f"{name}/{column}", f"The sample's {column}.", "sc:Text", source=source))
+    types = _content_types(member)
+    fields.append(_field(f"{name}/content", member["sentence"], *types, source=content, **_array(member)))
     return _record_set(name, f"{member['sentence']} With the split and the kit of its sample.", fields)
 
 
-def _content_type(member: Mapping[str, Any]) -> dict[str, Any]:
+def _class_records() -> mlc.RecordSet:
+    fields = []
+    for name, (kind, text) in CLASS_FIELDS.items():
+        source = mlc.Source(file_object=CLASSES, extract=mlc.Extract(json_path=f"$[*].{name}"))
+        fields.append(_field(f"classes/{name}", text, kind, source=source))
+    return _record_set("classes", "The part labels of the dataset by id.", fields, "id")
+
+
+def _content_types(member: Mapping[str, Any]) -> list[str]:
     if member["name"].endswith(".png"):
-        return {"dataType": "sc:ImageObject"}
+        return ["sc:ImageObject"]
+    return ["sc:Text", ELEMENTS[member["dtype"]]] if member["name"].endswith(".npy") else ["sc:Text"]
+
+
+def _array(member: Mapping[str, Any]) -> dict[str, Any]:
     if not member["name"].endswith(".npy"):
-        return {"dataType": "sc:Text"}
-    lengths = ",".join(str(item) if isinstance(item, int) else "-1" for item in member["shape"])
-    return {"dataType": ["sc:Text", ELEMENTS[member["dtype"]]], "isArray": True, "arrayShape": lengths}
+        return {}
+    lengths = (str(length) if isinstance(length, int) else "-1" for length in member["shape"])
+    return {"is_array": True, "array_shape": ",".join(lengths)}
 
 
-def _record_set(name: str, description: str, fields: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    return {
-        "@type": "cr:RecordSet",
-        "@id": name,
-        "name": name,
-        "description": description,
-        "key": {"@id": f"{name}/key"},
-        "field": list(fields),
-    }
+def _record_set(name: str, text: str, fields: Sequence[mlc.Field], key: str = "key", **more: Any) -> mlc.RecordSet:
+    return mlc.RecordSet(id=name, name=name, description=text, key=[f"{name}/{key}"], fields=list(fields), **more)
 
 
-def _field(identifier: str, description: str, data_type: str = "", **more: Any) -> dict[str, Any]:
-    typed = {"dataType": data_type} if data_type else {}
-    name = identifier.rpartition("/")[2]
-    return {"@type": "cr:Field", "@id": identifier, "name": name, "description": description, **typed, **more}
+def _field(name: str, text: str, *types: str, **more: Any) -> mlc.Field:
+    full = [_full_name(kind) for kind in types]
+    return mlc.Field(id=name, name=name.rpartition("/")[2], description=text, data_types=full, **more)
 
 
-def _class_file(classes: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        "@type": "cr:FileObject",
-        "@id": CLASSES,
-        "name": CLASSES,
-        "description": "The part labels of the dataset, and how many shapes and parts of each split have them.",
-        "contentUrl": CLASSES,
-        "encodingFormat": FORMATS["json"],
-        "sha256": classes["sha256"],
-    }
+def _full_name(name: str) -> str:
+    """Expand the prefix of a type: `sc:Text`, `cr:Float32`."""
+    prefix, _, rest = name.partition(":")
+    return {"sc": "https://schema.org/", "cr": "http://mlcommons.org/croissant/"}[prefix] + rest
 
 
-def _class_records() -> dict[str, Any]:
-    fields = {
-        "id": ("sc:Integer", "What the labels of points and the classes of parts say."),
-        "name": ("sc:Text", "The part label."),
-        "kit": ("sc:Text", "The kit, program or category that has it."),
-        "color": ("sc:Text", "A colour that stands for it, sRGB."),
-    }
-    return {
-        "@type": "cr:RecordSet",
-        "@id": "classes",
-        "name": "classes",
-        "description": "The part labels of the dataset by id.",
-        "key": {"@id": "classes/id"},
-        "field": [
-            {
-                "@type": "cr:Field",
-                "@id": f"classes/{name}",
-                "name": name,
-                "description": text,
-                "dataType": kind,
-                "source": {"fileObject": {"@id": CLASSES}, "extract": {"jsonPath": f"$[*].{name}"}},
-            }
-            for name, (kind, text) in fields.items()
-        ],
-    }
-
-
-def _identifier(member: str) -> str:
-    """`points.npy` as `points`; members of one format only keep their name: `glb`, `json`."""
-    return member.partition(".")[0]
+def _identifier(member: Mapping[str, Any]) -> str:
+    """Return `points` for `points.npy`; members named by their format keep their name: `glb`, `json`."""
+    return str(member["name"]).partition(".")[0]

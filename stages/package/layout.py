@@ -11,6 +11,8 @@ SCHEMA = "schema.json"
 CLASSES = "classes.json"
 CHECKSUMS = "checksums.txt"
 PREVIEW = "preview.png"
+INDEX = "index"
+"""Name of the index in `croissant.json`."""
 
 
 def shard_path(config: Config, split: str, index: int) -> str:

@@ -118,7 +118,7 @@ class Dataset:
 
     @classmethod
     def open(cls, folder: Path) -> Dataset:
-        """Open the dataset in a folder. Raises ConfigError where it is none, or none that is finished."""
+        """Open the dataset in a folder. Raises ConfigError where it holds no finished dataset."""
         try:
             manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
             listed = json.loads((folder / "classes.json").read_text(encoding="utf-8"))

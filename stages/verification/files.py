@@ -12,8 +12,7 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import best_match
 
 from pipeline.paths import file_digest
-from stages.package.croissant import INDEX
-from stages.package.layout import CHECKSUMS, CLASSES, CROISSANT, MANIFEST, SCHEMA
+from stages.package.layout import CHECKSUMS, CLASSES, CROISSANT, INDEX, MANIFEST, SCHEMA
 from stages.verification.findings import Findings
 
 SampleRow = tuple[str, str, str, str, str]
@@ -94,7 +93,7 @@ def read_schema(folder: Path, findings: Findings) -> str:
 
 
 def check_splits(manifest: Mapping[str, Any], rows: Sequence[SampleRow], findings: Findings) -> None:
-    """Check that keys are unique, that graphs share a split where the manifest says so, and the counts of splits.
+    """Check that keys are unique, that graphs share a split if the manifest requires it, and the counts of splits.
 
     rows: result of `check_shard` for each sample of each readable shard
     """

@@ -1,1 +1,1 @@
-"""Chaos: runs over the real stages are killed, starved and spoilt at random moments, and must end as if nothing was."""
+"""Chaos tests: faults at random moments of runs over the real stages, whose files must come out as without."""

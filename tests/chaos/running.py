@@ -1,4 +1,4 @@
-"""Runs that can be struck: the driver's process, its workers, and whether anything of them stays behind."""
+"""Runs under faults: the driver's process, its workers, and a check that none stays behind."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-_HUNG_AFTER = 3600.0
-"""Seconds after which a run is taken to hang; where nothing is compiled yet, the first one takes long."""
+_HANG_SECONDS = 3600.0
+"""After these a run hangs; the first one may compile kernels."""
 
 
 @dataclass
 class Run:
-    """A run under way. `workers`: every worker process that it was seen to have."""
+    """A run in progress; `workers` are all worker processes that were seen."""
 
     process: subprocess.Popen[bytes]
-    output: Path
+    output_file: Path
     workers: set[int] = field(default_factory=set)
     began: float = field(default_factory=time.monotonic)
 
     def look(self) -> set[int]:
-        """The worker processes that it has now."""
+        """Return its current worker processes."""
         now = {pid for pid in _descendants(self.process.pid) if b"LokyProcess" in _command(pid)}
         self.workers |= now
         return now
@@ -33,17 +33,17 @@ class Run:
         return self.process.poll() is not None
 
     def wait(self, until: Callable[[], object]) -> bool:
-        """Wait until something is so; False where the run ends before. Raises AssertionError for a run that hangs."""
+        """Wait for a condition; return False where the run ends before. Raises AssertionError for a run that hangs."""
         while not self.over():
             self.look()
             if until():
                 return True
-            assert time.monotonic() - self.began < _HUNG_AFTER, f"hangs: {self.said()[-2000:]}"
+            assert time.monotonic() - self.began < _HANG_SECONDS, f"hangs: {self.output()[-2000:]}"
             time.sleep(0.05)
         return False
 
     def end(self) -> int:
-        """The exit code, when it has come to its end. Raises AssertionError where it hangs or leaves workers behind."""
+        """Wait for the exit code. Raises AssertionError where the run hangs or leaves workers behind."""
         try:
             self.wait(lambda: False)
             end = time.monotonic() + 20
@@ -58,12 +58,12 @@ class Run:
             self.process.wait()
         return self.process.returncode
 
-    def said(self) -> str:
-        return self.output.read_text(errors="replace")
+    def output(self) -> str:
+        return self.output_file.read_text(errors="replace")
 
 
 def alive(pid: int) -> bool:
-    """Whether there is such a process of Python, and no mere rest of one."""
+    """Whether a Python process exists and is no zombie."""
     return b"python" in _command(pid)
 
 

@@ -1,4 +1,4 @@
-"""Where chaos happens: small datasets in one folder, what undisturbed runs made of them, and runs to be struck."""
+"""A sandbox of chaos tests: small datasets in one folder, their expected files, and runs that receive faults."""
 
 from __future__ import annotations
 
@@ -29,11 +29,12 @@ _DIFFERS = {"seconds", "peak_bytes"}
 
 @dataclass
 class Sandbox:
-    """Datasets in `folder`, from the configs that their `sections` say, whose `steps` are run in order, with two
-    workers.
+    """Datasets in one folder, made with two workers.
 
-    edited: sections with another value somewhere, by dataset. calm: path below `out` and digest of every file of an
-    undisturbed run.
+    steps: dataset and stage of each run, in order
+    sections: config sections of each dataset
+    edited: sections with other values, by dataset
+    expected: digest of every file below `out` after undisturbed runs, by path
     """
 
     folder: Path
@@ -41,7 +42,7 @@ class Sandbox:
     steps: Sequence[Step]
     sections: Mapping[str, Mapping[str, Any]]
     edited: Sequence[Mapping[str, Mapping[str, Any]]] = ()
-    calm: dict[str, str] = field(default_factory=dict)
+    expected: dict[str, str] = field(default_factory=dict)
 
     @property
     def out(self) -> Path:
@@ -63,12 +64,12 @@ class Sandbox:
             self.config(dataset).write_text(yaml.safe_dump({**facts, **sections}))
 
     def settle(self) -> None:
-        """Make the datasets undisturbed, and note what came of it. Raises AssertionError where they cannot be made."""
+        """Make the datasets without faults, and keep the digests. Raises AssertionError where that fails."""
         self.folder.mkdir(parents=True, exist_ok=True)
         self.write_configs()
         run = self.start(self.steps)
-        assert run.end() == 0, run.said()
-        self.calm = self.digests()
+        assert run.end() == 0, run.output()
+        self.expected = self.digests()
 
     def start(self, steps: Sequence[Step], *options: str, prepare: Callable[[], None] | None = None) -> Run:
         """Start `make dataset` from the first of `steps` on; `prepare` runs in the process before it begins."""
@@ -76,13 +77,13 @@ class Sandbox:
         driver = [sys.executable, "-m", "tests.chaos.driver", ",".join(asked)]
 
         def begin() -> None:
-            # who runs this in the background has it ignore Ctrl-C, and a child inherits that
+            # A background process ignores Ctrl-C, and its children inherit that.
             signal.signal(signal.SIGINT, signal.SIG_DFL)
             if prepare is not None:
                 prepare()
 
-        said = self.folder / f"said-{time.monotonic_ns()}.txt"
-        with open(said, "wb") as stream:
+        output = self.folder / f"output-{time.monotonic_ns()}.txt"
+        with open(output, "wb") as stream:
             process = subprocess.Popen(
                 [*driver, "--out", str(self.out), "--workers", "2", *options],
                 cwd=ROOT,
@@ -91,7 +92,7 @@ class Sandbox:
                 start_new_session=True,
                 preexec_fn=begin,
             )
-        return Run(process, said)
+        return Run(process, output)
 
     def records(self, step: Step) -> Path:
         """The folder with the records of a stage of a dataset."""
@@ -101,8 +102,8 @@ class Sandbox:
         """The shards of a stage that have records."""
         return sorted(path.stem for path in self.records(step).glob("*.json"))
 
-    def unmake(self, step: Step, shards: Sequence[str]) -> None:
-        """Take away shards as if they had never been made: record first, then the files."""
+    def delete_shards(self, step: Step, shards: Sequence[str]) -> None:
+        """Delete shards as if they had never been made: record first, then the files."""
         for shard in shards:
             path = self.records(step) / f"{shard}.json"
             record = read_record(path)
@@ -111,22 +112,22 @@ class Sandbox:
                 (path.parents[1] / file).unlink(missing_ok=True)
 
     def written(self) -> dict[Path, int]:
-        """When each record was written that is there now, in nanoseconds."""
+        """Return the time at which each existing record was written, in nanoseconds."""
         found = {}
         for path in self.work.glob("*/*/records/*.json"):
             try:
                 found[path] = path.stat().st_mtime_ns
-            except FileNotFoundError:  # a run is at work
+            except FileNotFoundError:  # a run is active
                 continue
         return found
 
-    def begin_anew(self) -> None:
-        """Take away everything that was made."""
+    def clear(self) -> None:
+        """Delete everything that was made."""
         if self.out.exists():
             remove(self.out)
 
     def digests(self) -> dict[str, str]:
-        """Every file that counts below `out`, and a digest of it: not logs and locks, nor the times in records."""
+        """Return the digest of every file below `out` but logs and locks, without the times in records."""
         found = {}
         for path in sorted(self.out.rglob("*")):
             log = path.suffix == ".txt" and path.parent.parent == self.work
@@ -135,7 +136,7 @@ class Sandbox:
         return found
 
     def half_written(self, spared: set[str]) -> list[str]:
-        """Files under a final name that are not what the undisturbed run has put there; `spared` are not looked at."""
+        """Return files under a final name that differ from the expected ones, without `spared`."""
         passing = {"progress", "failed", "rejects"}
         return [
             path
@@ -143,7 +144,7 @@ class Sandbox:
             if path not in spared
             and not Path(path).name.startswith(".")
             and Path(path).parent.name not in passing
-            and self.calm.get(path) != digest
+            and self.expected.get(path) != digest
         ]
 
 

@@ -1,4 +1,4 @@
-"""The small datasets that chaos is let loose on: together they pass through every stage."""
+"""The small datasets of chaos tests; together they use every stage."""
 
 from __future__ import annotations
 
@@ -17,9 +17,11 @@ from tests.stated import stated
 
 @dataclass(frozen=True)
 class Datasets:
-    """Sections and stages of each dataset of an arena, in the order in which they are made, and edits of the configs.
+    """The datasets of a sandbox.
 
-    tests: whether it is for the tests alone.
+    made: stages and config sections of each dataset, in order
+    edited: edits of the configs
+    tests: whether it is only for the tests
     """
 
     made: Mapping[str, tuple[Sequence[str], Mapping[str, Any]]]
@@ -50,7 +52,7 @@ def _edits(dataset: str) -> list[dict[str, dict[str, Any]]]:
     return [{dataset: item} for item in changed]
 
 
-ARENAS: dict[str, Datasets] = {
+SANDBOXES: dict[str, Datasets] = {
     "kits": Datasets(
         {
             "castles": (
@@ -86,7 +88,7 @@ ARENAS: dict[str, Datasets] = {
     "furniture": Datasets(
         {"furniture": (("shapeassembly", *_SAMPLES), {"shapeassembly": _PROGRAMS, **_SMALL})}, _edits("furniture")
     ),
-    "dreams": Datasets(
+    "sampled": Datasets(
         {
             "parent": (
                 ("exemplars", "variations", "strings", "training"),
@@ -147,22 +149,22 @@ ARENAS: dict[str, Datasets] = {
 
 
 def sandbox_in(folder: Path, name: str) -> Sandbox:
-    """The datasets of an arena made undisturbed in `folder`. Raises AssertionError where a stage has nothing to do."""
-    wanted = ARENAS[name]
+    """The datasets of a sandbox made undisturbed in `folder`. Raises AssertionError where a stage has nothing to do."""
+    wanted = SANDBOXES[name]
     steps: list[Step] = [(dataset, stage) for dataset, (stages, _) in wanted.made.items() for stage in stages]
-    arena = Sandbox(folder, name, steps, {dataset: sections for dataset, (_, sections) in wanted.made.items()})
-    arena.edited = wanted.edited
-    arena.settle()
-    idle = [step for step in steps if not arena.shards(step)]
+    sandbox = Sandbox(folder, name, steps, {dataset: sections for dataset, (_, sections) in wanted.made.items()})
+    sandbox.edited = wanted.edited
+    sandbox.settle()
+    idle = [step for step in steps if not sandbox.shards(step)]
     assert not idle, f"{name}: nothing to do for {idle}"
-    return arena
+    return sandbox
 
 
-def damaged(arena: Sandbox) -> list[str]:
-    """What the mill's part of `make verify` finds; it withdraws the records of what is damaged."""
+def damaged(sandbox: Sandbox) -> list[str]:
+    """Return the corrupted shards; removes their records."""
     stages = find_stages()
     found = []
-    for dataset in arena.sections:
-        config = load_config(arena.config(dataset), {name: stage.config for name, stage in stages.items()})
-        found += list(corrupted_shards(config, stages, DatasetPaths(arena.out, config.name)))
+    for dataset in sandbox.sections:
+        config = load_config(sandbox.config(dataset), {name: stage.config for name, stage in stages.items()})
+        found += list(corrupted_shards(config, stages, DatasetPaths(sandbox.out, config.name)))
     return found

@@ -1,4 +1,4 @@
-"""Each hostile file is read; what became of it, and what it cost."""
+"""Reading of hostile files: the result and the cost of each."""
 
 from __future__ import annotations
 
@@ -18,19 +18,20 @@ from tests.hostile.mutate import mutate
 
 LIMITS = ReadLimits(cpu_seconds=20, memory_mb=1000)
 
-PYTHONS_OWN = (
+PYTHON_WORDS = (
     "Traceback", "Error:", "object at 0x", "not supported between", "unsupported operand", "has no attribute",
     "invalid literal", "could not convert", "NoneType", "dtype(", "Exception",
 )  # fmt: skip
-"""What a message in our own words does not hold."""
+"""Words of Python's own messages, which an error for users does not hold."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a hostile file.
+    """Result of reading a hostile file.
 
-    end: `read`, `refused` (in the reader's own words), `stopped` (by a limit, or by what no reader foresaw), or
-    `escaped`; cpu: seconds; message: of the error.
+    end: `read`, `refused` (with the reader's message), `stopped` (by a limit or an unexpected error), or `escaped`
+    message: message of the error
+    cpu: CPU seconds
     """
 
     number: int
@@ -43,11 +44,11 @@ class Outcome:
 
 
 def outcomes(folder: Path, count: int, seed: int) -> Iterator[Outcome]:
-    """Make `count` hostile files in `folder`, one after another, and read each."""
+    """Make hostile files in `folder`, one at a time, and read each."""
     good = write_good(folder)
-    contents = {item: item.read_bytes() for item in good}
-    for item in good:
-        read_model(item)  # what is compiled on a fresh clone is no work on a hostile file
+    contents = {file: file.read_bytes() for file in good}
+    for file in good:
+        read_model(file)  # compile kernels before times are measured
     for number in range(count):
         rng = np.random.default_rng([seed, number])
         origin = good[number % len(good)]
@@ -69,7 +70,7 @@ def _read(path: Path) -> tuple[str, str]:
     except ConfigError as error:
         message = str(error)
         message.encode()
-        if not message.startswith(f"{path}") or "\n" in message or any(item in message for item in PYTHONS_OWN):
+        if not message.startswith(f"{path}") or "\n" in message or any(word in message for word in PYTHON_WORDS):
             return "escaped", message
         if time.monotonic() - started > 10 * LIMITS.cpu_seconds:
             return "escaped", "it ran on"
@@ -80,5 +81,5 @@ def _read(path: Path) -> tuple[str, str]:
 
 
 def _cpu() -> float:
-    both = [resource.getrusage(item) for item in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(item.ru_utime + item.ru_stime for item in both)
+    both = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(usage.ru_utime + usage.ru_stime for usage in both)

@@ -1,4 +1,4 @@
-"""Good model files, small, one or more of each format: what hostile ones are made of."""
+"""Small valid model files of every format, from which hostile ones are made."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ BOXES = {"base": box((4, 1, 4)), "roof": box((2, 0.5, 2), (0.5, 1, 0.5))}
 
 
 def write_good(folder: Path) -> list[Path]:
-    """Write the good files into `folder`, with what they name beside them; the model files, in a fixed order."""
+    """Write valid files and the files that they name into `folder`; return the model files in a fixed order."""
     import trimesh
 
     (folder / "skin.png").write_bytes(png(np.arange(48).reshape(4, 4, 3) * 5))

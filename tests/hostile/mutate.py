@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-LONGEST = 1_000_000
+MAX_BYTES = 1_000_000
 """Bytes of a hostile file: what makes one expensive is to be in it, and not its length."""
 TOKEN = re.compile(rb'[^\s<>{}\[\],:"]+')
 NUMBER = re.compile(rb"(?<![\w#.])-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?!\w)")
@@ -24,7 +24,7 @@ def mutate(content: bytes, rng: np.random.Generator) -> tuple[str, bytes]:
     """The name of a mutation and what it makes of `content`; up to three of the same kind."""
     name = list(MUTATIONS)[rng.integers(len(MUTATIONS))]
     for _ in range(rng.integers(1, 4)):
-        content = MUTATIONS[name](content, rng)[:LONGEST]
+        content = MUTATIONS[name](content, rng)[:MAX_BYTES]
     return name, content
 
 
@@ -46,13 +46,13 @@ def _take_out(content: bytes, rng: np.random.Generator) -> bytes:
 
 def _repeat_token(content: bytes, rng: np.random.Generator) -> bytes:
     times = int(rng.choice([2, 10, 2000]))
-    return _at_token(content, rng, lambda token: (token + b" ") * min(times, 1 + LONGEST // len(token)))
+    return _at_token(content, rng, lambda token: (token + b" ") * min(times, 1 + MAX_BYTES // len(token)))
 
 
 def _repeat_line(content: bytes, rng: np.random.Generator) -> bytes:
     lines = content.splitlines(keepends=True) or [b""]
     place = int(rng.integers(len(lines)))
-    times = min(int(rng.choice([2, 50, 2000])), 1 + LONGEST // len(lines[place] or b" "))
+    times = min(int(rng.choice([2, 50, 2000])), 1 + MAX_BYTES // len(lines[place] or b" "))
     return b"".join([*lines[:place], lines[place] * times, *lines[place + 1 :]])
 
 

@@ -133,10 +133,11 @@ def test_verify_of_an_unfinished_dataset_fails(tmp_path: Path, write_config: Wri
     assert "flour: 6 of 6 shards are not made, first harvest0-0" in done.stdout
 
 
-def test_command_that_reads_its_arguments_itself_gets_all() -> None:
-    done = shapemill("inspect", "my.glb", "--json")
-    assert (done.returncode, done.stdout) == (0, "inspect my.glb --json\n")
-    assert shapemill("inspect", "--fail").returncode == 1
+def test_group_of_commands_of_a_room_gets_its_arguments_and_gives_its_exit_code() -> None:
+    done = shapemill("inspect", "mesh", "my.glb", "--json")
+    assert (done.returncode, done.stdout) == (0, "inspect my.glb True\n")
+    assert shapemill("inspect", "mesh", "my.glb", "--fail").returncode == 1
+    assert shapemill("inspect", "program", "chair").stdout == "program chair\n"
 
 
 def test_clean_removes_the_work_and_leaves_the_dataset(tmp_path: Path, write_config: WriteConfig) -> None:

@@ -75,7 +75,7 @@ def test_cluster_makes_the_same_bytes_though_workers_die_and_a_shard_kills_its_o
         assert "failed: harvest1-0; mend the cause" in run.stderr.read()
     # Each killer is one that the test knows: a worker killed while it makes the poisoned shard would count for that.
     tried = {shard: (tmp_path / "marks" / shard).read_text() for shard in trouble}
-    assert tried["harvest1-0"] == "xxxx", "three times beside others, once alone"
+    assert tried["harvest1-0"] == "xxxx", "three times among others, once in isolation"
     assert tried["harvest0-0"] == tried["harvest2-1"] == "xx", "a death costs a shard one more try"
     run_toy_stages(write_config(), out, "flour")
     assert made(out) == made(tmp_path / "calm"), "a run that moves from a cluster to this machine"

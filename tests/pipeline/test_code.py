@@ -197,7 +197,7 @@ def test_chair_does_not_know_the_vase() -> None:
 
 @pytest.mark.usefixtures("write")
 class TestNotes:
-    """What a file says is noted beside Python's compiled files, so that the next process need not parse it."""
+    """Notes next to Python's compiled files hold digests, so that the next process parses nothing."""
 
     @pytest.fixture
     def digests(self, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], dict[str, str]]:

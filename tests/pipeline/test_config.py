@@ -190,7 +190,7 @@ HOSTILE = {
     f"name: {'b' * 50_000}\n": "bread.yaml:1: name: string should have at most 64 characters",
     f"name: bread\nbakery: {{recipe: {'a' * 5_000}}}\n": "bread.yaml:2: bakery.recipe: aaaa",
     f"name: bread\nbakery: {{recipe: {'a/' * 5_000}}}\n": "bread.yaml:2: bakery.recipe: a/a/",
-    f"name: bread\nseed: {'9' * 5_000}\n": "bread.yaml: is no YAML: it holds a character or a number that is none",
+    f"name: bread\nseed: {'9' * 5_000}\n": "bread.yaml: is no YAML: it holds an invalid character or number",
     "name: bread\n" + "#" * 1_100_000: "bread.yaml: is longer than 1,000,000 characters",
     "name: bread\n? [a]\n: 1\n": "bread.yaml:2: a key must be text",
 }

@@ -39,7 +39,7 @@ def again(before: dict[str, int], out: Path) -> set[str]:
     [
         # read by the next stage; and by shards of its own stage, which were made of the good bytes and stay
         (1, ["grain/harvest0-0", "grain/harvest2-1"], {"flour": {"fineness": 3.0}}, ("flour", "bread")),
-        # the first is read two stages on; the second is found when the first is made again
+        # the first is read two stages later; the second is found when the first is rebuilt
         (2, ["flour/harvest1-0", "grain/harvest1-0"], {"salt": {"spoons": 2}}, ("salt", "bread")),
     ],
 )

@@ -13,7 +13,7 @@ from pipeline.paths import DatasetPaths
 from pipeline.run import run_stage
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 
-SIZE = 1000
+BYTES_PER_SAMPLE = 1000
 
 
 class CornConfig(StrictModel):
@@ -42,7 +42,7 @@ def flour_plan(plan: Plan) -> list[Shard]:
 def write_samples(task: Task) -> Outcome:
     samples = int(task.shard.params.get("samples", 0))
     with task.output(f"{task.shard.name}.bin") as stream:
-        stream.write(bytes(SIZE * max(samples, 1)))
+        stream.write(bytes(BYTES_PER_SAMPLE * max(samples, 1)))
     return Outcome(samples, {"samples": samples})
 
 

@@ -88,7 +88,7 @@ def test_shard_that_keeps_killing_its_worker_is_set_aside_and_the_rest_is_made(
     )
     assert run.returncode == 1
     assert "flour: failed: harvest0-1" in run.stderr
-    assert (tmp_path / "marks/harvest0-1").read_text() == "xxxx", "three times beside others, once alone"
+    assert (tmp_path / "marks/harvest0-1").read_text() == "xxxx", "three times among others, once in isolation"
     flour = tmp_path / "out" / WORK / "flour"
     assert len(list(flour.glob("*.tar"))) == 5
     assert not list(flour.glob(".*.tmp"))

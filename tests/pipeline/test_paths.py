@@ -1,4 +1,4 @@
-"""Files that a command was asked for: there whole, or not at all and with a word why."""
+"""Files that a command was asked for: complete, or missing with an explanation."""
 
 from __future__ import annotations
 

@@ -290,6 +290,6 @@ def test_shards_without_their_section_are_not_rebuilt_for_it(tmp_path: Path) -> 
     assert weave(tmp_path, stages) == 1
     assert weave(tmp_path, stages, colour="blue") == 0
     assert weave(tmp_path, stage_of([Shard("a", {"dye": "blue"})], whole_section=False), colour="blue") == 1
-    # A stage whose shards see its section, as is the rule, makes them anew.
+    # A stage whose shards see its section rebuilds them.
     assert weave(tmp_path / "seen", stage_of([Shard("a")])) == 1
     assert weave(tmp_path / "seen", stage_of([Shard("a")]), colour="blue") == 1

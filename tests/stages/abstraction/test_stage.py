@@ -1,4 +1,4 @@
-"""The stage on the real mill: reasons beside samples without a program; tests of collections look at those with one."""
+"""The stage in the engine, with samples without a program; tests of collections check those with one."""
 
 from __future__ import annotations
 

@@ -20,6 +20,7 @@ FACTS = {
 }
 INDEX = {"path": "../toy-index/toy.parquet", "bytes": 1, "sha256": "00" * 32, "columns": {"key": "string"}}
 CLASSES = {"sha256": "12" * 32}
+SHARD = {"path": "data/train/toy.tar", "split": "train", "samples": 1, "bytes": 1, "sha256": "34" * 32}
 
 
 def test_the_table_gives_credit_and_says_what_is_not_stated() -> None:
@@ -31,7 +32,7 @@ def test_the_table_gives_credit_and_says_what_is_not_stated() -> None:
 
 
 def test_croissant_says_what_the_dataset_is_based_on() -> None:
-    said, unsaid = croissant(FACTS, [], [], INDEX, CLASSES, [{**ORIGIN, **SAID}, {**ORIGIN, **UNSAID}], "cited")[
+    said, unsaid = croissant(FACTS, [SHARD], [], INDEX, CLASSES, [{**ORIGIN, **SAID}, {**ORIGIN, **UNSAID}], "cited")[
         "isBasedOn"
     ]
     assert said == {
@@ -44,4 +45,4 @@ def test_croissant_says_what_the_dataset_is_based_on() -> None:
         "creditText": "Copyright\n(c) Jane",
     }
     assert unsaid == {key: said[key] for key in ("@type", "name", "identifier")}
-    assert "isBasedOn" not in croissant(FACTS, [], [], INDEX, CLASSES, [], "cited")
+    assert "isBasedOn" not in croissant(FACTS, [SHARD], [], INDEX, CLASSES, [], "cited")

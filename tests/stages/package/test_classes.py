@@ -50,7 +50,7 @@ def test_a_class_has_the_colour_of_its_source_or_of_its_first_part() -> None:
     assert [item["color"] for item in table] == ["#966432", "#00c800", "#a0a0a0", "#0102ff"]
 
 
-def test_the_table_is_json_with_a_line_for_each_class() -> None:
+def test_the_table_is_json_with_a_line_for_every_class() -> None:
     table = count_classes(CLASSES, [("train", tally(3))])
     content = table_bytes(table)
     assert json.loads(content) == table

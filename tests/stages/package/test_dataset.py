@@ -63,7 +63,7 @@ def test_tar_entries_carry_neither_time_nor_user(toy_folder: Path) -> None:
                 )
 
 
-def test_the_json_has_the_same_fields_in_each_sample_and_nothing_empty(toy_folder: Path) -> None:
+def test_the_json_has_the_same_fields_in_every_sample_and_nothing_empty(toy_folder: Path) -> None:
     def shape(value: object) -> object:
         if isinstance(value, dict):
             return {name: shape(item) for name, item in value.items()}
@@ -99,7 +99,7 @@ def test_the_json_says_what_the_collection_holds(toy_folder: Path) -> None:
 
 
 def test_classes_are_listed_with_what_has_them_by_split(toy_folder: Path) -> None:
-    """Counted anew from the records; the ids are the places in the list, the colours those of the kits' types."""
+    """Recounted from the records; ids are indices of the list, and colours those of the kits' types."""
     table = json.loads((toy_folder / "classes.json").read_text())
     assert [item["id"] for item in table] == list(range(4))
     assert [(item["name"], item["kit"]) for item in table] == [
@@ -192,7 +192,7 @@ def test_the_card_has_what_hugging_face_asks_for(toy_folder: Path) -> None:
         split: f"data/{split}/*.tar" for split in SPLITS
     }
     assert "](preview.png)" in text
-    assert "| all | 23 | 12 |" in text
+    assert "| total | 23 | 12 |" in text
 
 
 def test_checksums_cover_every_file_and_the_manifest_the_index(toy_folder: Path) -> None:

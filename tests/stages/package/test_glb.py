@@ -61,7 +61,7 @@ def test_equal_parts_share_one_mesh_and_types_not_in_use_are_left_out() -> None:
     assert only["nodes"][0]["extras"] == {"class": 1, "instance": 0}
 
 
-def test_each_face_keeps_its_colour_in_linear_light() -> None:
+def test_every_face_keeps_its_colour_in_linear_light() -> None:
     kit = toy_kit("blocks")
     scene = loaded(glb_bytes(kit_shape(kit, chain(2, 0))))
     for part_type in kit.types:
@@ -91,7 +91,7 @@ def test_the_container_is_aligned_and_its_arrays_lie_inside() -> None:
 
 
 @pytest.mark.parametrize(("colors", "vertices"), [(1, 8), (2, 8 + 4)])
-def test_a_vertex_stands_once_for_each_colour_around_it(colors: int, vertices: int) -> None:
+def test_a_vertex_stands_once_for_every_colour_around_it(colors: int, vertices: int) -> None:
     face_colors = np.full((12, 3), 90, dtype=np.uint8)
     face_colors[10:] += colors - 1
     part_type = PartType("box", BOX, BOX_FACES, face_colors, np.eye(4), np.eye(4)[None])

@@ -16,7 +16,7 @@ import pytest
 from pipeline.shards import bytes_array, read_shard
 from tests.stages.package.toy import SPLITS, toy_keys
 
-POINTS = 16 + 64
+POINT_COUNT = 16 + 64
 
 
 def outside(script: str, *arguments: str, cache: Path) -> str:
@@ -40,13 +40,13 @@ def shard_pattern(folder: Path, split: str) -> str:
 
 
 @pytest.mark.parametrize("split", SPLITS)
-def test_webdataset_yields_each_sample_once_and_decoded(toy_folder: Path, split: str) -> None:
+def test_webdataset_yields_every_sample_once_and_decoded(toy_folder: Path, split: str) -> None:
     import webdataset
 
     samples = list(webdataset.WebDataset(shard_pattern(toy_folder, split), shardshuffle=False).decode())
     assert [sample["__key__"] for sample in samples] == toy_keys(split)
     for sample in samples:
-        assert sample["points.npy"].shape == sample["normals.npy"].shape == (POINTS, 3)
+        assert sample["points.npy"].shape == sample["normals.npy"].shape == (POINT_COUNT, 3)
         assert sample["points.npy"].dtype == np.float32
         assert sample["labels.npy"].dtype == sample["instances.npy"].dtype == np.int16
         assert sample["contacts.npy"].shape == (2, sample["json"]["counts"]["contacts"])
@@ -55,7 +55,7 @@ def test_webdataset_yields_each_sample_once_and_decoded(toy_folder: Path, split:
 
 
 @pytest.mark.filterwarnings("ignore:This DataLoader will create")
-def test_a_torch_loader_of_four_workers_yields_each_sample_once(toy_folder: Path) -> None:
+def test_a_torch_loader_of_four_workers_yields_every_sample_once(toy_folder: Path) -> None:
     import webdataset
     from torch.utils.data import DataLoader
 
@@ -63,8 +63,8 @@ def test_a_torch_loader_of_four_workers_yields_each_sample_once(toy_folder: Path
     tuples = samples.to_tuple("__key__", "points.npy", "labels.npy").batched(2)
     seen = []
     for names, points, labels in DataLoader(tuples, batch_size=None, num_workers=4):
-        assert tuple(points.shape) == (len(names), POINTS, 3)
-        assert tuple(labels.shape) == (len(names), POINTS)
+        assert tuple(points.shape) == (len(names), POINT_COUNT, 3)
+        assert tuple(labels.shape) == (len(names), POINT_COUNT)
         seen.extend(names)
     assert sorted(seen) == sorted(toy_keys("train"))
 
@@ -111,7 +111,7 @@ def test_hugging_face_datasets_loads_every_split_with_typed_members(toy_folder: 
     assert "null" not in features["json"]
     assert found["nodes"] == sorted(found["parts"])
     assert found["size"] == [24, 24]
-    assert set(found["points"]) == {POINTS}
+    assert set(found["points"]) == {POINT_COUNT}
 
 
 CROISSANT = """
@@ -182,5 +182,5 @@ def test_mlcroissant_knows_splits_types_and_shapes(toy_folder: Path, croissant: 
     for joined in ("points-of-samples", "sketch0-of-samples", "json-of-samples"):
         assert {record["key"]: record["split"] for record in records[joined]} == split_of
     shape, (text, element) = croissant["shapes"]["points/content"]
-    assert (shape, text.rpartition("/")[2], element.rpartition("/")[2]) == ([POINTS, 3], "Text", "Float32")
+    assert (shape, text.rpartition("/")[2], element.rpartition("/")[2]) == ([POINT_COUNT, 3], "Text", "Float32")
     assert croissant["shapes"]["contacts-of-samples/content"][0] == [2, -1]

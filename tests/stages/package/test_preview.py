@@ -15,7 +15,7 @@ def row(kit: str, key: str, length: int) -> tuple[Sample, Shape]:
     return sample, kit_shape(toy_kit("blocks"), sample.assembly)
 
 
-def test_kits_take_turns_and_each_begins_with_its_largest() -> None:
+def test_kits_take_turns_and_every_begins_with_its_largest() -> None:
     samples = [row("a", f"a{length}", length) for length in (2, 3, 9, 5)] + [row("b", "b4", 4), row("b", "b7", 7)]
     chosen = [sample.key for sample, _ in varied(samples, 5)]
     assert chosen[:2] == ["a9", "b7"]

@@ -19,8 +19,8 @@ class Row(dict[str, Any]):
 
 def row(number: int) -> Row:
     values = {"string": "x", "bool": True, "float64": 0.5}
-    told = {"key": f"k{number}", "kit": "toy", "graph": f"g{number // 2}", "parts": number, "stable": number == 0}
-    return Row({name: values.get(kind, 1) for name, kind in column_kinds().items()} | told)
+    text = {"key": f"k{number}", "kit": "toy", "graph": f"g{number // 2}", "parts": number, "stable": number == 0}
+    return Row({name: values.get(kind, 1) for name, kind in column_kinds().items()} | text)
 
 
 def test_a_tally_counts_as_lists_would() -> None:

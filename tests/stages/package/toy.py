@@ -1,4 +1,4 @@
-"""A small dataset of boxes, made through the mill: toy stages before the real `points` and `package`."""
+"""A small dataset of boxes, made by the engine: toy stages before the real `points` and `package`."""
 
 from __future__ import annotations
 
@@ -62,9 +62,9 @@ def toy_kit(name: str) -> Kit:
     """Two types of boxes; the kit `planks` has z up."""
     types = (box("tower", (1.0, 1.0, 3.0), (200, 40, 40)), box("long.wall", (1.0, 0.5, 2.0), (40, 40, 200)))
     exemplar = Exemplar("row", chain(6, 0), tuple(f"part{index}" for index in range(6)))
-    beside = [np.eye(4), np.eye(4)]
-    beside[0][0, 3], beside[1][0, 3] = 1.0, -1.0
-    dockings = tuple(Docking(0, 1, pose, "face", count, 0.0) for pose, count in zip(beside, (3, 2), strict=True))
+    poses = [np.eye(4), np.eye(4)]
+    poses[0][0, 3], poses[1][0, 3] = 1.0, -1.0
+    dockings = tuple(Docking(0, 1, pose, "face", count, 0.0) for pose, count in zip(poses, (3, 2), strict=True))
     rules = {kind: {(): 1, ((1 - kind, 1),): 1, ((1 - kind, 2),): 4} for kind in (0, 1)}
     return Kit(
         name=name,
@@ -191,7 +191,7 @@ TOY_STAGES: Mapping[str, Stage] = named_inputs(
 
 
 def toy_config(shards: int = 4) -> Config:
-    """The config of the toy dataset of so many shards a split."""
+    """Return the config of the toy dataset with a number of shards per split."""
     sections = {
         **ABSENT_SECTIONS,
         "exemplars": ExemplarsConfig(),

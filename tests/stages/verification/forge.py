@@ -1,9 +1,9 @@
-"""A forger: changes one thing in a finished dataset and makes every checksum, offset and count anew.
+"""A forger: changes one thing in a finished dataset and updates every checksum, offset and count.
 
     python -m tests.stages.verification.forge datasets/castle --count 30 --seed 0
 
-copies the dataset beside what `make verify` needs of the mill's folder, applies each forgery to a sample chosen at
-random, verifies the copy, and says what was found. `--with-work` leaves what all stages made beside the copy.
+copies the dataset with the files of the work folder that `make verify` needs, applies each forgery to a random sample,
+verifies the copy, and prints the findings. `--with-work` keeps the shards of all stages.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ import numpy as np
 
 from pipeline.paths import file_digest
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes
-from stages.package.croissant import INDEX
 from stages.package.index import index_row, tar_bytes, write_index
+from stages.package.layout import INDEX
 from stages.package.manifest import checksums
 from stages.shape.collection.pairs import CONTACTS, pair_bytes, pairs_of
 from stages.shape.geometry.components import connected_components
@@ -391,7 +391,7 @@ def reseal(folder: Path) -> None:
         manifest["files"]["croissant.json"] = file_digest(folder / "croissant.json")
         (folder / "manifest.json").write_text(json.dumps(manifest, indent=1, ensure_ascii=False) + "\n")
     except (ValueError, TypeError, KeyError):
-        pass  # a manifest of rubbish: only the checksums are made anew
+        pass  # a manifest of rubbish: only the checksums are updated
     listed = (path for path in sorted(folder.rglob("*")) if path.is_file() and not path.is_symlink())
     digests = {path.relative_to(folder).as_posix(): file_digest(path) for path in listed}
     digests.pop("checksums.txt", None)
@@ -478,7 +478,7 @@ def _png(pixels: np.ndarray) -> bytes:
 
 
 def copy_dataset(source: Path, target: Path, with_work: bool) -> Path:
-    """A copy of a dataset and its index in the folder `target`, with what verify needs of the mill's folder."""
+    """A copy of a dataset and its index in the folder `target`, with the files of the work folder that verify needs."""
     for name in (source.name, f"{source.name}-index"):
         shutil.copytree(source.parent / name, target / name)
     work = source.parent / ".work" / source.name

@@ -169,7 +169,7 @@ BY_STATICS_OR_DRAWING = {"a mirrored sketch", "the sketch of another sample", "a
 
 @pytest.mark.parametrize("name", sorted({*FORGERIES} - BY_STATICS_OR_DRAWING))
 def test_a_forged_sample_is_found_and_named(folder: Path, name: str) -> None:
-    """Whatever is done to a sample, with checksums, offsets and counts made anew."""
+    """A forged sample is found even with matching checksums, offsets and counts."""
     key = forge(folder, name, np.random.default_rng(len(name)))
     faults = [fault for found in verify_dataset(folder, 0, 0).faults.values() for fault in found]
     assert any(key in fault for fault in faults), faults

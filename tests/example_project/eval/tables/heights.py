@@ -1,4 +1,4 @@
-"""An example of a table beside the project's own."""
+"""An example of a table outside the project."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""A producer in a house of its own: heaps of boxes, each sample a text that lists their heights."""
+"""A producer in a project of its own: heaps of boxes, each sample a text that lists their heights."""

@@ -44,8 +44,8 @@ class Heaps:
         return [("a pebble", heap("1.0"))]
 
 
-def _anew(_: DatasetPaths) -> RebuildShape:
+def _rebuild(_: DatasetPaths) -> RebuildShape:
     return lambda record, _: upright(heap(record["text"]))
 
 
-LANGUAGE = Language("heap", lambda _: (), lambda _: Heaps(), False, "Heights of the pebbles.", _anew)
+LANGUAGE = Language("heap", lambda _: (), lambda _: Heaps(), False, "Heights of the pebbles.", _rebuild)
