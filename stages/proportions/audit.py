@@ -13,12 +13,12 @@ from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import PackagedSample
 
 
-def _recheck(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
+def _recheck(sample: PackagedSample, paths: DatasetPaths) -> Iterator[str]:
     """Read and write the text again, and check that the shape keeps the contacts of its exemplar."""
     record = sample.record
     if record["language"] != LANGUAGE.name:
         return
-    kit = dataset_kits(places)[record["kit"]]
+    kit = dataset_kits(paths)[record["kit"]]
     try:
         name, warp = read_proportions(record["text"])
         fault = warp_fault(kit, exemplar_of(kit, name).whole, shape_of_text(kit, record["text"]))

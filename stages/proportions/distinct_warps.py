@@ -55,9 +55,9 @@ class DistinctWarps:
         gaps = np.abs(points - self._origin).max(axis=1, initial=0.0)
         chosen: list[int] = []
         while len(chosen) < min(count, len(points)):
-            place = int(gaps.argmax())
-            if gaps[place] < self._min_difference:
+            index = int(gaps.argmax())
+            if gaps[index] < self._min_difference:
                 break
-            chosen.append(place)
-            gaps = np.minimum(gaps, np.abs(points - points[place]).max(axis=1, initial=0.0))
+            chosen.append(index)
+            gaps = np.minimum(gaps, np.abs(points - points[index]).max(axis=1, initial=0.0))
         return chosen

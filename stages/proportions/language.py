@@ -42,8 +42,8 @@ def _reads(plan: Plan) -> tuple[str, ...]:
     return tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
 
 
-def _rebuild(places: DatasetPaths) -> RebuildShape:
-    kits = dataset_kits(places)
+def _rebuild(paths: DatasetPaths) -> RebuildShape:
+    kits = dataset_kits(paths)
 
     def shape(record: Mapping[str, Any], _: IntArray) -> Shape:
         if record["kit"] not in kits:

@@ -196,11 +196,11 @@ def run_collection(task: Task) -> Outcome:
 def report(plan: Plan) -> Sequence[str]:
     """Return the number of shapes of each kit, the rejects, and warnings where there are fewer than requested."""
     config = _requested_config(plan)
-    made = plan.summary("proportions", choice_name(plan.config.name)) if config.samples_per_kit else None
-    if made is None:
+    summary = plan.summary("proportions", choice_name(plan.config.name)) if config.samples_per_kit else None
+    if summary is None:
         return []
     lines = []
-    for kit, count in made["shapes"].items():
+    for kit, count in summary["shapes"].items():
         rejected: dict[str, int] = {}
         for search in range(config.parallel_searches):
             for reason, rejects in plan.rejects("proportions", _search_name(kit, search)).items():

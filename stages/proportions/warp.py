@@ -109,15 +109,15 @@ def lattice_of(kit: Kit, exemplar: Assembly) -> Lattice:
     for axis in range(3):
         ends = np.sort(boxes[:, :, axis].ravel())
         groups = np.split(ends, 1 + np.flatnonzero(np.diff(ends) > near))
-        places = np.array([group.mean() for group in groups])
+        knot_positions = np.array([group.mean() for group in groups])
         numbers = []
-        for gap in np.diff(places).tolist():
+        for gap in np.diff(knot_positions).tolist():
             tolerances = [max(2 * near, EQUAL_LENGTH_TOLERANCE * length) for length in known]
             equal = (number for number, length in enumerate(known) if abs(length - gap) <= tolerances[number])
             number = next(equal, len(known))
             known += [gap] if number == len(known) else []
             numbers.append(number)
-        knots.append(places)
+        knots.append(knot_positions)
         lengths.append(np.array(numbers, dtype=np.int64))
     return Lattice((knots[0], knots[1], knots[2]), (lengths[0], lengths[1], lengths[2]), {"y": 1, "z": 2}[kit.up])
 
@@ -133,8 +133,8 @@ def warped(kit: Kit, exemplar: Assembly, lattice: Lattice, warp: Sequence[FloatA
     meshes = []
     for part, (kind, pose) in enumerate(zip(exemplar.types.tolist(), exemplar.poses, strict=True)):
         mesh = kit.types[kind]
-        places = transform_points(pose, mesh.vertices)
-        moved = np.column_stack([_mapped(places[:, axis], lattice.knots[axis], images[axis]) for axis in range(3)])
+        positions = transform_points(pose, mesh.vertices)
+        moved = np.column_stack([_mapped(positions[:, axis], lattice.knots[axis], images[axis]) for axis in range(3)])
         centre = (moved.min(axis=0) + moved.max(axis=0)) / 2
         poses[part, :3, 3] = centre
         meshes.append(WarpedMesh(shape.part_names[part], moved - centre, mesh.faces, mesh.face_colors, mesh))
@@ -142,10 +142,10 @@ def warped(kit: Kit, exemplar: Assembly, lattice: Lattice, warp: Sequence[FloatA
     return replace(shape, meshes=tuple(meshes), assembly=assembly, own_names=shape.part_names)
 
 
-def _mapped(places: FloatArray, knots: FloatArray, images: FloatArray) -> FloatArray:
+def _mapped(positions: FloatArray, knots: FloatArray, images: FloatArray) -> FloatArray:
     """Return moved positions along an axis, float64 (v,). A knot is the mean of near ends, so some lie a little
     outside.
     """
-    inside = np.interp(places, knots, images)
-    mapped: FloatArray = inside + np.minimum(places - knots[0], 0.0) + np.maximum(places - knots[-1], 0.0)
+    inside = np.interp(positions, knots, images)
+    mapped: FloatArray = inside + np.minimum(positions - knots[0], 0.0) + np.maximum(positions - knots[-1], 0.0)
     return mapped

@@ -196,7 +196,7 @@ def _slot_misfits(kit: Kit, assembly: Assembly) -> list[int]:
 def _penetration_faults(
     kit: Kit, assembly: Assembly, shape: Shape, boxes: FloatArray, pairs: IntArray, names: Sequence[str]
 ) -> list[str]:
-    meshes, drawn, poses = shape.meshes, shape.assembly.types, assembly.poses
+    meshes, mesh_of, poses = shape.meshes, shape.assembly.types, assembly.poses
     test = PenetrationTest(meshes)
     slack = kit.contact_tolerance + kit.pose_tolerance
     faults = []
@@ -204,13 +204,13 @@ def _penetration_faults(
         if assembly.types[i] > assembly.types[j]:
             i, j = j, i
         seen = kit.grammar.depths.get((int(assembly.types[i]), int(assembly.types[j])), 0.0)
-        both = meshes[drawn[i]], meshes[drawn[j]]
+        both = meshes[mesh_of[i]], meshes[mesh_of[j]]
         if any(isinstance(mesh, StretchedMesh) for mesh in both):
             seen += STRETCHED_DEPTH * min(mesh.diagonal for mesh in both)
         allowed = seen + slack
         if depth_bound(boxes[i], boxes[j]) <= allowed:
             continue
-        depth = test.depth(int(drawn[i]), int(drawn[j]), invert(poses[i]) @ poses[j])
+        depth = test.depth(int(mesh_of[i]), int(mesh_of[j]), invert(poses[i]) @ poses[j])
         if depth > allowed:
             faults.append(f"{names[i]} and {names[j]} reach {depth:.4g} into each other, {seen:.4g} in the exemplars")
     return faults

@@ -40,8 +40,8 @@ class Shape:
     @cached_property
     def label_of(self) -> TypeArray:
         """Index of each mesh's label in `labels`, int16 (k,)."""
-        places = {name: index for index, name in enumerate(self.labels)}
-        return np.array([places[mesh.label] for mesh in self.meshes], dtype=np.int16)
+        index_of = {name: index for index, name in enumerate(self.labels)}
+        return np.array([index_of[mesh.label] for mesh in self.meshes], dtype=np.int16)
 
     @cached_property
     def part_labels(self) -> TypeArray:

@@ -70,14 +70,14 @@ def bake(meshes: Sequence[PartMesh], assembly: Assembly) -> tuple[tuple[PartMesh
         return tuple(meshes), assembly
     bent = np.abs(assembly.stretches - np.eye(3)).max(axis=(1, 2)) > RIGID_TOLERANCE
     baked = [meshes[kind] for kind in np.unique(assembly.types[~bent]).tolist()]
-    places = {(kind, b""): place for place, kind in enumerate(np.unique(assembly.types[~bent]).tolist())}
+    index_of = {(kind, b""): index for index, kind in enumerate(np.unique(assembly.types[~bent]).tolist())}
     types = []
     for part_type, stretch, is_bent in zip(assembly.types.tolist(), assembly.stretches, bent, strict=True):
         key = part_type, stretch.tobytes() if is_bent else b""
-        if key not in places:
-            places[key] = len(baked)
+        if key not in index_of:
+            index_of[key] = len(baked)
             baked.append(_stretched(meshes[part_type], stretch))
-        types.append(places[key])
+        types.append(index_of[key])
     return tuple(baked), replace(assembly, types=np.array(types, dtype=np.int16), stretches=None)
 
 

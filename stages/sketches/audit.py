@@ -84,9 +84,9 @@ def _drawing_faults(
 
 
 def _outline_faults(inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], sample: PackagedSample) -> Iterator[str]:
-    drawn, astray = outline_shares(inked, camera, sample)
-    if drawn < MIN_OUTLINE_DRAWN:
-        yield f"draws {drawn:.0%} of the outline that its camera sees"
+    outline_drawn, astray = outline_shares(inked, camera, sample)
+    if outline_drawn < MIN_OUTLINE_DRAWN:
+        yield f"draws {outline_drawn:.0%} of the outline that its camera sees"
     if astray > MAX_INK_ASTRAY:
         yield f"has {astray:.0%} of its ink where its camera does not see the shape"
 
@@ -112,17 +112,17 @@ def outline_shares(
     seen = np.zeros(inked.shape, dtype=bool)
     seen[np.ix_(rows, columns)] = hit
     off = np.argwhere(inked & (distance_transform_edt(~seen) > near + step))
-    astray = sum(not _is_seen_near(place, near, camera, sample) for place in off)
+    astray = sum(not _is_seen_near(pixel, near, camera, sample) for pixel in off)
     return float((to_ink[outline] <= near).mean()), astray / int(inked.sum())
 
 
-def _is_seen_near(place: npt.NDArray[np.int64], near: float, camera: Mapping[str, Any], sample: PackagedSample) -> bool:
+def _is_seen_near(pixel: npt.NDArray[np.int64], near: float, camera: Mapping[str, Any], sample: PackagedSample) -> bool:
     """Return whether the shape is seen `near` a pixel, with rays dense enough for thin parts.
 
     place: row and column of the pixel, (2,)
     """
     offsets = np.arange(-near, near + FINE_RAY_SPACING_PIXELS, FINE_RAY_SPACING_PIXELS)
-    origins, directions = _rays(camera, place[1] + 0.5 + offsets, place[0] + 0.5 + offsets)
+    origins, directions = _rays(camera, pixel[1] + 0.5 + offsets, pixel[0] + 0.5 + offsets)
     return bool(sample.rays.hit(origins.reshape(-1, 3), directions.reshape(-1, 3)).any())
 
 

@@ -65,10 +65,10 @@ def drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene) -
 def report(plan: Plan) -> Sequence[str]:
     """Return what drew the sketches: one line, or several if machines differ."""
     summaries = (plan.summary("sketches", name) for name in plan.shards("sketches"))
-    drawn = Counter(
+    counts = Counter(
         f"{summary['renderer']}, {summary['renderer_version']}" for summary in summaries if summary is not None
     )
-    return [f"{count} shards drawn by {what}" for what, count in sorted(drawn.items())]
+    return [f"{count} shards drawn by {what}" for what, count in sorted(counts.items())]
 
 
 def check_machine(config: Config) -> None:

@@ -69,8 +69,8 @@ def _pair_faults(sample: PackagedSample) -> Iterator[str]:
         if (pairs[0] >= pairs[1]).any() or (pairs < 0).any() or (pairs >= parts).any():
             yield f"{member} holds entries that are not pairs of its parts"
             return
-        places = pairs[0].astype(np.int64) * parts + pairs[1]
-        if (np.diff(places) <= 0).any():
+        keys = pairs[0].astype(np.int64) * parts + pairs[1]
+        if (np.diff(keys) <= 0).any():
             yield f"{member} is not in order, or has a pair twice"
     if connected_components(parts, sample.arrays[JOINTS].T).max() + 1 != physics["components"]:
         yield "its joints do not make as many components as physics says"

@@ -69,8 +69,8 @@ def _short(length: float) -> float:
 
 def report(plan: Plan) -> Sequence[str]:
     """Return how many samples are rooted and stable."""
-    found = [plan.summary("validity", name) for name in plan.shards("validity")]
-    done = [summary for summary in found if summary is not None]
+    summaries = [plan.summary("validity", name) for name in plan.shards("validity")]
+    done = [summary for summary in summaries if summary is not None]
     judged = sum(summary["samples"] for summary in done)
     if not judged:
         return []

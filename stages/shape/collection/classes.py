@@ -38,15 +38,15 @@ class Classes:
     @classmethod
     def of(cls, sources: Mapping[str, Source]) -> Classes:
         """Return the classes of the sources of a dataset. Raises ValueError for more than an int16 can count."""
-        found: list[PartClass] = []
+        classes: list[PartClass] = []
         first: dict[str, int] = {}
         for kit, source in sources.items():
-            first[kit] = len(found)
+            first[kit] = len(classes)
             colors = source.colors or (None,) * len(source.labels)
-            found += [
-                PartClass(len(found) + place, name, kit, color)
-                for place, (name, color) in enumerate(zip(source.labels, colors, strict=True))
+            classes += [
+                PartClass(len(classes) + index, name, kit, color)
+                for index, (name, color) in enumerate(zip(source.labels, colors, strict=True))
             ]
-        if len(found) > 2**15:
-            raise ValueError(f"the dataset has {len(found):,} part labels; labels are 16-bit numbers: at most 32,768")
-        return cls(tuple(found), first)
+        if len(classes) > 2**15:
+            raise ValueError(f"the dataset has {len(classes):,} part labels; labels are 16-bit numbers: at most 32,768")
+        return cls(tuple(classes), first)

@@ -53,10 +53,10 @@ def language_of(producer: str) -> Language:
 @cache
 def _discovered(what: str, kind: type[Discovered]) -> dict[str, Discovered]:
     """Return the `WHAT` of each `stages/<folder>/<what>.py`, by folder. Raises TypeError for a file without it."""
-    found: dict[str, Discovered] = {}
+    discovered: dict[str, Discovered] = {}
     for folder in folders_with(stages.__name__, f"{what}.py"):
         declared = getattr(importlib.import_module(f"{stages.__name__}.{folder}.{what}"), what.upper(), None)
         if not isinstance(declared, kind):
             raise TypeError(f"stages/{folder}/{what}.py must hold {what.upper()} = {kind.__name__}(...)")
-        found[folder] = declared
-    return found
+        discovered[folder] = declared
+    return discovered

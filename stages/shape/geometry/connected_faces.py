@@ -16,10 +16,10 @@ def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> 
     opposed faces that are connected elsewhere belong together, and of the others, going around the edge, two with the
     inside between them. A face that repeats another belongs to it.
     """
-    positions, place = np.unique(vertices, axis=0, return_inverse=True)
-    places = place.reshape(-1)[faces]
-    turn = (places.argmin(axis=1)[:, None] + np.arange(3)) % 3
-    turned = np.take_along_axis(places, turn, axis=1)
+    positions, inverse = np.unique(vertices, axis=0, return_inverse=True)
+    vertex_of = inverse.reshape(-1)[faces]
+    turn = (vertex_of.argmin(axis=1)[:, None] + np.arange(3)) % 3
+    turned = np.take_along_axis(vertex_of, turn, axis=1)
     _, original, copy_of = np.unique(np.column_stack([turned, kinds]), axis=0, return_index=True, return_inverse=True)
     numbers = 3 * np.arange(len(faces))[:, None] + turn
     pairs = [np.column_stack([numbers[original[copy_of.reshape(-1)]].ravel(), numbers.ravel()])]
@@ -27,7 +27,7 @@ def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> 
     first_of = np.sort(original)
     from_corner = (3 * first_of[:, None] + np.arange(3)).ravel()
     to_corner = (3 * first_of[:, None] + (1, 2, 0)).ravel()
-    start, end = places.ravel()[from_corner], places.ravel()[to_corner]
+    start, end = vertex_of.ravel()[from_corner], vertex_of.ravel()[to_corner]
     forward = start < end
     # each side of a face as (kind, lower place, higher place, corner at the lower, corner at the higher)
     sides = np.column_stack(
@@ -51,10 +51,10 @@ def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> 
     for begin, count in zip(first[size > 2].tolist(), size[size > 2].tolist(), strict=True):
         there = np.arange(begin, begin + count)
         couples, rest = _couples(region[owner[there]], forward[there])
-        wedges = _wedges(positions[sides[begin, 1:3]], positions[places[owner[there[rest]]]], forward[there[rest]])
+        wedges = _wedges(positions[sides[begin, 1:3]], positions[vertex_of[owner[there[rest]]]], forward[there[rest]])
         matched += [there[np.array([pair])] for pair in [*couples, *(tuple(rest[[i, j]]) for i, j in wedges)]]
-    one, other = np.concatenate(matched).T
-    pairs += [np.column_stack([sides[one, column], sides[other, column]]) for column in (3, 4)]
+    first_side, other = np.concatenate(matched).T
+    pairs += [np.column_stack([sides[first_side, column], sides[other, column]]) for column in (3, 4)]
     return np.concatenate(pairs)
 
 
@@ -99,13 +99,13 @@ def _wedges(ends: FloatArray, triangles: FloatArray, forward: np.ndarray) -> lis
     clockwise = np.round(-counterclockwise, 4) % np.round(2 * np.pi, 4)
     free = np.lexsort((forward, clockwise)).tolist()
     pairs: list[tuple[int, int]] = []
-    place = 0
-    while place < len(free) > 1:
-        here, after = free[place], free[(place + 1) % len(free)]
+    index = 0
+    while index < len(free) > 1:
+        here, after = free[index], free[(index + 1) % len(free)]
         if forward[here] and not forward[after]:
             pairs.append((here, after))
             free = [face for face in free if face not in (here, after)]
-            place = 0
+            index = 0
         else:
-            place += 1
+            index += 1
     return pairs

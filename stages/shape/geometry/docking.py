@@ -55,9 +55,9 @@ class DockingTable:
             entries.setdefault((docking.b, docking.a), []).append((backward, 2 * index + 1))
         self.images: dict[tuple[int, int], tuple[FloatArray, IntArray]] = {}
         self._vectors: dict[tuple[int, int], FloatArray] = {}
-        for pair, found in sorted(entries.items()):
-            poses = np.concatenate([images for images, _ in found])
-            labels = np.concatenate([np.full(len(images), label, dtype=np.int32) for images, label in found])
+        for pair, of_pair in sorted(entries.items()):
+            poses = np.concatenate([images for images, _ in of_pair])
+            labels = np.concatenate([np.full(len(images), label, dtype=np.int32) for images, label in of_pair])
             vectors = pose_vectors(poses, self.types[pair[1]].diagonal / 2)
             # Equal images are written once. Where two images of one docking are within tolerance both get the lower
             # label, so that a docking that is nearly its own inverse is even; both stay, for what lies at their sides.
@@ -111,8 +111,8 @@ class DockingTable:
             first, second = self.types[a], self.types[b]
             fits = [*self._fit_poses.get((a, b), ()), *map(invert, self._fit_poses.get((b, a), ()))]
             seen = self.images[a, b][0] if (a, b) in self.images else np.empty((0, 4, 4))
-            found = np.concatenate([seen, *(symmetric_images(first, second, pose) for pose in fits)])
-            self._poses[a, b] = found, pose_vectors(found, second.diagonal / 2)
+            all_poses = np.concatenate([seen, *(symmetric_images(first, second, pose) for pose in fits)])
+            self._poses[a, b] = all_poses, pose_vectors(all_poses, second.diagonal / 2)
         return self._poses[a, b][0]
 
     def nearest(self, a: int, b: int, pose: FloatArray) -> list[tuple[float, FloatArray]]:

@@ -9,10 +9,10 @@ from stages.shape.geometry.grid_hash import OWN_CELL, cell_hash
 
 
 @numba.njit(cache=True)
-def _gap(one, other):
+def _gap(first, second):
     total = 0.0
-    for k in range(len(one)):
-        total += (one[k] - other[k]) ** 2
+    for k in range(len(first)):
+        total += (first[k] - second[k]) ** 2
     return total**0.5
 
 
@@ -35,15 +35,15 @@ def distinct_images(vectors, labels, tolerance, same):
     count = 0
     for candidate in np.argsort(labels, kind="mergesort"):
         vector = vectors[candidate]
-        nearest, least, is_written = -1, np.inf, False
+        nearest, least_gap, is_written = -1, np.inf, False
         for turn in range(27):
-            place = heads[cell_hash(vector, turn, reach) & (size - 1)]
-            while place >= 0 and not is_written:
-                gap = _gap(vectors[kept[place]], vector)
+            index = heads[cell_hash(vector, turn, reach) & (size - 1)]
+            while index >= 0 and not is_written:
+                gap = _gap(vectors[kept[index]], vector)
                 is_written = gap <= same
-                if gap <= tolerance and (gap < least or (gap == least and place < nearest)):
-                    nearest, least = place, gap
-                place = following[place]
+                if gap <= tolerance and (gap < least_gap or (gap == least_gap and index < nearest)):
+                    nearest, least_gap = index, gap
+                index = following[index]
             if is_written:
                 break
         if is_written:
@@ -63,16 +63,16 @@ def nearest_image(known, vectors):
     """Return the index of the nearest of the images `known` (n, 12), n > 0, for each of the `vectors` (m, 12), and its
     gap.
     """
-    places, gaps = np.empty(len(vectors), dtype=np.int64), np.empty(len(vectors))
+    indices, gaps = np.empty(len(vectors), dtype=np.int64), np.empty(len(vectors))
     for number in range(len(vectors)):
-        best, least = 0, np.inf
-        for place in range(len(known)):
+        best, least_gap = 0, np.inf
+        for index in range(len(known)):
             total = 0.0
             for k in range(12):
-                total += (known[place, k] - vectors[number, k]) ** 2
-                if total >= least:
+                total += (known[index, k] - vectors[number, k]) ** 2
+                if total >= least_gap:
                     break
-            if total < least:
-                best, least = place, total
-        places[number], gaps[number] = best, least**0.5
-    return places, gaps
+            if total < least_gap:
+                best, least_gap = index, total
+        indices[number], gaps[number] = best, least_gap**0.5
+    return indices, gaps

@@ -47,14 +47,14 @@ def _split(low, high):
             links[parent, side] = node
         longest, axis = -1.0, 0
         for k in range(3):
-            bottom, top, least, most = np.inf, -np.inf, np.inf, -np.inf
-            for place in range(begin, end):
-                face = order[place]
+            bottom, top, low_centre, high_centre = np.inf, -np.inf, np.inf, -np.inf
+            for index in range(begin, end):
+                face = order[index]
                 bottom, top = min(bottom, low[face, k]), max(top, high[face, k])
-                least, most = min(least, centres[face, k]), max(most, centres[face, k])
+                low_centre, high_centre = min(low_centre, centres[face, k]), max(high_centre, centres[face, k])
             boxes[node, k], boxes[node, 3 + k] = (bottom + top) / 2, (top - bottom) / 2
-            if most - least > longest:
-                longest, axis = most - least, k
+            if high_centre - low_centre > longest:
+                longest, axis = high_centre - low_centre, k
         if end - begin <= MAX_LEAF_TRIANGLES:
             links[node] = -begin - 1, end - begin
             continue
@@ -223,7 +223,7 @@ def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, stop_at_first, pairs):
     stack = np.empty((512, 2), dtype=np.int64)
     moved = np.empty((3, 3))
     scratch = np.empty((4, 3))
-    found = 0
+    count = 0
     stack[0, 0] = 0
     stack[0, 1] = 0
     size = 1
@@ -242,12 +242,12 @@ def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, stop_at_first, pairs):
                         )
                 for u in range(-la[i, 0] - 1, -la[i, 0] - 1 + la[i, 1]):
                     if _triangles_within(ca[u], moved, tolerance, scratch[0], scratch[1], scratch[2], scratch[3]):
-                        if found < len(pairs):
-                            pairs[found, 0] = u
-                            pairs[found, 1] = v
-                        found += 1
+                        if count < len(pairs):
+                            pairs[count, 0] = u
+                            pairs[count, 1] = v
+                        count += 1
                         if stop_at_first:
-                            return found
+                            return count
         elif leaf_b or (not leaf_a and ba[i, 3] + ba[i, 4] + ba[i, 5] > bb[j, 3] + bb[j, 4] + bb[j, 5]):
             for child in range(2):
                 stack[size, 0], stack[size, 1] = la[i, child], j
@@ -256,7 +256,7 @@ def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, stop_at_first, pairs):
             for child in range(2):
                 stack[size, 0], stack[size, 1] = i, lb[j, child]
                 size += 1
-    return found
+    return count
 
 
 _NO_PAIRS = np.empty((0, 2), dtype=np.int64)
@@ -270,11 +270,11 @@ def first_contact(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> bool:
 def near_pairs(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> np.ndarray:
     """Return all pairs of triangles within `tolerance`, int64 (p, 2), in tree order of `a` and `b`."""
     pairs = np.empty((4096, 2), dtype=np.int64)
-    found = _walk(*a, *b, pose, tolerance, False, pairs)
-    if found > len(pairs):
-        pairs = np.empty((found, 2), dtype=np.int64)
+    count = _walk(*a, *b, pose, tolerance, False, pairs)
+    if count > len(pairs):
+        pairs = np.empty((count, 2), dtype=np.int64)
         _walk(*a, *b, pose, tolerance, False, pairs)
-    return pairs[:found]
+    return pairs[:count]
 
 
 @numba.njit(cache=True)
@@ -291,8 +291,8 @@ def contact_patches(ca, cb, pairs, pose, tolerance):
     area = np.zeros(len(pairs))
     crossing = np.zeros(len(pairs), dtype=np.bool_)
     total = 0
-    one = np.empty((16, 3))
-    two = np.empty((16, 3))
+    polygon = np.empty((16, 3))
+    spare = np.empty((16, 3))
     tri = np.empty((3, 3))
     na, nb, edge, sides = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for index in range(len(pairs)):
@@ -313,12 +313,12 @@ def contact_patches(ca, cb, pairs, pose, tolerance):
         cross_b = sides.min() < -2 * tolerance and sides.max() > 2 * tolerance
         crossing[index] = cross_a and cross_b
         for k in range(3):
-            one[k] = first[k]
+            polygon[k] = first[k]
         base = _dot(nb, tri[0])
-        count = cut(one, 3, nb, 1.0, base + tolerance, two)
+        count = cut(polygon, 3, nb, 1.0, base + tolerance, spare)
         for axis in range(3):
             nb[axis] = -nb[axis]
-        count = cut(two, count, nb, 1.0, -base + tolerance, one)
+        count = cut(spare, count, nb, 1.0, -base + tolerance, polygon)
         for k in range(3):
             if count == 0:
                 break
@@ -333,14 +333,14 @@ def contact_patches(ca, cb, pairs, pose, tolerance):
                 continue
             for axis in range(3):
                 edge[axis] /= length
-            count = cut(one, count, edge, 1.0, _dot(edge, tri[k]) + tolerance, two)
-            one, two = two, one
+            count = cut(polygon, count, edge, 1.0, _dot(edge, tri[k]) + tolerance, spare)
+            polygon, spare = spare, polygon
         if count == 0:
             continue
         if abs(_dot(na, nb)) > 0.99:
-            area[index] = polygon_area(one, count)
+            area[index] = polygon_area(polygon, count)
         for k in range(count):
-            points[total] = one[k]
+            points[total] = polygon[k]
             total += 1
     return points[:total], area, crossing
 

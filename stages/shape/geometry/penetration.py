@@ -89,8 +89,8 @@ class PenetrationTest:
         odd = self._odd(scene, points, RAYS[:MAJORITY_RAYS])
         doubtful = (odd > 0) & (odd < MAJORITY_RAYS)
         odd[doubtful] += self._odd(scene, points[doubtful], RAYS[MAJORITY_RAYS:])
-        found: np.ndarray = odd >= MAJORITY_RAYS
-        return found
+        is_inside: np.ndarray = odd >= MAJORITY_RAYS
+        return is_inside
 
     def _odd(self, scene: Any, points: np.ndarray, directions: FloatArray) -> np.ndarray:
         """Return along how many `directions` (d, 3) each of the points (p, 3) sees an odd number of surfaces, (p,)."""
@@ -144,9 +144,9 @@ def _inside_box(columns: FloatArray, pose: FloatArray, box: FloatArray) -> Float
     """
     slack = BOX_ROUNDING_SHARE * float(np.abs(box).max())
     for axis, (low, high) in enumerate(box.T):
-        places = pose[axis, :3] @ columns + pose[axis, 3]
-        columns = columns[:, (places > low - slack) & (places < high + slack)]
+        coordinates = pose[axis, :3] @ columns + pose[axis, 3]
+        columns = columns[:, (coordinates > low - slack) & (coordinates < high + slack)]
     points = transform_points(pose, columns.T)
     inside = (points > box[0]) & (points < box[1])
-    found: FloatArray = points[inside[:, 0] & inside[:, 1] & inside[:, 2]]
-    return found
+    kept: FloatArray = points[inside[:, 0] & inside[:, 1] & inside[:, 2]]
+    return kept

@@ -169,7 +169,7 @@ def _bliss(
     colors = np.concatenate([cells, len(order) + along[~plain], len(order) + against[turning]])
     graph = igraph.Graph(n=len(colors), edges=arcs)
     # igraph 1.0 answers with the nodes in canonical order, whatever its documentation says of new numbers.
-    place = np.argsort(graph.canonical_permutation(color=colors.tolist()))[: len(nodes)]
+    rank = np.argsort(graph.canonical_permutation(color=colors.tolist()))[: len(nodes)]
     settled = order.copy()
-    settled[positions] = nodes[np.lexsort((place, cells))]
+    settled[positions] = nodes[np.lexsort((rank, cells))]
     return settled

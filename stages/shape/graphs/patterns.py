@@ -42,7 +42,7 @@ def observed_patterns(kit: Kit, dockings: DockingTable, upright: bool) -> list[P
     upright: whether patterns that differ only in which way is up are two
     """
     axis = {"y": 1, "z": 2}[kit.up]
-    found: dict[tuple[int, ...], list[Pattern]] = {}
+    patterns: dict[tuple[int, ...], list[Pattern]] = {}
     for number, exemplar in enumerate(kit.exemplars):
         assembly = exemplar.assembly
         labels = dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
@@ -65,14 +65,14 @@ def observed_patterns(kit: Kit, dockings: DockingTable, upright: bool) -> list[P
                 1,
                 number,
             )
-            alike = found.setdefault(signature, [])
-            for place, known in enumerate(alike):
+            alike = patterns.setdefault(signature, [])
+            for index, known in enumerate(alike):
                 if _same(kit, known, pattern, upright):
-                    alike[place] = replace(known, seen=known.seen + 1)
+                    alike[index] = replace(known, seen=known.seen + 1)
                     break
             else:
                 alike.append(pattern)
-    return sorted((pattern for alike in found.values() for pattern in alike), key=lambda pattern: pattern.part_type)
+    return sorted((pattern for alike in patterns.values() for pattern in alike), key=lambda pattern: pattern.part_type)
 
 
 def _same(kit: Kit, first: Pattern, second: Pattern, upright: bool) -> bool:
@@ -82,8 +82,8 @@ def _same(kit: Kit, first: Pattern, second: Pattern, upright: bool) -> bool:
         turns = turns[np.linalg.norm(turns @ first.up - second.up, axis=1) < MAX_UP_DIFFERENCE]
     limit = 2.0 * kit.pose_tolerance
     for turn in turns:
-        places = first.poses[:, :3, 3] @ turn.T
-        gaps = np.linalg.norm(places[:, None] - second.poses[None, :, :3, 3], axis=2)
+        positions = first.poses[:, :3, 3] @ turn.T
+        gaps = np.linalg.norm(positions[:, None] - second.poses[None, :, :3, 3], axis=2)
         gaps[first.types[:, None] != second.types[None]] = np.inf
         nearest = gaps.argmin(axis=1) if len(gaps) else np.empty(0, dtype=np.int64)
         if len(set(nearest.tolist())) < len(nearest) or (gaps[np.arange(len(gaps)), nearest] > limit).any():

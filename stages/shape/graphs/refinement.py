@@ -73,8 +73,8 @@ def refine(colors, edges, forward, backward, classes):
                 if size[cell] == 1:
                     continue
                 _sort_by_count(partition, count, low, end)
-                found, largest = _split(partition, count, cell, low)
-                cells += found - 1
+                pieces, largest = _split(partition, count, cell, low)
+                cells += pieces - 1
                 # of a cell that does not wait, the largest piece need not wait
                 was_waiting = waiting[cell]
                 begin = cell
@@ -177,8 +177,8 @@ def _touch(partition, members, arc, count, touched, moved, parted):
                 broken += 1
             moved[cell] += 1
             target = cell + size[cell] - moved[cell]
-            other, place = order[target], position[v]
-            order[place], position[other] = other, place
+            other, index = order[target], position[v]
+            order[index], position[other] = other, index
             order[target], position[v] = v, target
         count[v] += 1
         arc = older[arc]
@@ -227,6 +227,6 @@ def _sort_by_count(partition, count, low, end):
         begins[value], total = total, total + begins[value]
     nodes = order[low:end].copy()
     for v in nodes:
-        place = begins[count[v]]
+        index = begins[count[v]]
         begins[count[v]] += 1
-        order[place], position[v] = v, place
+        order[index], position[v] = v, index

@@ -264,7 +264,7 @@ class SlotGrammar:
 
         All observed ones are there, and others, at most MAX_PATTERNS for each orientation, modulo symmetry.
         """
-        found: list[Pattern] = []
+        admitted: list[Pattern] = []
         for part_type, orientations in sorted(self._orientations.items()):
             for orientation in orientations:
                 chosen: dict[State, tuple[float, int]] = {}
@@ -280,8 +280,8 @@ class SlotGrammar:
                 for places, (weight, owner) in chosen.items():
                     poses = np.array([orientation.poses[place] for place in places]).reshape(-1, 4, 4)
                     types = np.array([orientation.types[place] for place in places], dtype=np.int64)
-                    found.append(Pattern(part_type, types, poses, orientation.up, weight, owner))
-        return found
+                    admitted.append(Pattern(part_type, types, poses, orientation.up, weight, owner))
+        return admitted
 
     def _others(self, orientation: _Orientation) -> Iterator[State]:
         """Yield neighbourhoods that the grammar admits: all in order if few, else random ones."""
@@ -331,10 +331,10 @@ class SlotGrammar:
                 if not fitting:
                     return None
                 states, odds = [states[number] for number in fitting], odds[fitting]
-            place = int(odds.cumsum().searchsorted(rng.random() * odds.sum()))
-            split[slot] = states[min(place, len(states) - 1)]
+            chosen = int(odds.cumsum().searchsorted(rng.random() * odds.sum()))
+            split[slot] = states[min(chosen, len(states) - 1)]
             done.append(slot)
-        return tuple(sorted(place for state in split for place in state))
+        return tuple(sorted(chosen for state in split for chosen in state))
 
     def _fits(self, orientation: _Orientation, split: list[State], slot: int, others: Iterable[int]) -> bool:
         """Return whether the level admits the state of a slot together with those of some others."""

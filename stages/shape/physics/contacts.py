@@ -90,15 +90,15 @@ class PairContacts:
 
         plain = np.flatnonzero(_both_boxes(placed, pairs))
         rows, points, normals = box_contacts(placed.centres, placed.axes, placed.halves, pairs[plain], tolerance)
-        found = [(plain[rows], points, normals)]
+        groups = [(plain[rows], points, normals)]
         locked = np.zeros(len(pairs), dtype=bool)
         for row in np.setdiff1d(np.arange(len(pairs)), plain).tolist():
             i, j = pairs[row].tolist()
             near, points, normals = self._patch(placed, i, j, tolerance)
             locked[row] = near and not len(points)
             rotation, offset = placed.poses[i, :3, :3], placed.poses[i, :3, 3]
-            found.append((np.full(len(points), row), points @ rotation.T + offset, -normals @ rotation.T))
-        patch = np.concatenate([rows for rows, _, _ in found])
+            groups.append((np.full(len(points), row), points @ rotation.T + offset, -normals @ rotation.T))
+        patch = np.concatenate([rows for rows, _, _ in groups])
         order = np.argsort(patch, kind="stable")
         patch = patch[order]
         return (
@@ -106,8 +106,8 @@ class PairContacts:
                 first=pairs[patch, 0].astype(np.int64),
                 second=pairs[patch, 1].astype(np.int64),
                 patch=patch,
-                points=np.concatenate([points for _, points, _ in found])[order],
-                normals=np.concatenate([normals for _, _, normals in found])[order],
+                points=np.concatenate([points for _, points, _ in groups])[order],
+                normals=np.concatenate([normals for _, _, normals in groups])[order],
             ),
             locked,
         )
@@ -155,8 +155,8 @@ class PairContacts:
             return 0.0, 0.0
         question = ("overlap", a, b, key)
         if question in self._answers:
-            found: tuple[float, float] = self._answers[question]
-            return found
+            cached: tuple[float, float] = self._answers[question]
+            return cached
         moved = self.meshes[b].vertices @ pose[:3, :3].T + pose[:3, 3]
         low = np.maximum(self.meshes[a].bounds[0], moved.min(axis=0))
         high = np.minimum(self.meshes[a].bounds[1], moved.max(axis=0))
@@ -179,8 +179,8 @@ class PairContacts:
         a, b, pose, key = self._question(placed, i, j)
         question = ("patch", a, b, key, tolerance)
         if question in self._answers:
-            found: tuple[bool, FloatArray, FloatArray] = self._answers[question]
-            return found
+            cached: tuple[bool, FloatArray, FloatArray] = self._answers[question]
+            return cached
         pairs = near_pairs(self._tree(a), self._tree(b), pose, tolerance)
         corners_a, corners_b = self._tree(a)[0], self._tree(b)[0]
         closed = bool(self.solids.closed[a] and self.solids.closed[b])

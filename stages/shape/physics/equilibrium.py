@@ -92,20 +92,20 @@ def _solved(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing:
     If a method fails, another takes over.
     """
     if len(load) == 1:
-        found = _by_tableau(wrenches, bodies, load, growing, cap)
-        if found is not None:
-            return found
+        limits = _by_tableau(wrenches, bodies, load, growing, cap)
+        if limits is not None:
+            return limits
     if len(wrenches) * len(growing) <= MAX_HIGHS_COLUMNS:
-        found = _by_highs(wrenches, bodies, load, growing, cap)
-        if found is not None:
-            return found
+        limits = _by_highs(wrenches, bodies, load, growing, cap)
+        if limits is not None:
+            return limits
     factors, motions = np.full(len(growing), -1.0), np.zeros_like(growing)
     for index in range(len(growing)):
         single = wrenches, bodies, load, growing[index : index + 1], cap
-        found = _by_interior_point(*single) or _by_highs(*single)
-        if found is None or found.factors[0] < 0:
+        limits = _by_interior_point(*single) or _by_highs(*single)
+        if limits is None or limits.factors[0] < 0:
             return LoadLimits(np.full(len(growing), -1.0), motions)
-        factors[index], motions[index] = found.factors[0], found.motions[0]
+        factors[index], motions[index] = limits.factors[0], limits.motions[0]
     return LoadLimits(factors, motions)
 
 
@@ -172,13 +172,13 @@ def _by_interior_point(
 
     loads = np.stack([-load.ravel(), growing.ravel()])
     try:
-        found, dual = solve_interior(
+        solution, dual = solve_interior(
             wrenches, bodies, len(load), loads, np.array([1.0, cap]), np.array([-STEADY_LOAD_WEIGHT, -1.0])
         )
     except (ArithmeticError, np.linalg.LinAlgError):
         return None
-    borne = found[0] >= 1 - BORNE_TOLERANCE
-    return LoadLimits(np.array([found[1] if borne else -1.0]), -dual.reshape(growing.shape))
+    borne = solution[0] >= 1 - BORNE_TOLERANCE
+    return LoadLimits(np.array([solution[1] if borne else -1.0]), -dual.reshape(growing.shape))
 
 
 def _cone(normals: FloatArray, friction: float, azimuth: float, directions: int) -> FloatArray:

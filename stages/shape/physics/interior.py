@@ -221,26 +221,26 @@ def _along(bodies: np.ndarray, count: int) -> tuple[np.ndarray, int]:
 
     both = bodies[bodies[:, 1] >= 0]
     graph = coo_matrix((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(count, count)).tocsr()
-    place = np.argsort(reverse_cuthill_mckee(graph + graph.T, symmetric_mode=True))
-    apart = np.abs(place[both[:, 0]] - place[both[:, 1]]).max(initial=0)
-    return place, 6 * int(apart) + 5
+    index = np.argsort(reverse_cuthill_mckee(graph + graph.T, symmetric_mode=True))
+    distance = np.abs(index[both[:, 0]] - index[both[:, 1]]).max(initial=0)
+    return index, 6 * int(distance) + 5
 
 
 @numba.njit(cache=True)
-def _normal(wrenches, place, weights, count, width):
+def _normal(wrenches, order, weights, count, width):
     """Return the lower band, (width + 1, 6 count), of the weighted sum of the columns' outer products."""
     band = np.zeros((width + 1, 6 * count))
     for c in range(len(wrenches)):
-        for one in range(2):
-            p = place[c, one]
+        for side in range(2):
+            p = order[c, side]
             if p < 0:
                 continue
             for other in range(2):
-                q = place[c, other]
+                q = order[c, other]
                 if q < 0 or q > p:
                     continue
                 for i in range(6):
-                    scaled = weights[c] * wrenches[c, one, i]
+                    scaled = weights[c] * wrenches[c, side, i]
                     for j in range(6):
                         row, column = 6 * p + i, 6 * q + j
                         if row >= column:
@@ -249,11 +249,11 @@ def _normal(wrenches, place, weights, count, width):
 
 
 @numba.njit(cache=True)
-def _act(wrenches, place, x, count):
+def _act(wrenches, order, x, count):
     out = np.zeros(6 * count)
     for c in range(len(wrenches)):
         for side in range(2):
-            p = place[c, side]
+            p = order[c, side]
             if p >= 0:
                 for i in range(6):
                     out[6 * p + i] += x[c] * wrenches[c, side, i]
@@ -261,11 +261,11 @@ def _act(wrenches, place, x, count):
 
 
 @numba.njit(cache=True)
-def _lift(wrenches, place, y):
+def _lift(wrenches, order, y):
     out = np.zeros(len(wrenches))
     for c in range(len(wrenches)):
         for side in range(2):
-            p = place[c, side]
+            p = order[c, side]
             if p >= 0:
                 for i in range(6):
                     out[c] += y[6 * p + i] * wrenches[c, side, i]

@@ -117,13 +117,13 @@ class Judge:
         floating = _floating(placed, connected, config)
         volumes, depths = self._touch.overlaps(placed, connected)
         standing = self._standing(placed)
-        found = self._stability(placed, connected, depths, standing)
+        verdict = self._stability(placed, connected, depths, standing)
         whole = self._solids.volumes[placed.types].sum()
         return Validity(
             rooted=not floating.any(),
-            stable=found.stable,
-            margin=found.margin,
-            weakest=found.weakest,
+            stable=verdict.stable,
+            margin=verdict.margin,
+            weakest=verdict.weakest,
             tipping_degrees=tipping_angle(placed, standing),
             components=int(connected_components(len(placed), connected).max()) + 1,
             floating=int(floating.sum()),
@@ -200,5 +200,5 @@ def _floating(placed: PlacedParts, connected: np.ndarray, config: PhysicsConfig)
     """Return which parts no chain of connected parts leads to the ground, bool (n,)."""
     pieces = connected_components(len(placed), connected)
     low = placed.spans[:, 0, 2] <= config.connected * placed.diagonal
-    found: np.ndarray = ~np.isin(pieces, pieces[low])
-    return found
+    floating: np.ndarray = ~np.isin(pieces, pieces[low])
+    return floating

@@ -63,7 +63,7 @@ def facing_polygons(ca, cb, pairs, pose, tolerance, oriented):
     """
     r, t = pose[:3, :3], pose[:3, 3]
     points, normals = np.empty((10 * len(pairs) + 1, 3)), np.empty((10 * len(pairs) + 1, 3))
-    one, two, tri = np.empty((16, 3)), np.empty((16, 3)), np.empty((3, 3))
+    polygon, spare, tri = np.empty((16, 3)), np.empty((16, 3)), np.empty((3, 3))
     na, nb, side = np.empty(3), np.empty(3), np.empty(3)
     total = 0
     for index in range(len(pairs)):
@@ -77,17 +77,17 @@ def facing_polygons(ca, cb, pairs, pose, tolerance, oriented):
         facing = na[0] * nb[0] + na[1] * nb[1] + na[2] * nb[2]
         if facing > -MIN_OPPOSED_COSINE and (oriented or facing < MIN_OPPOSED_COSINE):
             continue
-        one[:3] = first
+        polygon[:3] = first
         count = 3
         for k in range(3):
             offset = _sides(tri, nb, k, side)
-            count = cut(one, count, side, 1.0, offset, two)
-            one, two = two, one
+            count = cut(polygon, count, side, 1.0, offset, spare)
+            polygon, spare = spare, polygon
             if count == 0:
                 break
         base = nb[0] * tri[0, 0] + nb[1] * tri[0, 1] + nb[2] * tri[0, 2]
-        count = cut(one, count, nb, 1.0, base + tolerance, two)
-        count = cut(two, count, nb, -1.0, -base + tolerance, one)
+        count = cut(polygon, count, nb, 1.0, base + tolerance, spare)
+        count = cut(spare, count, nb, -1.0, -base + tolerance, polygon)
         if count < 3:
             continue
         sign = -1.0 if facing < 0 else 1.0
@@ -96,9 +96,9 @@ def facing_polygons(ca, cb, pairs, pose, tolerance, oriented):
             side[i] = na[i] + sign * nb[i]
             length += side[i] * side[i]
         for k in range(count):
-            above = (nb[0] * one[k, 0] + nb[1] * one[k, 1] + nb[2] * one[k, 2] - base) / 2
+            above = (nb[0] * polygon[k, 0] + nb[1] * polygon[k, 1] + nb[2] * polygon[k, 2] - base) / 2
             for i in range(3):
-                points[total, i] = one[k, i] - above * nb[i]
+                points[total, i] = polygon[k, i] - above * nb[i]
                 normals[total, i] = side[i] / length**0.5
             total += 1
     return points[:total], normals[:total]
@@ -248,20 +248,23 @@ def overlap(ca, cb, pose, low, high):
     # A little off the middle, along each axis by another share, so that no line meets the edges of a symmetric part.
     step = (high - low) / (LINES_PER_SIDE + 0.02)
     start = low + LINE_OFFSETS * step
-    one, two = np.empty((LINES_PER_SIDE, LINES_PER_SIDE, 64)), np.empty((LINES_PER_SIDE, LINES_PER_SIDE, 64))
+    heights_a, heights_b = (
+        np.empty((LINES_PER_SIDE, LINES_PER_SIDE, 64)),
+        np.empty((LINES_PER_SIDE, LINES_PER_SIDE, 64)),
+    )
     count_one = np.zeros((LINES_PER_SIDE, LINES_PER_SIDE), dtype=np.int64)
     count_two = np.zeros((LINES_PER_SIDE, LINES_PER_SIDE), dtype=np.int64)
     volume, depth = 0.0, np.inf
     for axis in range(3):
-        _crossings(ca, axis, start, step, LINES_PER_SIDE, one, count_one)
-        _crossings(moved, axis, start, step, LINES_PER_SIDE, two, count_two)
+        _crossings(ca, axis, start, step, LINES_PER_SIDE, heights_a, count_one)
+        _crossings(moved, axis, start, step, LINES_PER_SIDE, heights_b, count_two)
         longest, sum_of = 0.0, 0.0
         for i in range(LINES_PER_SIDE):
             for j in range(LINES_PER_SIDE):
                 p, q = count_one[i, j], count_two[i, j]
                 if p < 2 or q < 2 or p % 2 == 1 or q % 2 == 1:
                     continue
-                a, b = np.sort(one[i, j, :p]), np.sort(two[i, j, :q])
+                a, b = np.sort(heights_a[i, j, :p]), np.sort(heights_b[i, j, :q])
                 for x in range(0, p, 2):
                     for y in range(0, q, 2):
                         shared = min(a[x + 1], b[y + 1]) - max(a[x], b[y])

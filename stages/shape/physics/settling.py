@@ -123,9 +123,9 @@ def _downhill(support: FloatArray, centre: FloatArray, near: float) -> tuple[Flo
     edges = np.roll(support, -1, axis=0) - support
     lengths = np.maximum((edges**2).sum(axis=1), np.finfo(float).tiny)
     along = np.clip(((centre - support) * edges).sum(axis=1) / lengths, 0.0, 1.0)
-    places = support + along[:, None] * edges
-    nearest = int(np.linalg.norm(places - centre, axis=1).argmin())
-    way = centre - places[nearest]
+    nearest_points = support + along[:, None] * edges
+    nearest = int(np.linalg.norm(nearest_points - centre, axis=1).argmin())
+    way = centre - nearest_points[nearest]
     if np.linalg.norm(way) <= near:
         way = np.array([edges[nearest, 1], -edges[nearest, 0]]) if len(support) > 1 else np.array([1.0, 0.0])
-    return places[nearest], way / np.linalg.norm(way)
+    return nearest_points[nearest], way / np.linalg.norm(way)

@@ -41,14 +41,14 @@ class MeshSolids:
         eights = [index for index in eights if len(meshes[index].faces) == 12]
         if not eights:
             return
-        found, centres, axes, halves = recognise_boxes(np.stack([meshes[index].vertices for index in eights]))
+        is_box, centres, axes, halves = recognise_boxes(np.stack([meshes[index].vertices for index in eights]))
         faces = np.stack([meshes[index].faces for index in eights])
         corners = np.stack([meshes[index].vertices for index in eights])[np.arange(len(eights))[:, None, None], faces]
         sides = 8 * (halves * np.roll(halves, 1, axis=1)).sum(axis=1)
         # Twelve triangles with the area of the six sides are the sides: none is missing or repeated.
-        found &= np.abs(triangle_areas(corners).sum(axis=1) - sides) <= 1e-4 * sides
+        is_box &= np.abs(triangle_areas(corners).sum(axis=1) - sides) <= 1e-4 * sides
         for index, row in zip(eights, range(len(eights)), strict=True):
-            if found[row]:
+            if is_box[row]:
                 self.boxes[index] = True
                 self.centres[index], self.axes[index], self.halves[index] = centres[row], axes[row], halves[row]
                 self.centroids[index] = centres[row]

@@ -152,8 +152,8 @@ def _reach(pieces: np.ndarray, between: ContactPatches, standing: ContactPatches
     """Return whether the body of each part rests on the ground, directly or by other bodies, bool (n,)."""
     links = np.stack([between.first, between.second], axis=1).astype(np.int32)
     groups = connected_components(int(pieces.max()) + 1, links)
-    found: np.ndarray = np.isin(groups[pieces], groups[pieces[standing.first]])
-    return found
+    grounded: np.ndarray = np.isin(groups[pieces], groups[pieces[standing.first]])
+    return grounded
 
 
 def _hulls_of(standing: ContactPatches, pieces: np.ndarray) -> ContactPatches:
@@ -205,13 +205,13 @@ def _fastest(placed: PlacedParts, pieces: np.ndarray, centres: FloatArray, motio
     return int(np.flatnonzero(lengths >= lengths.max() * (1 - 1e-6))[0])
 
 
-def _joined(one: ContactPatches, other: ContactPatches) -> ContactPatches:
+def _joined(first: ContactPatches, second: ContactPatches) -> ContactPatches:
     return ContactPatches(
-        first=np.concatenate([one.first, other.first]),
-        second=np.concatenate([one.second, other.second]),
-        patch=np.concatenate([one.patch, other.patch]),
-        points=np.concatenate([one.points, other.points]),
-        normals=np.concatenate([one.normals, other.normals]),
+        first=np.concatenate([first.first, second.first]),
+        second=np.concatenate([first.second, second.second]),
+        patch=np.concatenate([first.patch, second.patch]),
+        points=np.concatenate([first.points, second.points]),
+        normals=np.concatenate([first.normals, second.normals]),
     )
 
 

@@ -39,18 +39,18 @@ def mirror_score(placed: PlacedParts) -> float:
     and each other, and through that part.
     """
     centre = placed.weights @ placed.centroids
-    places = placed.centroids - centre
+    positions = placed.centroids - centre
     spreads = _spreads(placed)
-    outmost = int(np.argmax(placed.weights * (places[:, :2] ** 2).sum(axis=1)))
-    ways = places[outmost, :2] - places[:, :2]
-    alike = np.abs(places[:, 2] - places[outmost, 2]) <= MIRROR_TOLERANCE_SHARE * placed.diagonal
+    outmost = int(np.argmax(placed.weights * (positions[:, :2] ** 2).sum(axis=1)))
+    ways = positions[outmost, :2] - positions[:, :2]
+    alike = np.abs(positions[:, 2] - positions[outmost, 2]) <= MIRROR_TOLERANCE_SHARE * placed.diagonal
     ways = ways[alike & (np.linalg.norm(ways, axis=1) > 1e-9 * placed.diagonal)]
-    own = places[outmost, :2]
+    own = positions[outmost, :2]
     if np.linalg.norm(own) <= MIRROR_TOLERANCE_SHARE * placed.diagonal:
         own = _long_axis(placed)
     normals = np.concatenate([ways, [[-own[1], own[0]]], [own]])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return max(_matched(placed, places, spreads, normal) for normal in normals)
+    return max(_matched(placed, positions, spreads, normal) for normal in normals)
 
 
 def _long_axis(placed: PlacedParts) -> FloatArray:
@@ -70,12 +70,12 @@ def _spreads(placed: PlacedParts) -> FloatArray:
     return spreads
 
 
-def _matched(placed: PlacedParts, places: FloatArray, spreads: FloatArray, normal: FloatArray) -> float:
+def _matched(placed: PlacedParts, positions: FloatArray, spreads: FloatArray, normal: FloatArray) -> float:
     from scipy.spatial import cKDTree
 
     mirror = np.eye(3)
     mirror[:2, :2] -= 2 * np.outer(normal, normal)
-    there = np.concatenate([places, spreads.reshape(-1, 9)], axis=1)
-    mirrored = np.concatenate([places @ mirror, (mirror @ spreads @ mirror).reshape(-1, 9)], axis=1)
+    there = np.concatenate([positions, spreads.reshape(-1, 9)], axis=1)
+    mirrored = np.concatenate([positions @ mirror, (mirror @ spreads @ mirror).reshape(-1, 9)], axis=1)
     distances, _ = cKDTree(there).query(mirrored, distance_upper_bound=MIRROR_TOLERANCE_SHARE * placed.diagonal)
     return float(placed.weights[np.isfinite(distances)].sum())

@@ -107,27 +107,27 @@ def _leaving(table, basis, count, column, fixed):
 
     Ties go to the first variable. `fixed`: whether slacks are zero and must stay so.
     """
-    found, least = -1, np.inf
+    leaving, least_ratio = -1, np.inf
     for row in range(len(table)):
         rate = table[row, column]
         slack = fixed and count <= basis[row] < count + len(table)
         if rate > ZERO_RATE or (slack and rate < -ZERO_RATE):
             ratio = 0.0 if slack else max(table[row, -1], 0.0) / rate
-            if ratio < least - ZERO_RATE or (ratio <= least + ZERO_RATE and basis[row] < basis[found]):
-                found, least = row, min(ratio, least)
-    return found
+            if ratio < least_ratio - ZERO_RATE or (ratio <= least_ratio + ZERO_RATE and basis[row] < basis[leaving]):
+                leaving, least_ratio = row, min(ratio, least_ratio)
+    return leaving
 
 
 @numba.njit(cache=True)
 def _entering(rates, greedy):
     """Return the column of the greatest rate, or of the first above rounding, -1 for none."""
-    found, most = -1, ZERO_RATE
+    entering, greatest_rate = -1, ZERO_RATE
     for column in range(len(rates)):
-        if rates[column] > most:
-            found, most = column, rates[column]
+        if rates[column] > greatest_rate:
+            entering, greatest_rate = column, rates[column]
             if not greedy:
                 break
-    return found
+    return entering
 
 
 @numba.njit(cache=True)

@@ -97,7 +97,7 @@ def openness(depth: Float32Array, normal: Float32Array, view: View, reach: float
 def _ground_seen(wanted, across, upwards, perspective, rotation, shift, axis, height, middle, reach):
     rows, columns = wanted.shape
     pixels, points = np.empty(rows * columns, dtype=np.int64), np.empty((rows * columns, 3))
-    found = 0
+    count = 0
     start, ray, point = np.zeros(3), np.zeros(3), np.zeros(3)
     for row in range(rows):
         for column in range(columns):
@@ -119,10 +119,10 @@ def _ground_seen(wanted, across, upwards, perspective, rotation, shift, axis, he
                 point[k] = start[k] + long * ray[k]
                 distance += (point[k] - middle[k]) ** 2
             if distance < reach * reach:
-                pixels[found] = row * columns + column
-                points[found] = point
-                found += 1
-    return pixels[:found], points[:found]
+                pixels[count] = row * columns + column
+                points[count] = point
+                count += 1
+    return pixels[:count], points[:count]
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -186,10 +186,10 @@ class OpenGLRenderer:
         self._targets = [int(target) for target in GL.glGenRenderbuffers(2)]
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._frame)
         kinds = (GL.GL_COLOR_ATTACHMENT0, GL.GL_R32I), (GL.GL_DEPTH_ATTACHMENT, GL.GL_DEPTH_COMPONENT32F)
-        for target, (place, content) in zip(self._targets, kinds, strict=True):
+        for target, (attachment, content) in zip(self._targets, kinds, strict=True):
             GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, target)
             GL.glRenderbufferStorage(GL.GL_RENDERBUFFER, content, width, height)
-            GL.glFramebufferRenderbuffer(GL.GL_FRAMEBUFFER, place, GL.GL_RENDERBUFFER, target)
+            GL.glFramebufferRenderbuffer(GL.GL_FRAMEBUFFER, attachment, GL.GL_RENDERBUFFER, target)
         if GL.glCheckFramebufferStatus(GL.GL_FRAMEBUFFER) != GL.GL_FRAMEBUFFER_COMPLETE:
             raise RuntimeError(f"OpenGL cannot draw integers on {width} x {height} pixels")
         self._size = (width, height)
@@ -243,7 +243,7 @@ def _upload(vertices: np.ndarray, faces: IntArray) -> _Mesh:
     for row in range(3):
         GL.glVertexAttribPointer(1 + row, 4, GL.GL_FLOAT, False, INSTANCE.itemsize, ctypes.c_void_p(16 * row))
     GL.glVertexAttribIPointer(4, 1, GL.GL_INT, INSTANCE.itemsize, ctypes.c_void_p(48))
-    for place in range(5):
-        GL.glEnableVertexAttribArray(place)
-        GL.glVertexAttribDivisor(place, 1 if place else 0)
+    for attribute in range(5):
+        GL.glEnableVertexAttribArray(attribute)
+        GL.glVertexAttribDivisor(attribute, 1 if attribute else 0)
     return _Mesh(array, (points, indices, instances), faces.size)

@@ -64,8 +64,8 @@ def portrait(
     # Bright albedos are reduced a little, so that white models keep their shading.
     albedo = 0.02 + 0.90 * srgb_to_linear(color[shown])
     picture[shown] = albedo * (lit[:, None] * KEY * (0.35 + 0.65 * open_sky) + sky * open_sky)
-    drawn = _ink(seen, size)[..., None]
-    picture = _reduced(picture) * (1.0 - drawn) + srgb_to_linear(np.array(INK, dtype=np.uint8)) * drawn
+    lines = _ink(seen, size)[..., None]
+    picture = _reduced(picture) * (1.0 - lines) + srgb_to_linear(np.array(INK, dtype=np.uint8)) * lines
     return linear_to_srgb(picture)
 
 

@@ -71,8 +71,8 @@ class MeshSet:
         mesh_of = np.repeat(np.arange(len(self.centers)), np.diff(self.vertex_first))
         size = np.zeros(len(self.centers))
         np.maximum.at(size, mesh_of, np.abs(self.vertices).max(axis=1))
-        places = np.rint(self.vertices / np.maximum(size[mesh_of, None] * WELD_DISTANCE_SHARE, np.finfo(float).tiny))
-        welded = np.unique(np.column_stack([mesh_of, places + 0.0]), axis=0, return_inverse=True)[1].ravel()
+        cells = np.rint(self.vertices / np.maximum(size[mesh_of, None] * WELD_DISTANCE_SHARE, np.finfo(float).tiny))
+        welded = np.unique(np.column_stack([mesh_of, cells + 0.0]), axis=0, return_inverse=True)[1].ravel()
         return np.asarray(welded[self.faces])
 
     @cached_property

@@ -287,8 +287,8 @@ def _crossings(shown, triangles, parts, thresholds, projection):
     """
     height, width = shown.shape
     across, down = np.full((height, width), -1, dtype=np.int32), np.full((height, width), -1, dtype=np.int32)
-    most = _differing(shown)
-    shares, kinds = np.empty(most), np.empty(most, dtype=np.uint8)
+    max_lines = _differing(shown)
+    shares, kinds = np.empty(max_lines), np.empty(max_lines, dtype=np.uint8)
     total = 0
     for r in range(height):
         for c in range(width):
@@ -341,7 +341,7 @@ def _join(across, down, shares, kinds_of):
     ends = np.empty((2 * node, 2, 2))
     kinds = np.empty(2 * node, dtype=np.uint8)
     nodes = np.empty((2 * node, 2), dtype=np.int32)
-    places, found, numbers = np.empty((4, 2)), np.empty(4, dtype=np.uint8), np.empty(4, dtype=np.int32)
+    positions, found_kinds, numbers = np.empty((4, 2)), np.empty(4, dtype=np.uint8), np.empty(4, dtype=np.int32)
     total = 0
     for r in range(height - 1):
         for c in range(width - 1):
@@ -355,40 +355,44 @@ def _join(across, down, shares, kinds_of):
                 if number < 0:
                     continue
                 if side < 2:
-                    places[size] = column + 0.5 + shares[number], row + 0.5
+                    positions[size] = column + 0.5 + shares[number], row + 0.5
                 else:
-                    places[size] = column + 0.5, row + 0.5 + shares[number]
-                found[size], numbers[size] = kinds_of[number], number
+                    positions[size] = column + 0.5, row + 0.5 + shares[number]
+                found_kinds[size], numbers[size] = kinds_of[number], number
                 size += 1
             if size < 2:
                 continue
             if size == 2:
-                ends[total, 0], ends[total, 1] = places[0], places[1]
-                kinds[total], nodes[total, 0], nodes[total, 1] = min(found[0], found[1]), numbers[0], numbers[1]
+                ends[total, 0], ends[total, 1] = positions[0], positions[1]
+                kinds[total], nodes[total, 0], nodes[total, 1] = (
+                    min(found_kinds[0], found_kinds[1]),
+                    numbers[0],
+                    numbers[1],
+                )
                 total += 1
                 continue
-            middle = _meeting(places, found, size)
+            middle = _meeting(positions, found_kinds, size)
             for k in range(size):
-                ends[total, 0], ends[total, 1] = places[k], middle
-                kinds[total], nodes[total, 0], nodes[total, 1] = found[k], numbers[k], node
+                ends[total, 0], ends[total, 1] = positions[k], middle
+                kinds[total], nodes[total, 0], nodes[total, 1] = found_kinds[k], numbers[k], node
                 total += 1
             node += 1
     return ends[:total], kinds[:total], nodes[:total]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _meeting(places, found, size):
+def _meeting(positions, line_kinds, size):
     """Return where three or four lines meet: on the chord of the two weightiest if they outweigh the rest."""
     middle = np.zeros(2)
-    heaviest = found[:size].max()
+    heaviest = line_kinds[:size].max()
     chord = 0
     for k in range(size):
-        if found[k] == heaviest:
+        if line_kinds[k] == heaviest:
             chord += 1
     counted = 0
     for k in range(size):
-        if chord != 2 or found[k] == heaviest:
-            middle += places[k]
+        if chord != 2 or line_kinds[k] == heaviest:
+            middle += positions[k]
             counted += 1
     return middle / counted
 

@@ -162,10 +162,10 @@ def test_a_config_that_makes_no_shapes_is_refused(tmp_path: Path) -> None:
     )
     assert "a dataset needs exactly one of " in printed
     assert all(way in printed for way in ways)
-    assert "this has none" in printed
+    assert "this config has none" in printed
 
 
 def test_a_config_that_makes_shapes_in_two_ways_is_refused(tmp_path: Path) -> None:
     code, printed = shapemill("run", "exemplars", *config_of(tmp_path, {**STOOLS, **KITS}))
     assert code == 2
-    assert "this has programs.program and exemplars.kits" in printed
+    assert "this config has programs.program and exemplars.kits" in printed
