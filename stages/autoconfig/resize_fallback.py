@@ -9,6 +9,7 @@ from pipeline.randomness import decision_rng
 from stages.autoconfig.closed_box import is_closed_box
 from stages.autoconfig.resolve import REQUIREMENT_KEYS, Resolution
 from stages.autoconfig.resolved_kit import ResolvedKit
+from stages.autoconfig.settings import RANDOM_STREAM
 from stages.autoconfig.yield_estimate import LOOK_FIRST, MAX_SAMPLES_REQUESTED, YieldEstimate, rounded_text
 from stages.exemplars.build import Observation
 from stages.proportions.distinct_warps import DistinctWarps
@@ -105,7 +106,7 @@ def _unvaried(resolved: ResolvedKit) -> Resolution:
 
 def _different(lattice: Lattice, config: ProportionsConfig, exemplar: int, wanted: int) -> int:
     """Return how many different shapes of an exemplar a run finds that wants `wanted`, if all hold together."""
-    rng = decision_rng(0, "choices", "different", exemplar)
+    rng = decision_rng(0, RANDOM_STREAM, "different", exemplar)
     distinct = DistinctWarps(lattice, config.min_difference)
     for _ in range(config.oversample * CANDIDATES_PER_SAMPLE * wanted):
         warp = lattice.draw(rng, config.log_std, config.max_factor)
@@ -130,7 +131,7 @@ def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
         kept: list[Shape] = []
         distinct = DistinctWarps(lattice, config.min_difference)
         for draw in range(-(-TRIAL_DRAWS // count)):
-            rng = decision_rng(0, "choices", "proportions", number, draw)
+            rng = decision_rng(0, RANDOM_STREAM, "proportions", number, draw)
             warp = lattice.draw(rng, config.log_std, config.max_factor)
             shape = warped(kit, exemplar.whole, lattice, warp)
             tried += 1

@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.randomness import decision_rng
 from stages.autoconfig.contact_analysis import ContactAnalysis, Setting
 from stages.autoconfig.lost_support import lost_support
+from stages.autoconfig.settings import RANDOM_STREAM
 from stages.autoconfig.trial_search import MAX_GROWTH_DEGREE, TrialResult, TrialSearch
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
@@ -187,7 +188,7 @@ def _try_setting(
     min_hubs: hubs that a hit must get back, if the setting leaves hubs out. copies: as for Search.
     """
     names = [oracle.kit.types[index].name for index in setting.hubs]
-    rng = decision_rng(0, "choices", setting.grammar, *setting.kinds, *names)
+    rng = decision_rng(0, RANDOM_STREAM, setting.grammar, *setting.kinds, *names)
     search = TrialSearch(oracle, rng, min_hubs if setting.hubs else 0, copies=copies)
     candidate = _candidate_of(setting, kept_share, search, search.run(tries, SUFFICIENT_GRAPHS, evenly=True))
     promising = candidate.trial.histograms >= (1 if candidate.trial.by_meaning else PROMISING_HISTOGRAMS)

@@ -6,6 +6,9 @@ from pydantic import Field
 
 from pipeline.config import StrictModel
 
+RANDOM_STREAM = "choices"
+"""First word of every random stream of auto-configuration; another word would change resolved settings."""
+
 
 class AutoconfigConfig(StrictModel):
     """How the kit keys left at `auto` are resolved."""

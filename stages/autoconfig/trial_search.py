@@ -147,7 +147,7 @@ class TrialSearch:
             divisor = GROWTH_FIRST_DIVISOR * (HOPELESS_GROWTH_DIVISOR if is_hopeless else 1)
             budget = max(tries // divisor, 1) if is_first_growth else left[number]
             missing = wanted - len(self.variants)
-            variants, used = search.run(self._rng, budget, missing, f"probe-{self._tries}", lambda _: None)
+            variants, used = search.run(self._rng, budget, missing, f"trial-{self._tries}", lambda _: None)
             self._tries += used
             left[number] = left[number] - used if variants else 0
             complete = [variant for variant in variants if self._is_complete(variant.assembly)]

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.randomness import decision_rng
+from stages.autoconfig.settings import RANDOM_STREAM
 from stages.exemplars.identify import IdentifiedParts
 from stages.exemplars.model import Model
 from stages.points.area_sampling import sample_surface
@@ -100,7 +101,7 @@ def _upside_down(corners: FloatArray) -> tuple[float, float]:
     """Return the mean distance of a surface from its mirror images along y and z, as shares of the longest side."""
     triangles = corners.reshape(-1, 3)
     faces = np.arange(len(triangles), dtype=np.int32).reshape(-1, 3)
-    points, _, _ = sample_surface(triangles, faces, MIRROR_SAMPLES, decision_rng(0, "choices", "up"))
+    points, _, _ = sample_surface(triangles, faces, MIRROR_SAMPLES, decision_rng(0, RANDOM_STREAM, "up"))
     low, high = triangles.min(axis=0), triangles.max(axis=0)
     tree, moved = cKDTree(points), []
     for axis in _AXES.values():

@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.randomness import decision_rng
 from stages.autoconfig.lost_support import lost_support
 from stages.autoconfig.setting_search import MIN_USEFUL_GRAPHS, has_low_diversity
+from stages.autoconfig.settings import RANDOM_STREAM
 from stages.autoconfig.trial_search import TrialResult, TrialSearch
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.patterns import observed_patterns, unique_pattern_share
@@ -76,7 +77,7 @@ def estimate_yield(
     known_graphs: graphs that an earlier trial search found; if there are any, a first search in vain is continued.
     min_hubs, max_copied_share: as for TrialSearch, since rejected variants do not count.
     """
-    search = TrialSearch(oracle, decision_rng(0, "choices", "forecast"), min_hubs, max_copied_share)
+    search = TrialSearch(oracle, decision_rng(0, RANDOM_STREAM, "forecast"), min_hubs, max_copied_share)
     trial = search.run(tries, MAX_ESTIMATE_GRAPHS, evenly=True)
     if trial.graphs or known_graphs:
         trial = search.run((ESTIMATE_TRIES_FACTOR - 1) * tries, MAX_ESTIMATE_GRAPHS, evenly=True)

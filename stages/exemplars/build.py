@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import get_args
 
 import numpy as np
 
@@ -21,26 +20,6 @@ from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import EMPTY_ASSEMBLY, Assembly, ContactKind, Exemplar, Kit
-
-
-@dataclass(frozen=True)
-class KitReport:
-    """What building a kit found and did.
-
-    segmentation: a line for each model.
-    repairs: number of repairs by kind.
-    contacts: number of contacts by kind.
-    contact_tolerance: in the kit's units.
-    warnings: a sentence each.
-    aliases: for each type with several names in the models, its other names.
-    """
-
-    segmentation: tuple[str, ...]
-    repairs: Mapping[str, int]
-    contacts: Mapping[ContactKind, int]
-    contact_tolerance: float
-    warnings: tuple[str, ...]
-    aliases: Mapping[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -71,24 +50,15 @@ def read_kit(config: KitConfig) -> Kit:
     return kit
 
 
-def build_kit(config: KitConfig, models: Sequence[Model]) -> tuple[Kit, KitReport]:
-    """Return the kit of `models`, and a report.
+def build_kit(config: KitConfig, models: Sequence[Model]) -> tuple[Kit, Observation]:
+    """Return the kit of `models`, and the observation that it comes from.
 
     Raises ConfigError, with the model, the part and the mend, if no kit can be made.
     """
     observation = observe_models(config, models)
     if observation.refusals:
         raise ConfigError("\n".join(observation.refusals))
-    kinds = [kind for of_exemplar in observation.kinds for kind in of_exemplar]
-    report = KitReport(
-        segmentation=tuple(f"{model.path.name}: {model.segmentation}: {model.why}" for model in models),
-        repairs=observation.repairs,
-        contacts={kind: kinds.count(kind) for kind in get_args(ContactKind)},
-        contact_tolerance=observation.kit.contact_tolerance,
-        warnings=observation.warnings,
-        aliases=observation.aliases,
-    )
-    return observation.kit, report
+    return observation.kit, observation
 
 
 def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:

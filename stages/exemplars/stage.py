@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, get_args
 
 from pipeline.paths import file_digest
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
@@ -32,6 +32,7 @@ def run_shard(task: Task) -> Outcome:
     from stages.exemplars.build import build_kit
     from stages.exemplars.kit_figure import kit_figure
     from stages.exemplars.read import read_model
+    from stages.shape.kit import ContactKind
     from stages.shape.kit_files import write_kit
 
     section = task.config.section(ExemplarsConfig)
@@ -42,7 +43,8 @@ def run_shard(task: Task) -> Outcome:
         resolved = resolution["resolved"]
         config = config.resolve(resolved).model_copy(update={"parts": resolved.get("parts", config.parts)})
     models = [read_model(shape.path, config.parts, section.limits) for shape in config.shapes]
-    kit, report = build_kit(config, models)
+    kit, observation = build_kit(config, models)
+    kinds = [kind for of_exemplar in observation.kinds for kind in of_exemplar]
     with task.output(f"{kit.name}.json") as text, task.output(f"{kit.name}.tar") as arrays:
         write_kit(kit, text, arrays)
     with task.output(f"{kit.name}.png") as picture:
@@ -53,14 +55,14 @@ def run_shard(task: Task) -> Outcome:
             "kit": kit.name,
             "types": len(kit.types),
             "parts": [len(exemplar.assembly) for exemplar in kit.exemplars],
-            "contacts": report.contacts,
+            "contacts": {kind: kinds.count(kind) for kind in get_args(ContactKind)},
             "rules": sum(len(rules) for rules in kit.grammar.neighbourhoods.values()),
             "dockings": len(kit.grammar.dockings),
-            "segmentation": list(report.segmentation),
-            "repairs": report.repairs,
-            "aliases": {name: list(words) for name, words in report.aliases.items()},
+            "segmentation": [f"{model.path.name}: {model.segmentation}: {model.why}" for model in models],
+            "repairs": observation.repairs,
+            "aliases": {name: list(words) for name, words in observation.aliases.items()},
             "hubs": [kit.types[index].name for index in kit.grammar.hubs],
-            "warnings": list(report.warnings),
+            "warnings": list(observation.warnings),
             "resolved": resolution["resolved"],
             "reasons": resolution["reasons"],
         },

@@ -101,10 +101,12 @@ class TestRepairs:
         vertices, faces = CUBE
         soup = vertices[np.concatenate([faces, faces])].reshape(-1, 3)
         doubled = soup, np.arange(len(soup), dtype=np.int32).reshape(-1, 3)
-        kit, report = build_kit(block_config(), [model({"plain": (CUBE, (0, 0, 0)), "doubled": (doubled, (1, 0, 0))})])
+        kit, observation = build_kit(
+            block_config(), [model({"plain": (CUBE, (0, 0, 0)), "doubled": (doubled, (1, 0, 0))})]
+        )
         assert kit.type_names() == ("plain",)
-        assert report.repairs["duplicate_faces"] == 12
-        assert report.repairs["merged_vertices"] > 0
+        assert observation.repairs["duplicate_faces"] == 12
+        assert observation.repairs["merged_vertices"] > 0
 
 
 class TestRefusals:
@@ -124,11 +126,11 @@ class TestRefusals:
 
     def test_largest_piece_is_kept_if_the_config_says_so(self) -> None:
         apart = model({"moon": (CUBE, FAR), "a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 0, 0)), "c": (CUBE, (2, 0, 0))})
-        kit, report = build_kit(block_config(disconnected="largest"), [apart])
+        kit, observation = build_kit(block_config(disconnected="largest"), [apart])
         assert kit.exemplars[0].part_names == ("a", "b", "c")
         assert kit.exemplars[0].assembly.edges.tolist() == [[0, 1], [1, 2]]
         assert kit.grammar.neighbourhoods == {0: {((0, 1),): 2, ((0, 2),): 1}}
-        assert any("moon" in warning for warning in report.warnings)
+        assert any("moon" in warning for warning in observation.warnings)
 
     def test_pieces_of_single_parts_are_no_exemplar(self) -> None:
         apart = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (3, 0, 0))})
@@ -159,10 +161,10 @@ class TestLeftOut:
         quarter = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
         again = [raw_part(name, CUBE, placed(1, 0, 0, quarter)) for name in ("again", "and again")]
         model_of = Model(Path("thrice.glb"), (again[0], *ring().parts, again[1]), "nodes", "", ())
-        kit, report = build_kit(block_config(), [model_of])
+        kit, observation = build_kit(block_config(), [model_of])
         assert kit.exemplars[0].part_names == ("again", "cube.0", "cube.2", "cube.3")
         assert len(kit.exemplars[0].assembly.edges) == len(block_kit(ring()).exemplars[0].assembly.edges)
-        (warning,) = (warning for warning in report.warnings if "left out" in warning)
+        (warning,) = (warning for warning in observation.warnings if "left out" in warning)
         assert "thrice.glb: 2 parts are left out of the model: " in warning
         assert "cube.1 (it coincides with again), and again (it coincides with" in warning
 
@@ -175,19 +177,21 @@ class TestLeftOut:
     def test_part_without_area_is_left_out_and_named(self) -> None:
         flat = CUBE[0], np.array([[0, 1, 1], [2, 2, 2]], dtype=np.int32)
         parts = model({"a": (CUBE, (0, 0, 0)), "ghost": (flat, (2, 0, 0)), "b": (CUBE, (1, 0, 0))})
-        kit, report = build_kit(block_config(), [parts])
+        kit, observation = build_kit(block_config(), [parts])
         assert kit.exemplars[0].part_names == ("a", "b")
         assert [
-            warning for warning in report.warnings if "1 part is left out of the model: ghost (it has no tri" in warning
+            warning
+            for warning in observation.warnings
+            if "1 part is left out of the model: ghost (it has no tri" in warning
         ]
 
 
 class TestWarnings:
     def test_kit_in_which_nothing_repeats_says_that_nothing_can_be_exchanged(self) -> None:
-        _, report = build_kit(block_config(), [model({"a": (CUBE, (0, 0, 0)), "b": (SLAB, (1, 0, 0))})])
-        assert any("little or nothing can be exchanged" in warning for warning in report.warnings)
-        _, report = build_kit(block_config(), [ring()])
-        assert report.warnings == ()
+        _, observation = build_kit(block_config(), [model({"a": (CUBE, (0, 0, 0)), "b": (SLAB, (1, 0, 0))})])
+        assert any("little or nothing can be exchanged" in warning for warning in observation.warnings)
+        _, observation = build_kit(block_config(), [ring()])
+        assert observation.warnings == ()
 
     def test_three_hundred_types_make_a_kit_and_say_how_strings_write_them(self) -> None:
         sizes = 1.0 + 0.05 * np.arange(300)
@@ -197,17 +201,17 @@ class TestWarnings:
             for k, (size, middle) in enumerate(zip(sizes.tolist(), middles.tolist(), strict=True))
         }
         parts["twin"] = (box(1, 1, 1), (0.5, 1.0, 0.0))
-        kit, report = build_kit(block_config(), [model(parts)])
+        kit, observation = build_kit(block_config(), [model(parts)])
         assert len(kit.types) == 300
         assert len(kit.exemplars[0].assembly.edges) == 301
-        assert any("300 part types" in warning for warning in report.warnings)
+        assert any("300 part types" in warning for warning in observation.warnings)
 
     def test_part_with_many_contacts_is_a_hub(self) -> None:
         floor = {"floor": (box(30, 2, 1), (15, 0, -1))}
         posts = {f"post.{k}": (CUBE, (1 + 1.3 * k, 0.0, 0.0)) for k in range(20)}
-        kit, report = build_kit(block_config(), [model(floor | posts)])
+        kit, observation = build_kit(block_config(), [model(floor | posts)])
         assert hub_parts(kit.exemplars[0].assembly) == [0]
-        assert any("floor (20)" in warning for warning in report.warnings)
+        assert any("floor (20)" in warning for warning in observation.warnings)
 
     def test_small_shapes_have_no_hubs(self) -> None:
         assert hub_parts(block_kit(ring()).exemplars[0].assembly) == []
