@@ -9,7 +9,7 @@ from stages.shape.collection.producer import Producer
 PRODUCER = Producer(
     language="derivation",
     keys="grammars.models",
-    asked=lambda config: bool(config.section(GrammarsConfig).models),
+    is_requested=lambda config: bool(config.section(GrammarsConfig).models),
     sentence="the partial symmetries of a mesh in one piece make a shape grammar, whose productions and grids make "
     "shapes; a shape's derivation is its `txt`.",
     origins=mesh_origins,

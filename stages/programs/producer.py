@@ -34,7 +34,7 @@ def _lineage(config: Config) -> Mapping[str, RecordField]:
 PRODUCER = Producer(
     language="program",
     keys="programs.program",
-    asked=lambda config: bool(config.section(ProgramsConfig).program),
+    is_requested=lambda config: bool(config.section(ProgramsConfig).program),
     sentence="a program builds shapes from random parameters; the parameters of a shape are its `txt`.",
     splits="There are no duplicates, within a split or across splits. In mode random, samples that differ in "
     "continuous parameters alone are in one split if their `lineage` has `split_by: structure`. With `split_by: "

@@ -10,7 +10,7 @@ from stages.shape.collection.producer import Producer
 PRODUCER = Producer(
     language="proportions",
     keys="proportions.samples_per_kit",
-    asked=lambda config: config.section(ProportionsConfig).samples_per_kit > 0,
+    is_requested=lambda config: config.section(ProportionsConfig).samples_per_kit > 0,
     sentence="exemplars are resized: along each axis the lengths between the ends of their parts are multiplied, equal "
     "lengths by equal factors. One map moves all of space, so parts that touch keep touching. The `txt` of a shape "
     "holds its factors.",

@@ -9,7 +9,7 @@ from stages.shapeassembly.settings import ShapeAssemblyConfig
 PRODUCER = Producer(
     language="shapeassembly",
     keys="shapeassembly.programs, hierarchies or sampled",
-    asked=lambda config: config.section(ShapeAssemblyConfig).has_sources,
+    is_requested=lambda config: config.section(ShapeAssemblyConfig).has_sources,
     sentence="ShapeAssembly programs are executed; a shape's program is its `txt`.",
     origins=program_origins,
     limits=("All parts are cuboids.",),

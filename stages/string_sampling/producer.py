@@ -73,7 +73,7 @@ def _lineage(_: Config) -> Mapping[str, RecordField]:
 PRODUCER = Producer(
     language="kit",
     keys="string_sampling.sources",
-    asked=lambda config: bool(config.section(StringSamplingConfig).sources),
+    is_requested=lambda config: bool(config.section(StringSamplingConfig).sources),
     sentence="models trained on the strings of other shapes generate new strings. Each is instantiated part by part "
     "with the dockings of its kit, and kept if its contacts, computed from the meshes, its neighbourhoods and "
     "its dockings are those of the exemplars.",

@@ -144,7 +144,7 @@ def _lineage(_: Config) -> Mapping[str, RecordField]:
 PRODUCER = Producer(
     language="kit",
     keys="exemplars.kits",
-    asked=lambda config: bool(
+    is_requested=lambda config: bool(
         config.section(ExemplarsConfig).kits and config.section(VariationsConfig).samples_per_kit
     ),
     sentence="exemplar meshes are cut into parts, a tiling grammar is read off their contacts, and new shapes are "

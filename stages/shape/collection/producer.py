@@ -37,7 +37,7 @@ class Producer:
 
     language: name of the language of its samples
     keys: config keys that ask for them, for messages
-    asked: whether a config asks for them
+    is_requested: whether a config asks for them
     sentence: how its samples are made, for the card
     splits: what keeps its splits apart, for the card
     graphs_share_split: whether samples of one graph always share a split
@@ -53,7 +53,7 @@ class Producer:
 
     language: str
     keys: str
-    asked: Callable[[Config], bool]
+    is_requested: Callable[[Config], bool]
     sentence: str
     splits: str
     graphs_share_split: bool

@@ -46,7 +46,7 @@ def planned_producer(plan: Plan) -> str | None:
 def check_producers(config: Config) -> None:
     """Raise ConfigError for a config that asks for no shapes, or for more than one kind of producer."""
     known = producers().values()
-    used = [producer.keys for producer in known if producer.asked(config)]
+    used = [producer.keys for producer in known if producer.is_requested(config)]
     if len(used) != 1:
         named = f"has {' and '.join(used)}" if used else "has none"
         keys = ", ".join(producer.keys for producer in known)

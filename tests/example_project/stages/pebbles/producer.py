@@ -9,7 +9,7 @@ from stages.shape.collection.producer import Producer
 PRODUCER = Producer(
     language="heap",
     keys="pebbles.heaps",
-    asked=lambda config: config.section(PebblesConfig).heaps > 0,
+    is_requested=lambda config: config.section(PebblesConfig).heaps > 0,
     sentence="pebbles are thrown on a heap.",
     splits="Every heap is thrown separately.",
     apart=False,
