@@ -35,8 +35,8 @@ def shape_of_execution(execution: Execution, labels: Sequence[str] = ()) -> Shap
 
     labels: those of all programs of a category, whose order decides the colours; without them the shape's own, sorted.
     """
-    known = tuple(labels) or tuple(sorted(set(execution.labels)))
-    color_of = dict(zip(known, label_colors(len(known)), strict=True))
+    all_labels = tuple(labels) or tuple(sorted(set(execution.labels)))
+    color_of = dict(zip(all_labels, label_colors(len(all_labels)), strict=True))
     halves = np.array([[x, y, z] for x in (0.5, -0.5) for y in (0.5, -0.5) for z in (0.5, -0.5)])
     meshes = tuple(
         PartMesh(label, halves * size, _FACES, np.tile(color_of[label], (len(_FACES), 1)))
@@ -46,7 +46,7 @@ def shape_of_execution(execution: Execution, labels: Sequence[str] = ()) -> Shap
     poses[:, :3, :3] = execution.frames
     poses[:, :3, 3] = execution.centres
     assembly = Assembly(np.arange(len(meshes), dtype=np.int16), poses, np.empty((0, 2), np.int32))
-    return Shape(meshes, assembly, "y", known, execution.names)
+    return Shape(meshes, assembly, "y", all_labels, execution.names)
 
 
 def label_colors(count: int) -> ByteArray:

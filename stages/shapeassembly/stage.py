@@ -37,13 +37,14 @@ def planned_shards(plan: Plan) -> list[Shard]:
     if not config.has_sources:
         return []
     extraction = extraction_shards(plan.config.name, config.hierarchies)
-    if any(plan.summary("shapeassembly", shard.name) is None for shard in extraction):
+    summaries = [plan.summary("shapeassembly", shard.name) for shard in extraction]
+    if None in summaries:
         return extraction
     digests = [source_digest(files.path) for files in config.programs]
-    made = [("shapeassembly", shard.name) for shard in extraction]
+    extracted = [("shapeassembly", shard.name) for shard in extraction]
     inputs = tuple(
         f"{stage}/{shard}"
-        for stage, shard in (*made, *(("program_sampling", name) for name in plan.shards("program_sampling")))
+        for stage, shard in (*extracted, *(("program_sampling", name) for name in plan.shards("program_sampling")))
     )
     assignment = Shard(assignment_name(plan.config.name), {"job": "assignment", "digests": digests}, inputs)
     summary = plan.summary("shapeassembly", assignment.name)

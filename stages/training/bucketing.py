@@ -37,6 +37,6 @@ def padded_rows(first: Indices, samples: Indices) -> tuple[npt.NDArray[np.bool_]
     first: where the rows of each sample begin, int64 (samples + 1,).
     """
     lengths = np.diff(first)[samples]
-    place = np.arange(lengths.max())
-    filled = place < lengths[:, None]
-    return filled, np.where(filled, first[samples][:, None] + place, 0)
+    column = np.arange(lengths.max())
+    filled = column < lengths[:, None]
+    return filled, np.where(filled, first[samples][:, None] + column, 0)

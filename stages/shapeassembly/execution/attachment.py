@@ -227,12 +227,12 @@ def _change_all(box, reach, wanted, has, decision):
 
 
 @numba.njit(cache=True)
-def hold(box, p, place):
-    """Move a cuboid so that its point `p` is at `place`."""
+def hold(box, p, position):
+    """Move a cuboid so that its point `p` is at `position`."""
     now = np.empty(3)
     point(box, p, now)
     for k in range(3):
-        box[k] += place[k] - now[k]
+        box[k] += position[k] - now[k]
 
 
 @numba.njit(cache=True)
@@ -294,7 +294,7 @@ def _push(box, priors, p, way, decision):
         if abs(priors[n][axis] - priors[0][axis]) * more > _MAX_PRIOR_SHIFT:
             return
     decision[1] = axis
-    place = np.empty(3)
-    point(box, priors[0], place)
+    position = np.empty(3)
+    point(box, priors[0], position)
     box[3 + axis] += more
-    hold(box, priors[0], place)
+    hold(box, priors[0], position)

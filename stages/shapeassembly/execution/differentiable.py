@@ -201,9 +201,9 @@ def _swing(box: _Box, priors: list[Tensor], p: Tensor, goal: Tensor, axis: int, 
         face = _UPRIGHT[axis] if box.frame is None else box.frame[:, axis]
         # Both signs cancel for either side.
         more = (goal - box.point(p)) @ face / (p[axis] - priors[0][axis])
-        place = box.point(priors[0])
+        position = box.point(priors[0])
         _scale(box, axis, box.sizes + more)
-        box.centre = place - box.arm(priors[0])
+        box.centre = position - box.arm(priors[0])
 
 
 def _skew(u: Tensor) -> Tensor:

@@ -58,24 +58,24 @@ def _attach(boxes, aligned, events, count, decision):
     box = boxes[moved]
     goal = np.empty(3)
     point(boxes[target], q, goal)
-    found = 0
+    priors_count = 0
     for n in range(count):
-        found += (events.who[n, 0] == moved) + (events.who[n, 1] == moved)
-    if found == 0:
+        priors_count += (events.who[n, 0] == moved) + (events.who[n, 1] == moved)
+    if priors_count == 0:
         decision[0] = MOVE
         hold(box, p, goal)
         return
     if aligned[moved]:
         grow(box, boxes[target], decision)
         return
-    priors = np.empty((found, 3))
-    found = 0
+    priors = np.empty((priors_count, 3))
+    priors_count = 0
     for n in range(count):
         for role in range(2):
             if events.who[n, role] == moved:
-                priors[found] = events.where[n, role]
-                found += 1
-    if found == 1:
+                priors[priors_count] = events.where[n, role]
+                priors_count += 1
+    if priors_count == 1:
         hinge(box, priors[0], p, goal, decision)
     else:
         swing(box, priors, p, goal, decision)

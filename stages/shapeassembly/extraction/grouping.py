@@ -205,8 +205,8 @@ def _reduced(
     layout: NodeLayout, kept: Sequence[int], formed: Sequence[_Formed]
 ) -> tuple[NodeLayout, list[SymmetryMacro | None]]:
     """Return the layout of the parts `kept`, ascending, with groups anchored, and the macro of each."""
-    place = {part: index for index, part in enumerate(kept)}
-    named = {id(layout.parts[part]): index for part, index in place.items()}
+    new_index = {part: index for index, part in enumerate(kept)}
+    named = {id(layout.parts[part]): index for part, index in new_index.items()}
     groups = {named[id(group.part)]: group for group in formed}
     anchors: list[frozenset[int] | None] = [None] * len(kept)
     bottoms, tops = [layout.bottoms[i] for i in kept], [layout.tops[i] for i in kept]
@@ -217,7 +217,11 @@ def _reduced(
     reduced = NodeLayout(
         layout.bbox,
         tuple(layout.parts[i] for i in kept),
-        {(place[i], place[j]): contact for (i, j), contact in layout.contacts.items() if i in place and j in place},
+        {
+            (new_index[i], new_index[j]): contact
+            for (i, j), contact in layout.contacts.items()
+            if i in new_index and j in new_index
+        },
         tuple(bottoms),
         tuple(tops),
         tuple(anchors),

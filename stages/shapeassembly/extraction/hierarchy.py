@@ -72,24 +72,24 @@ def check_limits(root: PartNode, source: str) -> PartNode:
     return root
 
 
-def box_from_numbers(numbers: FloatArray, place: str) -> Box:
+def box_from_numbers(numbers: FloatArray, location: str) -> Box:
     """Return a box from twelve numbers: centre, lengths, and the directions of the first two lengths.
 
-    Axes are orthonormalised, since files give few digits. Raises Rejected, naming `place`, for numbers that are not
+    Axes are orthonormalised, since files give few digits. Raises Rejected, naming `location`, for numbers that are not
     finite, negative sizes and degenerate axes.
     """
     rows = numbers.reshape(4, 3)
     if not np.isfinite(rows).all() or np.abs(rows).max() > 1e9:
-        raise Rejected(UNREADABLE, f"{place}: a box has twelve finite numbers: centre, size and two axes")
+        raise Rejected(UNREADABLE, f"{location}: a box has twelve finite numbers: centre, size and two axes")
     if (rows[1] < 0).any():
-        raise Rejected(UNREADABLE, f"{place}: a box has a negative size; write its lengths as positive numbers")
+        raise Rejected(UNREADABLE, f"{location}: a box has a negative size; write its lengths as positive numbers")
     right, top = rows[2], rows[3]
     lengths = np.linalg.norm(right), np.linalg.norm(top)
     if min(lengths) < 1e-6:
-        raise Rejected(UNREADABLE, f"{place}: an axis of the box has no length; give two unit vectors")
+        raise Rejected(UNREADABLE, f"{location}: an axis of the box has no length; give two unit vectors")
     right, top = right / lengths[0], top / lengths[1]
     top = top - right * (right @ top)
     if np.linalg.norm(top) < 1e-2:
-        raise Rejected(UNREADABLE, f"{place}: the axes of the box are parallel; give two perpendicular ones")
+        raise Rejected(UNREADABLE, f"{location}: the axes of the box are parallel; give two perpendicular ones")
     top = top / np.linalg.norm(top)
     return Box(rows[0], rows[1], np.stack([right, top, np.cross(right, top)]))

@@ -63,8 +63,8 @@ class NodeLayout:
 
     def at_face_center(self, mover: int, target: int) -> bool:
         """Return whether the attachment point of a contact is the centre of a face of the mover."""
-        place = local_points(self.parts[mover].box, self.points(mover, target)[0])
-        return bool((np.abs(place - 0.5) < 1e-3).sum() >= 2)
+        local = local_points(self.parts[mover].box, self.points(mover, target)[0])
+        return bool((np.abs(local - 0.5) < 1e-3).sum() >= 2)
 
     def ungroundable(self) -> list[int]:
         """Return the parts that no chain of permitted attachments joins to the bounding box, ascending."""

@@ -202,15 +202,15 @@ def _evenly_spaced(
     """Return the longest row that starts with `first` and continues in equal steps."""
     best = [first]
     start = bodies[first].center[axis]
-    places = {i: float(bodies[i].center[axis] - start) for i in row}
-    for step in sorted({place for place in places.values() if place > tolerance / 2}):
+    offsets = {i: float(bodies[i].center[axis] - start) for i in row}
+    for step in sorted({offset for offset in offsets.values() if offset > tolerance / 2}):
         candidate = [first]
         while True:
-            wanted = step * len(candidate)
-            near = [i for i in row if i not in candidate and abs(places[i] - wanted) <= min(tolerance, step / 4)]
+            target = step * len(candidate)
+            near = [i for i in row if i not in candidate and abs(offsets[i] - target) <= min(tolerance, step / 4)]
             if not near:
                 break
-            candidate.append(min(near, key=lambda i: abs(places[i] - wanted)))
+            candidate.append(min(near, key=lambda i: abs(offsets[i] - target)))
         if len(candidate) > len(best):
             best = candidate
     return best

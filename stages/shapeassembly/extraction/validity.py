@@ -32,10 +32,10 @@ def surface_points(boxes: Sequence[Box], count: int) -> FloatArray:
     for box, counts in zip(boxes, shares.tolist(), strict=True):
         for axis, number in enumerate(counts):
             offsets = (np.arange(1, number + 1)[:, None] * _GOLDEN) % 1.0 - 0.5
-            place = np.insert(offsets, axis, 0.5, axis=1)
+            local = np.insert(offsets, axis, 0.5, axis=1)
             for side in (-1.0, 1.0):
-                place[:, axis] = side / 2
-                points.append(box.center + (place * box.size) @ box.axes)
+                local[:, axis] = side / 2
+                points.append(box.center + (local * box.size) @ box.axes)
     return np.concatenate(points)
 
 

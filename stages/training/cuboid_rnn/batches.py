@@ -88,9 +88,9 @@ def batches(cuboids: CuboidCorpus, size: int, rng: np.random.Generator | None) -
 def batch_of(cuboids: CuboidCorpus, shapes: npt.NDArray[np.int64]) -> CuboidBatch:
     """Build the batch of some shapes, int64 (n,)."""
     lengths = np.diff(cuboids.first)[shapes]
-    place = np.arange(lengths.max() + 1)
-    filled = place < lengths[:, None]
-    rows = np.where(filled, cuboids.first[shapes][:, None] + place, 0)
+    column = np.arange(lengths.max() + 1)
+    filled = column < lengths[:, None]
+    rows = np.where(filled, cuboids.first[shapes][:, None] + column, 0)
     boxes = np.where(filled[..., None], cuboids.rows[rows], np.float32(0))
     rotated = (boxes[..., ROTATION] != 0).any(axis=-1)
     flags = np.stack([boxes[..., BOX_WIDTH] > 0, rotated], axis=-1)
@@ -101,12 +101,12 @@ def batch_of(cuboids: CuboidCorpus, shapes: npt.NDArray[np.int64]) -> CuboidBatc
     flags = flags.repeat(3, axis=1).astype(np.float32)
     steps = np.concatenate([numbers, flags], axis=-1)
     before = np.concatenate([np.zeros_like(steps[:, :1]), steps[:, :-1]], axis=1)
-    axes = np.broadcast_to(np.tile(np.eye(3, dtype=np.float32), (len(place), 1)), (*numbers.shape[:2], 3))
+    axes = np.broadcast_to(np.tile(np.eye(3, dtype=np.float32), (len(column), 1)), (*numbers.shape[:2], 3))
     return CuboidBatch(
         inputs=torch.from_numpy(np.concatenate([before, axes], axis=-1)),
         numbers=torch.from_numpy(numbers),
         flags=torch.from_numpy(flags),
         kinds=torch.from_numpy(kinds),
         step_mask=torch.from_numpy(filled.repeat(3, axis=1).astype(np.float32)),
-        kind_mask=torch.from_numpy((place <= lengths[:, None]).astype(np.float32)),
+        kind_mask=torch.from_numpy((column <= lengths[:, None]).astype(np.float32)),
     )

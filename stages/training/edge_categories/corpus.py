@@ -102,7 +102,8 @@ def _shapes(task: Task, split: str) -> Iterator[tuple[str, Assembly]]:
     shards = [shard for shard, of in params["splits"].items() if of == split]
     for done, shard in enumerate(shards):
         for sample in read_samples(task.input(params["producer"], f"{shard}.tar")):
-            if sample.kit == params["kit"] and sample.assembly.stretches is None:
+            stretched = sample.assembly.stretches is not None
+            if sample.kit == params["kit"] and not stretched:
                 yield sample.key, sample.assembly
         task.progress(done + 1, len(shards))
 

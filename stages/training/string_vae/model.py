@@ -197,8 +197,8 @@ class TransformerDecoder(TokenDecoder):
         return [points.new_zeros(len(points), 0, self.embedding.embedding_dim) for _ in range(2 * len(self.blocks))]
 
     def step(self, tokens: Tensor, points: Tensor, state: DecoderState) -> tuple[Tensor, Tensor, DecoderState]:
-        place = torch.full_like(tokens, state[0].shape[1])
-        inputs = (self.embedding(tokens) + self.places(place) + self.point(points))[:, None]
+        index = torch.full_like(tokens, state[0].shape[1])
+        inputs = (self.embedding(tokens) + self.places(index) + self.point(points))[:, None]
         grown: DecoderState = []
         for number, block in enumerate(self.blocks):
             inputs, keys, values = block(inputs, (state[2 * number], state[2 * number + 1]))

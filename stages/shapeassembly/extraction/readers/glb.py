@@ -48,20 +48,20 @@ def read_glb(path: Path, up: Literal["y", "z"]) -> PartHierarchy:
 
 
 def _part(
-    scene: Any, tree: Any, node: str, rotation: FloatArray, place: str, depth: int
+    scene: Any, tree: Any, node: str, rotation: FloatArray, location: str, depth: int
 ) -> tuple[PartNode, FloatArray] | None:
     """Return the part of a node and its points, float64 (n, 3) y up; None where no mesh is below it."""
     if depth > MAX_HIERARCHY_DEPTH:
-        raise Rejected(UNREADABLE, f"{place}: more than {MAX_HIERARCHY_DEPTH} levels; simplify the scene")
+        raise Rejected(UNREADABLE, f"{location}: more than {MAX_HIERARCHY_DEPTH} levels; simplify the scene")
     label = _NUMBER.sub("", node.rsplit("/", 1)[-1]) or "part"
-    results = [_part(scene, tree, child, rotation, place, depth + 1) for child in sorted(tree.get(node, []))]
+    results = [_part(scene, tree, child, rotation, location, depth + 1) for child in sorted(tree.get(node, []))]
     below = [result for result in results if result is not None]
     matrix, geometry = scene.graph.get(node)
     if geometry is not None:
         vertices = np.asarray(scene.geometry[geometry].vertices, dtype=np.float64)
         points = (vertices @ matrix[:3, :3].T + matrix[:3, 3]) @ rotation.T
         if not len(points) or not np.isfinite(points).all():
-            raise Rejected(UNREADABLE, f"{place}: node {node!r} has no vertices, or some that are not finite")
+            raise Rejected(UNREADABLE, f"{location}: node {node!r} has no vertices, or some that are not finite")
         below.insert(0, (PartNode(label, minimum_box(points)), points))
         if len(below) == 1:
             return below[0]

@@ -37,14 +37,14 @@ def read_partnet(path: Path) -> PartHierarchy:
     return PartHierarchy(name, check_limits(root, name))
 
 
-def _part(node: Any, folder: Path, place: str, depth: int) -> tuple[PartNode, FloatArray]:
+def _part(node: Any, folder: Path, location: str, depth: int) -> tuple[PartNode, FloatArray]:
     """Return a part and the points of its meshes, float64 (n, 3)."""
     if depth > MAX_HIERARCHY_DEPTH or not isinstance(node, dict):
-        raise Rejected(UNREADABLE, f"{place}: a part is an object, at most {MAX_HIERARCHY_DEPTH} levels deep")
+        raise Rejected(UNREADABLE, f"{location}: a part is an object, at most {MAX_HIERARCHY_DEPTH} levels deep")
     label = node.get("name")
     if not isinstance(label, str) or not label:
-        raise Rejected(UNREADABLE, f"{place}: a part has no `name`")
-    here = f"{place}/{label}"
+        raise Rejected(UNREADABLE, f"{location}: a part has no `name`")
+    here = f"{location}/{label}"
     children, meshes = node.get("children") or [], node.get("objs") or []
     if not isinstance(children, list) or not isinstance(meshes, list):
         raise Rejected(UNREADABLE, f"{here}: `children` and `objs` are lists")
@@ -58,19 +58,19 @@ def _part(node: Any, folder: Path, place: str, depth: int) -> tuple[PartNode, Fl
     return PartNode(label, minimum_box(points)), points
 
 
-def _points(mesh: Any, folder: Path, place: str) -> FloatArray:
+def _points(mesh: Any, folder: Path, location: str) -> FloatArray:
     """Return the vertices of one OBJ file, float64 (n, 3)."""
     if not isinstance(mesh, str) or not mesh or set(mesh) & set("/\\\0") or mesh in {".", ".."}:
-        raise Rejected(UNREADABLE, f"{place}: a mesh is named by a file of `objs`, without a folder: {mesh!r}")
+        raise Rejected(UNREADABLE, f"{location}: a mesh is named by a file of `objs`, without a folder: {mesh!r}")
     path = folder / f"{mesh}.obj"
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
         rows = [[float(number) for number in line.split()[1:4]] for line in lines if line.startswith("v ")]
         points = np.array(rows, dtype=np.float64).reshape(-1, 3)
     except FileNotFoundError:
-        raise Rejected(UNREADABLE, f"{place}: objs/{mesh}.obj is not there; download the shape again") from None
+        raise Rejected(UNREADABLE, f"{location}: objs/{mesh}.obj is not there; download the shape again") from None
     except ValueError:
-        raise Rejected(UNREADABLE, f"{place}: objs/{mesh}.obj has a vertex that is not three numbers") from None
+        raise Rejected(UNREADABLE, f"{location}: objs/{mesh}.obj has a vertex that is not three numbers") from None
     if not len(points) or not np.isfinite(points).all():
-        raise Rejected(UNREADABLE, f"{place}: objs/{mesh}.obj has no vertices, or some that are not finite")
+        raise Rejected(UNREADABLE, f"{location}: objs/{mesh}.obj has no vertices, or some that are not finite")
     return points

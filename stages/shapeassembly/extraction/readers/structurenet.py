@@ -32,15 +32,15 @@ def read_structurenet(path: Path) -> PartHierarchy:
     return PartHierarchy(path.stem, check_limits(_part(tree, path.name, 0), path.name))
 
 
-def _part(node: Any, place: str, depth: int) -> PartNode:
+def _part(node: Any, location: str, depth: int) -> PartNode:
     if depth > MAX_HIERARCHY_DEPTH:
-        raise Rejected(UNREADABLE, f"{place}: more than {MAX_HIERARCHY_DEPTH} levels; simplify it")
+        raise Rejected(UNREADABLE, f"{location}: more than {MAX_HIERARCHY_DEPTH} levels; simplify it")
     if not isinstance(node, dict):
-        raise Rejected(UNREADABLE, f"{place}: a part is an object with `label`, `box` and `children`")
+        raise Rejected(UNREADABLE, f"{location}: a part is an object with `label`, `box` and `children`")
     label = node.get("label")
     if not isinstance(label, str) or not label:
-        raise Rejected(UNREADABLE, f"{place}: a part has no `label`; name it")
-    here = f"{place}/{label}" if depth else place
+        raise Rejected(UNREADABLE, f"{location}: a part has no `label`; name it")
+    here = f"{location}/{label}" if depth else location
     numbers = node.get("box")
     if not isinstance(numbers, list) or len(numbers) != 12:
         raise Rejected(UNREADABLE, f"{here}: `box` is a list of twelve numbers: centre, size, x axis, y axis")

@@ -45,7 +45,8 @@ def test_a_cycle_is_open_from_its_number_to_the_same_number_again() -> None:
 
 
 def test_cycle_attention_changes_only_open_cycles() -> None:
-    assert random_vae("plain", cycle_attention=True).module.cycle_attention is None
+    published = random_vae("plain", cycle_attention=True).module
+    assert published.cycle_attention is None
     module = random_vae("masked", cycle_attention=True).module
     assert module.cycle_attention is not None
     codes, points = torch.tensor([[1, 7, 2, 6, 1, 6, 1, 7, 1]]), torch.zeros((1, 8))
