@@ -58,7 +58,7 @@ def _options_text(model: type[StrictModel]) -> str:
 
 
 def find_table(name: str) -> Evaluation:
-    """Return a table by name. Raises ConfigError, naming the nearest, if there is none."""
+    """Return a table by name. Raises ConfigError with the nearest name for an unknown one."""
     tables = find_tables()
     if name not in tables:
         close = nearest_word(name, tables)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from statistics import median
 from typing import Any
 
@@ -24,11 +24,9 @@ COLUMNS = ("shapes of", "exemplars", "shapes", "radius", "similar %", "probes", 
 
 NOTES = (
     "Similar: shapes with all probes matched. A probe is a random point of the surface; it matches if a rigid "
-    "transform "
-    "aligns its neighbourhood, within the radius along the surface, with one of an exemplar, in both directions and "
-    "with "
-    "normals. Matched: probes. Worst: matched share of the neighbourhood of the least matched probe. Transforms: "
-    "median number that matches a shape; the exemplar was cut into at least as many pieces.",
+    "transform aligns its neighbourhood, within the radius along the surface, with one of an exemplar, in both "
+    "directions and with normals. Matched: probes. Worst: matched share of the neighbourhood of the least matched "
+    "probe. Transforms: median number that matches a shape; the exemplar was cut into at least as many pieces.",
 )
 
 SAMPLES_PER_RADIUS = 6.0
@@ -66,9 +64,9 @@ class Similarity:
     probes: FloatArray
     """Points of the shape, float64 (p, 3)."""
     matched: BoolArray
-    """Whether the exemplar has the neighbourhood of each, bool (p,)."""
+    """Whether the exemplar has the neighbourhood of a probe, bool (p,)."""
     shares: FloatArray
-    """Greatest matched share of each neighbourhood, 1 if matched, float64 (p,)."""
+    """Greatest matched share of a neighbourhood, 1 if matched, float64 (p,)."""
     transforms: FloatArray
     """Those that matched, from the exemplar to the shape, float64 (m, 4, 4)."""
 
@@ -87,15 +85,15 @@ class Similarity:
 def r_similarity(
     exemplar: FloatArray, shape: FloatArray, radius: float, probes: int, rng: np.random.Generator
 ) -> Similarity:
-    """Test whether each of `probes` random points of a shape, triangles (t, 3, 3), has its ball in an exemplar.
+    """Test whether an exemplar has the neighbourhoods of `probes` random points of a shape, triangles (t, 3, 3).
 
     By §3.1, a rigid transform must take a point of the exemplar to the probe, and its neighbourhood, within `radius`
     along the surface, onto the shape with its normals. For equal topology the neighbourhood of the probe must also come
     from the exemplar. Distances along a surface are those in a graph of samples, some per cent longer; sheets closer
     than about a third of the radius count as linked.
 
-    Transforms align corners of one kind, where two planes meet. Each that matches one probe is tried on all others, so
-    there is one search for each piece of a shape. Raises ValueError for a surface without area.
+    Transforms align corners of one kind, where two planes meet. A transform that matches one probe is tried on all
+    others, so there is one search per piece of a shape. Raises ValueError for a surface without area.
     """
     exemplar_surface, surface = _Surface(exemplar, radius, rng), _Surface(shape, radius, rng)
     samples = np.sort(rng.choice(len(surface.points), min(probes, len(surface.points)), replace=False))
@@ -172,15 +170,15 @@ class _Surface:
     def __init__(self, corners: FloatArray, radius: float, rng: np.random.Generator) -> None:
         import open3d as o3d
 
-        ways = area_vectors(corners)
-        doubled = np.linalg.norm(ways, axis=1)
-        # slivers, such as cuts leave, have normals of rounding
+        vectors = area_vectors(corners)
+        doubled = np.linalg.norm(vectors, axis=1)
+        # normals of slivers, as made by cuts, are rounding errors
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         real = doubled > WELD_SHARE * radius * sides
         if not real.any():
-            raise ValueError("a surface without area is similar to nothing")
+            raise ValueError("the surface has no area")
         corners, doubled = corners[real], doubled[real]
-        normals = ways[real] / doubled[:, None]
+        normals = vectors[real] / doubled[:, None]
         self.corners, self.face_normals, self.radius = corners, normals, radius
         self.tolerance, self.spacing = TOLERANCE_SHARE * radius, radius / SAMPLES_PER_RADIUS
         self._scene = o3d.t.geometry.RaycastingScene(1)
@@ -193,8 +191,8 @@ class _Surface:
         face = np.minimum(face, len(corners) - 1)
         u, v = rng.random((2, count, 1))
         u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-        first, ways = corners[face, 0], corners[face, 1:] - corners[face, :1]
-        points, normals = first + u * ways[:, 0] + v * ways[:, 1], normals[face]
+        first, legs = corners[face, 0], corners[face, 1:] - corners[face, :1]
+        points, normals = first + u * legs[:, 0] + v * legs[:, 1], normals[face]
         clear = self.lies_on(points, normals)
         self.points, self.normals = points[clear], normals[clear]
 
@@ -209,12 +207,12 @@ class _Surface:
         offset = query - nearest["points"].numpy()
         along = (offset * normals).sum(axis=1)
         faces = self.face_normals[nearest["primitive_ids"].numpy()]
-        found: BoolArray = np.asarray(
+        is_on: BoolArray = np.asarray(
             (np.abs(along - above) <= self.tolerance)
             & (np.linalg.norm(offset - along[:, None] * normals, axis=1) <= self.tolerance)
             & ((faces * normals).sum(axis=1) > np.cos(MAX_NORMAL_RADIANS))
         )
-        return found
+        return is_on
 
     @cached_property
     def tree(self) -> Any:
@@ -239,10 +237,13 @@ class _Surface:
 
     @cached_property
     def frames(self) -> tuple[FloatArray, np.ndarray, BoolArray]:
-        """Corner frames (m, 4, 4), the third axis one plane's normal and the first turned to that of another which
-        meets it; what kind each is, int64 (m, 3): the angle of the planes in hundredths of its cosine, whether the
-        corner bends outward there, and which planes are none but ends of the surface; and whether three planes meet
-        there, bool (m,): else it may be any point of a crease."""
+        """Corner frames, their kinds, and whether they are full corners.
+
+        A frame, float64 (m, 4, 4), belongs to two planes that meet at a vertex: its third axis is the normal of one,
+        and its first points towards the normal of the other. A kind, int64 (m, 3), is 100 times the cosine between the
+        planes, whether the corner is convex, and which planes are ends of the surface. At full corners, bool (m,),
+        three planes meet; other frames are on creases.
+        """
         vertices, planes, ends, middles = self._planes()
         order = np.argsort(vertices, kind="stable")
         vertices, planes, ends, middles = vertices[order], planes[order], ends[order], middles[order]
@@ -252,46 +253,48 @@ class _Surface:
         count[count > MAX_PLANES] = 0
         start, width = np.repeat(first, count**2), np.repeat(count, count**2)
         number = np.arange(len(start)) - np.repeat(np.cumsum(count**2) - count**2, count**2)
-        one, two = start + number // np.maximum(width, 1), start + number % np.maximum(width, 1)
-        cosine = (planes[one] * planes[two]).sum(axis=1)
+        a, b = start + number // np.maximum(width, 1), start + number % np.maximum(width, 1)
+        cosine = (planes[a] * planes[b]).sum(axis=1)
         bent = np.abs(cosine) < np.cos(MAX_NORMAL_RADIANS)
-        one, two, cosine = one[bent], two[bent], cosine[bent]
-        frames = np.zeros((len(one), 4, 4))
-        across = planes[two] - cosine[:, None] * planes[one]
+        a, b, cosine = a[bent], b[bent], cosine[bent]
+        frames = np.zeros((len(a), 4, 4))
+        across = planes[b] - cosine[:, None] * planes[a]
         across /= np.linalg.norm(across, axis=1)[:, None]
-        frames[:, :3, 0], frames[:, :3, 1], frames[:, :3, 2] = across, np.cross(planes[one], across), planes[one]
-        frames[:, :3, 3], frames[:, 3, 3] = self._vertices[vertices[one]], 1.0
-        outward = ((middles[two] - self._vertices[vertices[one]]) * planes[one]).sum(axis=1) < 0
-        kinds = np.column_stack([np.round(100 * cosine), outward, 2 * ends[one] + ends[two]]).astype(np.int64)
+        frames[:, :3, 0], frames[:, :3, 1], frames[:, :3, 2] = across, np.cross(planes[a], across), planes[a]
+        frames[:, :3, 3], frames[:, 3, 3] = self._vertices[vertices[a]], 1.0
+        convex = ((middles[b] - self._vertices[vertices[a]]) * planes[a]).sum(axis=1) < 0
+        kinds = np.column_stack([np.round(100 * cosine), convex, 2 * ends[a] + ends[b]]).astype(np.int64)
         return frames, kinds, np.repeat(full, count**2)[bent]
 
     @cached_property
     def _welded(self) -> tuple[FloatArray, np.ndarray]:
         points = self.corners.reshape(-1, 3)
-        _, first, place = np.unique(
+        _, first, welded = np.unique(
             np.round(points / (WELD_SHARE * self.radius)), axis=0, return_index=True, return_inverse=True
         )
-        return points[first], place.reshape(-1, 3)
+        return points[first], welded.reshape(-1, 3)
 
     @property
     def _vertices(self) -> FloatArray:
         return self._welded[0]
 
     def _planes(self) -> tuple[np.ndarray, FloatArray, BoolArray, FloatArray]:
-        """Each plane at each vertex once: the vertex, its normal (m, 3), whether it is no plane but an end of the
-        surface, whose normal lies along the surface, and a point on it (m, 3)."""
+        """Return the distinct planes at vertices: the vertex, the normal, whether it is an end, and a point on it.
+
+        At an end of the surface, the normal is tangent to the surface and points away from it. Shapes (m,), (m, 3).
+        """
         vertices, faces = self._welded
         middles = self.corners.mean(axis=1)
         sides = np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)])
-        of = np.tile(np.arange(len(faces)), 3)
+        owner = np.tile(np.arange(len(faces)), 3)
         edge = np.sort(sides, axis=1)
         _, inverse, count = np.unique(edge, axis=0, return_inverse=True, return_counts=True)
         single = np.flatnonzero((count[inverse.reshape(-1)] == 1) & (edge[:, 0] != edge[:, 1]))
         along = vertices[sides[single, 1]] - vertices[sides[single, 0]]
-        out = np.cross(along, self.face_normals[of[single]])
+        out = np.cross(along, self.face_normals[owner[single]])
         out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
-        bare = ~self._goes_on(vertices[sides[single]].mean(axis=1), out, self.face_normals[of[single]])
-        single, out = single[bare], out[bare]
+        open_sides = ~self._continues(vertices[sides[single]].mean(axis=1), out, self.face_normals[owner[single]])
+        single, out = single[open_sides], out[open_sides]
         at = np.concatenate([faces.T.reshape(-1), sides[single].T.reshape(-1)])
         normals = np.concatenate([np.tile(self.face_normals, (3, 1)), np.tile(out, (2, 1))])
         is_end = np.arange(len(at)) >= 3 * len(faces)
@@ -300,51 +303,64 @@ class _Surface:
         _, first = np.unique(labels, axis=0, return_index=True)
         return at[first], normals[first], is_end[first], points[first]
 
-    def _goes_on(self, middles: FloatArray, out: FloatArray, normals: FloatArray) -> BoolArray:
-        """Whether there is more surface about sides of triangles, bool (n,), than the triangles, which lie against
-        `out` (n, 3): sides that are cut in other places on either side are no ends, though no two triangles share
-        them."""
+    def _continues(self, middles: FloatArray, out: FloatArray, normals: FloatArray) -> BoolArray:
+        """Return whether the surface continues beyond sides of triangles, whose `out` (n, 3) points away, bool (n,).
+
+        It does where two triangles meet without a common side, because the side is split in different places.
+        """
         reach = 2 * self.tolerance
-        found = np.zeros(len(middles), dtype=bool)
+        continues = np.zeros(len(middles), dtype=bool)
         for angle in EDGE_DIRECTIONS:
-            asked = middles + reach * (np.sin(angle) * normals - np.cos(angle) * out)
-            found |= self._scene.compute_distance(asked.astype(np.float32)).numpy() < reach / 2
-        return found
+            points = middles + reach * (np.sin(angle) * normals - np.cos(angle) * out)
+            continues |= self._scene.compute_distance(points.astype(np.float32)).numpy() < reach / 2
+        return continues
 
 
 def _search(
-    one: _Surface, other: _Surface, probe: int, around: np.ndarray, rng: np.random.Generator
+    exemplar: _Surface, shape: _Surface, probe: int, around: np.ndarray, rng: np.random.Generator
 ) -> tuple[FloatArray | None, float]:
-    """A motion that takes a neighbourhood of the exemplar `one` to that of a sample of the shape `other`, if any is
-    found, and the greatest share of it that one did."""
+    """Return a transform that maps a neighbourhood of the exemplar to that of a sample of the shape, or None.
+
+    Also return the greatest matched share of the neighbourhood.
+    """
     best = 0.0
-    glance = np.r_[probe, around[rng.integers(len(around), size=PRECHECK_SAMPLES)]]
-    for way in range(3):
-        motions = _by_corners(one, other, other.points[probe], way) if way < 2 else _anywhere(one, other, probe, rng)
-        for sample in glance.tolist():
-            back = np.linalg.inv(motions)
-            there = back[:, :3, :3] @ other.points[sample] + back[:, :3, 3]
-            motions = motions[one.lies_on(there, back[:, :3, :3] @ other.normals[sample])] if len(back) else motions
-        for motion in motions[:MAX_TRANSFORMS]:
-            share = float(_matches(one, other, motion, np.array([probe]), [around])[0])
+    precheck = np.r_[probe, around[rng.integers(len(around), size=PRECHECK_SAMPLES)]]
+    candidates = (
+        partial(_by_corners, exemplar, shape, shape.points[probe], full=True),
+        partial(_by_corners, exemplar, shape, shape.points[probe], full=False),
+        partial(_by_normals, exemplar, shape, probe, rng),
+    )
+    for find in candidates:
+        transforms = find()
+        for sample in precheck.tolist():
+            if not len(transforms):
+                break
+            inverse = np.linalg.inv(transforms)
+            points = inverse[:, :3, :3] @ shape.points[sample] + inverse[:, :3, 3]
+            transforms = transforms[exemplar.lies_on(points, inverse[:, :3, :3] @ shape.normals[sample])]
+        for transform in transforms[:MAX_TRANSFORMS]:
+            share = float(_matches(exemplar, shape, transform, np.array([probe]), [around])[0])
             if share >= 1.0:
-                return motion, share
+                return transform, share
             best = max(best, share)
     return None, best
 
 
-def _by_corners(one: _Surface, other: _Surface, point: FloatArray, way: int) -> FloatArray:
-    """Motions (m, 4, 4) that take corner frames of one surface to those of the other that are near a point: to full
-    corners, or, `way` 1, to points of creases, such as seams leave."""
-    frames, kinds, full = other.frames
-    own, known, _ = one.frames
-    there = np.flatnonzero(np.isin(_packed(kinds), _packed(known)) & (full == (way == 0)))
-    order = np.argsort(np.linalg.norm(frames[there, :3, 3] - point, axis=1), kind="stable")
-    found = []
-    for each in there[order[:CORNER_FRAMES_TRIED]].tolist():
-        like = np.flatnonzero((known == kinds[each]).all(axis=1))
-        found.append(frames[each] @ np.linalg.inv(own[like[:: 1 + len(like) // MAX_EXEMPLAR_FRAMES]]))
-    return np.concatenate(found) if found else np.empty((0, 4, 4))
+def _by_corners(exemplar: _Surface, shape: _Surface, point: FloatArray, full: bool) -> FloatArray:
+    """Return transforms (m, 4, 4) that map corner frames of the exemplar to those of the shape near a point.
+
+    full: frames of the shape at full corners; else those on creases.
+    """
+    frames, kinds, is_full = shape.frames
+    exemplar_frames, exemplar_kinds, _ = exemplar.frames
+    usable = np.flatnonzero(np.isin(_packed(kinds), _packed(exemplar_kinds)) & (is_full == full))
+    order = np.argsort(np.linalg.norm(frames[usable, :3, 3] - point, axis=1), kind="stable")
+    transforms = []
+    for frame in usable[order[:CORNER_FRAMES_TRIED]].tolist():
+        same_kind = np.flatnonzero((exemplar_kinds == kinds[frame]).all(axis=1))
+        origin = exemplar_frames[same_kind[:: 1 + len(same_kind) // MAX_EXEMPLAR_FRAMES]]
+        transforms.append(frames[frame] @ np.linalg.inv(origin))
+    return np.concatenate(transforms) if transforms else np.empty((0, 4, 4))
 
 
 def _packed(kinds: np.ndarray) -> np.ndarray:
@@ -352,25 +368,25 @@ def _packed(kinds: np.ndarray) -> np.ndarray:
     return packed
 
 
-def _anywhere(one: _Surface, other: _Surface, probe: int, rng: np.random.Generator) -> FloatArray:
-    """Motions (m, 4, 4) that take samples of one surface to a sample of the other, however turned about its normal."""
-    asked = rng.integers(len(one.points), size=FALLBACK_SAMPLES)
-    own = _with_normal(one.points[asked], one.normals[asked])
-    goal = _with_normal(other.points[[probe]], other.normals[[probe]])[0]
+def _by_normals(exemplar: _Surface, shape: _Surface, probe: int, rng: np.random.Generator) -> FloatArray:
+    """Return transforms (m, 4, 4) that map samples of the exemplar to one of the shape, turned about its normal."""
+    samples = rng.integers(len(exemplar.points), size=FALLBACK_SAMPLES)
+    source = _normal_frames(exemplar.points[samples], exemplar.normals[samples])
+    target = _normal_frames(shape.points[[probe]], shape.normals[[probe]])[0]
     turns = np.zeros((FALLBACK_TURNS, 4, 4))
     angle = 2 * np.pi * np.arange(FALLBACK_TURNS) / FALLBACK_TURNS
     turns[:, 0, 0] = turns[:, 1, 1] = np.cos(angle)
     turns[:, 1, 0], turns[:, 0, 1] = np.sin(angle), -np.sin(angle)
     turns[:, 2, 2] = turns[:, 3, 3] = 1.0
-    found: FloatArray = (goal @ turns @ np.linalg.inv(own)[:, None]).reshape(-1, 4, 4)
-    return found
+    transforms: FloatArray = (target @ turns @ np.linalg.inv(source)[:, None]).reshape(-1, 4, 4)
+    return transforms
 
 
-def _with_normal(points: FloatArray, normals: FloatArray) -> FloatArray:
-    """A frame at each point whose third axis is the normal."""
+def _normal_frames(points: FloatArray, normals: FloatArray) -> FloatArray:
+    """Return frames (n, 4, 4) at points, whose third axes are the normals."""
     frames = np.zeros((len(points), 4, 4))
-    least = np.eye(3)[np.abs(normals).argmin(axis=1)]
-    across = np.cross(normals, least)
+    axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    across = np.cross(normals, axis)
     across /= np.linalg.norm(across, axis=1)[:, None]
     frames[:, :3, 0], frames[:, :3, 1], frames[:, :3, 2] = across, np.cross(normals, across), normals
     frames[:, :3, 3], frames[:, 3, 3] = points, 1.0
@@ -378,58 +394,60 @@ def _with_normal(points: FloatArray, normals: FloatArray) -> FloatArray:
 
 
 def _matches(
-    one: _Surface, other: _Surface, motion: FloatArray, probes: np.ndarray, around: list[np.ndarray]
+    exemplar: _Surface, shape: _Surface, transform: FloatArray, probes: np.ndarray, around: list[np.ndarray]
 ) -> FloatArray:
-    """The share of the neighbourhood of each of `probes` of the shape `other` that a motion (4, 4) of the exemplar
-    matches, both ways, float64 (n,); 0 where it takes no point to the probe."""
-    back: FloatArray = np.asarray(np.linalg.inv(motion), dtype=np.float64)
+    """Return the shares of neighbourhoods of the shape that a transform of the exemplar matches, float64 (n,).
+
+    A share is the lesser of both directions; it is 0 if no point of the exemplar is mapped to the probe.
+    """
+    inverse: FloatArray = np.asarray(np.linalg.inv(transform), dtype=np.float64)
     shares = np.zeros(len(probes))
-    there = other.points[probes] @ back[:3, :3].T + back[:3, 3]
-    asked = np.flatnonzero(one.lies_on(there, other.normals[probes] @ back[:3, :3].T))
-    if not len(asked):
+    points = shape.points[probes] @ inverse[:3, :3].T + inverse[:3, 3]
+    mapped = np.flatnonzero(exemplar.lies_on(points, shape.normals[probes] @ inverse[:3, :3].T))
+    if not len(mapped):
         return shares
-    forth = _share(one, back, other, [around[each] for each in asked.tolist()])
-    away, start = one.tree.query(there[asked])
-    shares[asked] = np.minimum(forth, _share(other, motion, one, one.balls(start, away)))
+    to_exemplar = _share(exemplar, inverse, shape, [around[probe] for probe in mapped.tolist()])
+    distance, nearest = exemplar.tree.query(points[mapped])
+    shares[mapped] = np.minimum(to_exemplar, _share(shape, transform, exemplar, exemplar.balls(nearest, distance)))
     return shares
 
 
-def _share(target: _Surface, motion: FloatArray, source: _Surface, around: list[np.ndarray]) -> FloatArray:
-    """Of each neighbourhood of `source` the share that a motion takes onto `target`; 1 where there is nothing."""
-    sizes = np.array([len(each) for each in around])
+def _share(target: _Surface, transform: FloatArray, source: _Surface, around: list[np.ndarray]) -> FloatArray:
+    """Return the shares of neighbourhoods of `source` that a transform maps onto `target`; 1 for empty ones."""
+    sizes = np.array([len(ball) for ball in around])
     members = np.concatenate(around)
-    points = source.points[members] @ motion[:3, :3].T + motion[:3, 3]
-    found = target.lies_on(points, source.normals[members] @ motion[:3, :3].T)
-    total = np.bincount(np.repeat(np.arange(len(sizes)), sizes), weights=found, minlength=len(sizes))
+    points = source.points[members] @ transform[:3, :3].T + transform[:3, 3]
+    is_on = target.lies_on(points, source.normals[members] @ transform[:3, :3].T)
+    total = np.bincount(np.repeat(np.arange(len(sizes)), sizes), weights=is_on, minlength=len(sizes))
     shares: FloatArray = np.where(sizes > 0, total / np.maximum(sizes, 1), 1.0)
     return shares
 
 
 @numba.njit(cache=True)
-def _balls(starts, ends, lengths, places, limits):
-    """Samples within a limit along links of each of `places`: their starts and members, in the order they are met."""
-    members, first = [0 for _ in range(0)], np.zeros(len(places) + 1, dtype=np.int64)
+def _balls(starts, ends, lengths, centers, limits):
+    """Return the samples within limits along links around centers: starts, and members in order of discovery."""
+    members, first = [0 for _ in range(0)], np.zeros(len(centers) + 1, dtype=np.int64)
     distance = np.full(len(starts) - 1, np.inf)
-    for number in range(len(places)):
-        queue = [places[number]]
-        distance[places[number]] = 0.0
-        touched = [places[number]]
+    for number in range(len(centers)):
+        queue = [centers[number]]
+        distance[centers[number]] = 0.0
+        touched = [centers[number]]
         while len(queue):
-            after = [0 for _ in range(0)]
+            following = [0 for _ in range(0)]
             for n in queue:
                 for link in range(starts[n], starts[n + 1]):
-                    way = distance[n] + lengths[link]
-                    if way <= limits[number] and way < distance[ends[link]] - 1e-12:
+                    length = distance[n] + lengths[link]
+                    if length <= limits[number] and length < distance[ends[link]] - 1e-12:
                         if np.isinf(distance[ends[link]]):
                             touched.append(ends[link])
-                        distance[ends[link]] = way
-                        after.append(ends[link])
-            queue = after
+                        distance[ends[link]] = length
+                        following.append(ends[link])
+            queue = following
         for n in touched:
             members.append(n)
             distance[n] = np.inf
         first[number + 1] = len(members)
-    found = np.empty(len(members), dtype=np.int64)
+    packed = np.empty(len(members), dtype=np.int64)
     for n in range(len(members)):
-        found[n] = members[n]
-    return first, found
+        packed[n] = members[n]
+    return first, packed

@@ -15,14 +15,14 @@ DRAWS_PER_GRAPH = 3
 SHAPES_SHOWN = 3
 
 
-class Options(StrictModel):
+class CategoriesOptions(StrictModel):
     """How many shapes and strings are measured."""
 
     graphs: int = Field(100, ge=1, description="shapes of each kit and split")
     voters: int = Field(7, ge=0, description="random strings of each shape, besides its canonical one")
 
 
-def _compute(run: DatasetRun, options: Options) -> TableResult:
+def _compute(run: DatasetRun, options: CategoriesOptions) -> TableResult:
     from itertools import islice
 
     from eval.engine.models import training_curve
@@ -84,5 +84,5 @@ TABLE = Evaluation(
     requirements=(KITS, EDGE_CATEGORIES),
     estimate_seconds=lambda run: 5 + 110.0 * len(weights_of_kind(run.models, "edge_categories")),
     compute=_compute,
-    options=Options,
+    options=CategoriesOptions,
 )

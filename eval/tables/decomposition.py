@@ -16,7 +16,7 @@ from pipeline.errors import ConfigError
 FILES = "models with known parts, as files: decomposition a.glb b.glb"
 
 
-class Options(StrictModel):
+class DecompositionOptions(StrictModel):
     """How merged models are segmented."""
 
     segmentations: tuple[Literal["symmetry", "sections", "components"], ...] = Field(
@@ -24,11 +24,11 @@ class Options(StrictModel):
     )
 
 
-def _compute(run: DatasetRun, options: Options) -> TableResult:
+def _compute(run: DatasetRun, options: DecompositionOptions) -> TableResult:
     raise ConfigError(f"this table takes {FILES}")
 
 
-def _compute_from_files(paths: Sequence[Path], options: Options) -> TableResult:
+def _compute_from_files(paths: Sequence[Path], options: DecompositionOptions) -> TableResult:
     from eval.engine.shapes import model_kits
     from eval.grammars.decomposition import decomposition_table
     from eval.grammars.grammar_recall import grammar_table
@@ -48,5 +48,5 @@ TABLE = Evaluation(
     estimate_seconds=lambda run: 120.0,
     compute=_compute,
     compute_from_files=_compute_from_files,
-    options=Options,
+    options=DecompositionOptions,
 )

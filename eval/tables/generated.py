@@ -14,7 +14,7 @@ from pipeline.config import StrictModel
 SHAPES_SHOWN = 4
 
 
-class Options(StrictModel):
+class GeneratedOptions(StrictModel):
     """How many shapes are measured."""
 
     max_shapes: int = Field(1000, ge=1, description="shapes of each row")
@@ -36,7 +36,7 @@ def _missing(run: DatasetRun) -> str:
     return f"no finished dataset {missing[0]}, on which its models were trained; make dataset of it" if missing else ""
 
 
-def _compute(run: DatasetRun, options: Options) -> TableResult:
+def _compute(run: DatasetRun, options: GeneratedOptions) -> TableResult:
     from eval.engine.pictures import shape_picture
     from eval.generated.generated_shapes import GeneratedShape, finished_shapes, generated_row, generated_table
     from pipeline.paths import DatasetPaths
@@ -80,5 +80,5 @@ TABLE = Evaluation(
     requirements=(FINISHED_DATASET, KITS, Requirement("generated samples and their training datasets", _missing)),
     estimate_seconds=lambda run: 20 + 0.01 * run.samples,
     compute=_compute,
-    options=Options,
+    options=GeneratedOptions,
 )

@@ -18,7 +18,7 @@ WARM_UP_GRAPHS = 8
 """Graphs instantiated before time is measured, which fill the cache of contacts."""
 
 
-class Options(StrictModel):
+class InstantiationOptions(StrictModel):
     """What is instantiated, and how."""
 
     graphs: int = Field(100, ge=1, description="graphs of each kit and of each model")
@@ -27,7 +27,7 @@ class Options(StrictModel):
     max_placements: int = Field(4000, ge=1, description="as string_sampling.max_placements")
 
 
-def _compute(run: DatasetRun, options: Options) -> TableResult:
+def _compute(run: DatasetRun, options: InstantiationOptions) -> TableResult:
     from eval.engine.pictures import shape_picture
     from eval.generated.instantiation import (
         DRAWS_PER_GRAPH,
@@ -118,5 +118,5 @@ TABLE = Evaluation(
     requirements=(KITS, CORPUS),
     estimate_seconds=_estimate_seconds,
     compute=_compute,
-    options=Options,
+    options=InstantiationOptions,
 )

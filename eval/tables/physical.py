@@ -22,7 +22,7 @@ MAX_SHAPES = 200
 SHAPES_SHOWN = 6
 
 
-class Options(StrictModel):
+class PhysicalOptions(StrictModel):
     """How many shapes are judged, and how."""
 
     max_shapes: int = Field(MAX_SHAPES, ge=1, description="shapes of the dataset that are judged")
@@ -30,7 +30,7 @@ class Options(StrictModel):
     up: Literal["y", "z"] = Field("y", description="the axis that points up in files")
 
 
-def _compute(run: DatasetRun, options: Options) -> TableResult:
+def _compute(run: DatasetRun, options: PhysicalOptions) -> TableResult:
     from eval.dataset.physical_validity import PUBLISHED, judge_by_name, physical_table
     from eval.engine.shapes import dataset_shapes
     from stages.shape.physics.settings import PhysicsConfig
@@ -42,7 +42,7 @@ def _compute(run: DatasetRun, options: Options) -> TableResult:
     return TableResult([table], [_margins(results)], [weakest])
 
 
-def _compute_from_files(paths: Sequence[Path], options: Options) -> TableResult:
+def _compute_from_files(paths: Sequence[Path], options: PhysicalOptions) -> TableResult:
     from eval.dataset.physical_validity import PUBLISHED, judge_by_name, physical_table
     from eval.engine.shapes import box_shapes, model_shapes
     from stages.shape.physics.settings import PhysicsConfig
@@ -89,5 +89,5 @@ TABLE = Evaluation(
     estimate_seconds=lambda run: 10 + 0.2 * min(run.samples, MAX_SHAPES),
     compute=_compute,
     compute_from_files=_compute_from_files,
-    options=Options,
+    options=PhysicalOptions,
 )

@@ -16,7 +16,7 @@ from pipeline.errors import ConfigError
 FILES = "a model as a file: radius_sweep a.glb"
 
 
-class Options(StrictModel):
+class RadiusSweepOptions(StrictModel):
     """How grammars are extracted."""
 
     radii: tuple[float, ...] = Field(
@@ -25,11 +25,11 @@ class Options(StrictModel):
     up: Literal["y", "z"] = Field("y", description="the axis that points up in the files")
 
 
-def _compute(run: DatasetRun, options: Options) -> TableResult:
+def _compute(run: DatasetRun, options: RadiusSweepOptions) -> TableResult:
     raise ConfigError(f"this table takes {FILES}")
 
 
-def _compute_from_files(paths: Sequence[Path], options: Options) -> TableResult:
+def _compute_from_files(paths: Sequence[Path], options: RadiusSweepOptions) -> TableResult:
     from eval.grammars.radius_sweep import extractions, radius_figure, radius_table
     from stages.grammars.settings import MAX_RADIUS_SHARE, MIN_RADIUS_SHARE
 
@@ -54,5 +54,5 @@ TABLE = Evaluation(
     estimate_seconds=lambda run: 120.0,
     compute=_compute,
     compute_from_files=_compute_from_files,
-    options=Options,
+    options=RadiusSweepOptions,
 )

@@ -24,7 +24,7 @@ SHAPES_COMPARED = 8
 """Shapes whose parameters are changed one by one, to find errors that do not show."""
 
 
-class Options(StrictModel):
+class RecoveryOptions(StrictModel):
     """What is recovered, and how long the search is."""
 
     programs: tuple[str, ...] = Field((), description="programs whose models are measured; all unless given")
@@ -33,7 +33,7 @@ class Options(StrictModel):
     budget: int = Field(300, ge=1, description="shapes that a search evaluates")
 
 
-def _sections(run: DatasetRun, options: Options) -> Iterator[TableSection]:
+def _sections(run: DatasetRun, options: RecoveryOptions) -> Iterator[TableSection]:
     """Yield a section for each program and kind of input."""
     from eval.recovery.methods import usable_models
     from stages.programs.program import program_module
@@ -46,7 +46,7 @@ def _sections(run: DatasetRun, options: Options) -> Iterator[TableSection]:
         yield TableSection(f"{program}, {kind}", files, compute, (program_module(program),), own_options)
 
 
-def _of_model(model: TrainedRecovery, options: Options, seed: int) -> TableResult:
+def _of_model(model: TrainedRecovery, options: RecoveryOptions, seed: int) -> TableResult:
     from eval.recovery.methods import (
         MethodResults,
         apply_method,
@@ -102,5 +102,5 @@ TABLE = Evaluation(
     requirements=(CURVE_PROGRAM,),
     estimate_seconds=lambda run: 750.0,
     compute=cached_sections(_sections),
-    options=Options,
+    options=RecoveryOptions,
 )

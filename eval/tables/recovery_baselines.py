@@ -11,13 +11,13 @@ from pipeline.config import StrictModel
 from stages.training.checkpoint import weights_of_kind
 
 
-class Options(StrictModel):
+class RecoveryBaselinesOptions(StrictModel):
     """How much is recovered."""
 
     shapes: int = Field(100, ge=1, description="shapes recovered by each model")
 
 
-def _compute(run: DatasetRun, options: Options) -> TableResult:
+def _compute(run: DatasetRun, options: RecoveryBaselinesOptions) -> TableResult:
     from eval.recovery.methods import apply_method, held_out, methods
     from eval.recovery.tables import baselines_table
     from pipeline.randomness import decision_rng
@@ -41,5 +41,5 @@ TABLE = Evaluation(
     requirements=(RECOVERY,),
     estimate_seconds=lambda run: 60.0 * len(weights_of_kind(run.models, "recovery")),
     compute=_compute,
-    options=Options,
+    options=RecoveryBaselinesOptions,
 )

@@ -25,7 +25,7 @@ RESULTS_SHOWN = 8
 """Of each kind of input."""
 
 
-class Options(StrictModel):
+class RecoveryRobustnessOptions(StrictModel):
     """What is recovered, and how long the search is."""
 
     programs: tuple[str, ...] = Field((), description="programs whose models are measured; all unless given")
@@ -34,7 +34,7 @@ class Options(StrictModel):
     external: tuple[Path, ...] = Field((), description="folders with clouds, meshes and drawings from other sources")
 
 
-def _sections(run: DatasetRun, options: Options) -> Iterator[TableSection]:
+def _sections(run: DatasetRun, options: RecoveryRobustnessOptions) -> Iterator[TableSection]:
     """Yield a section for each program and corruption, and for each program and external folder."""
     from eval.recovery.methods import usable_models
     from eval.recovery.robustness import corruption_names, external_inputs
@@ -58,7 +58,9 @@ def _sections(run: DatasetRun, options: Options) -> Iterator[TableSection]:
                 yield TableSection(name, files, compute, modules, ("search_budget",))
 
 
-def _of_corruption(model: TrainedRecovery, corruption: str, options: Options, seed: int) -> TableResult:
+def _of_corruption(
+    model: TrainedRecovery, corruption: str, options: RecoveryRobustnessOptions, seed: int
+) -> TableResult:
     from eval.recovery.methods import apply_method, held_out, methods
     from eval.recovery.robustness import METHOD_NAMES, corrupted_inputs, corruption_table
     from pipeline.randomness import decision_rng
@@ -75,7 +77,7 @@ def _of_corruption(model: TrainedRecovery, corruption: str, options: Options, se
 
 
 def _of_folder(
-    model: TrainedRecovery, folder: str, inputs: Sequence[RecoveryInput], options: Options, seed: int
+    model: TrainedRecovery, folder: str, inputs: Sequence[RecoveryInput], options: RecoveryRobustnessOptions, seed: int
 ) -> TableResult:
     from eval.recovery.robustness import external_rows, external_table
 
@@ -98,5 +100,5 @@ TABLE = Evaluation(
     requirements=(CURVE_PROGRAM,),
     estimate_seconds=lambda run: 900.0,
     compute=cached_sections(_sections),
-    options=Options,
+    options=RecoveryRobustnessOptions,
 )

@@ -16,7 +16,7 @@ DENSITY_FACTOR = 8
 CLOUDS_SHOWN = 5
 
 
-class Options(StrictModel):
+class ShapeassemblyCloudsOptions(StrictModel):
     """Which clouds are reconstructed, and how."""
 
     categories: tuple[str, ...] = Field(("chair",), description="categories of the clouds")
@@ -26,7 +26,7 @@ class Options(StrictModel):
     top_p: float = Field(DEFAULT_TOP_P, gt=0, le=1, description="as shapeassembly.sampled.top_p")
 
 
-def _compute(run: DatasetRun, options: Options) -> TableResult:
+def _compute(run: DatasetRun, options: ShapeassemblyCloudsOptions) -> TableResult:
     from eval.engine.pictures import cloud_portrait
     from eval.programs.cloud_reconstruction import (
         ReconstructedShapes,
@@ -83,5 +83,5 @@ TABLE = Evaluation(
     requirements=(trained("model of programs or of their cuboids with a latent space", *LATENT_KINDS), PROGRAMS),
     estimate_seconds=lambda run: 1200.0,
     compute=_compute,
-    options=Options,
+    options=ShapeassemblyCloudsOptions,
 )

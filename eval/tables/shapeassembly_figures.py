@@ -18,7 +18,7 @@ CURVE_CATEGORIES = ("chair", "table")
 SECONDS_PER_MODEL = {"program_vae": 90.0, "program_lm": 60.0, "cuboid_rnn": 20.0, "part_graph_vae": 30.0}
 
 
-class Options(StrictModel):
+class ShapeassemblyFiguresOptions(StrictModel):
     """How much is shown."""
 
     curve_shapes: int = Field(100, ge=1, description="curve shapes on whose parts surfaces are trained")
@@ -29,7 +29,7 @@ class Options(StrictModel):
     top_p: float = Field(DEFAULT_TOP_P, gt=0, le=1, description="as shapeassembly.sampled.top_p")
 
 
-def _compute(run: DatasetRun, options: Options) -> TableResult:
+def _compute(run: DatasetRun, options: ShapeassemblyFiguresOptions) -> TableResult:
     from eval.programs.figures import (
         edits_figure,
         interpolation_figure,
@@ -100,5 +100,5 @@ TABLE = Evaluation(
         seconds * len(weights_of_kind(run.models, kind)) for kind, seconds in SECONDS_PER_MODEL.items()
     ),
     compute=_compute,
-    options=Options,
+    options=ShapeassemblyFiguresOptions,
 )

@@ -16,7 +16,7 @@ from stages.shape.arrays import FloatArray
 MAX_SHAPES = 24
 
 
-class Options(StrictModel):
+class SimilarityOptions(StrictModel):
     """What is compared."""
 
     max_shapes: int = Field(MAX_SHAPES, ge=1, description="shapes of the dataset")
@@ -24,7 +24,7 @@ class Options(StrictModel):
     radius: float = Field(0.016, gt=0, lt=1, description="of a neighbourhood, in longest sides; the published value")
 
 
-def _compute(run: DatasetRun, options: Options) -> TableResult:
+def _compute(run: DatasetRun, options: SimilarityOptions) -> TableResult:
     from eval.engine.shapes import dataset_shapes
     from eval.grammars.similarity import similarity_row, similarity_table, triangles_of
     from pipeline.randomness import decision_rng
@@ -56,7 +56,7 @@ def _exemplars(run: DatasetRun) -> dict[str, list[FloatArray]]:
     return triangles
 
 
-def _compute_from_files(paths: Sequence[Path], options: Options) -> TableResult:
+def _compute_from_files(paths: Sequence[Path], options: SimilarityOptions) -> TableResult:
     from eval.engine.shapes import model_shapes
     from eval.grammars.similarity import similarity_row, similarity_table, triangles_of
     from pipeline.errors import ConfigError
@@ -80,5 +80,5 @@ TABLE = Evaluation(
     estimate_seconds=lambda run: 20 + 4 * min(run.samples, MAX_SHAPES),
     compute=_compute,
     compute_from_files=_compute_from_files,
-    options=Options,
+    options=SimilarityOptions,
 )

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from stages.training.string_vae.trained import TrainedStringVae
 
 
-class Options(StrictModel):
+class StringsOptions(StrictModel):
     """How much is sampled."""
 
     searches: int = Field(1000, ge=1, description="searches of each sampling method")
 
 
-def _compute(run: DatasetRun, options: Options) -> TableResult:
+def _compute(run: DatasetRun, options: StringsOptions) -> TableResult:
     from eval.engine.models import training_curve
     from eval.engine.parallel_map import parallel_map
     from eval.strings.string_vaes import reconstruction_table, sampling_table, string_vaes, structure_table
@@ -98,5 +98,5 @@ TABLE = Evaluation(
     requirements=(STRING_VAE, CORPUS),
     estimate_seconds=lambda run: 140.0 * len(weights_of_kind(run.models, "string_vae")),
     compute=_compute,
-    options=Options,
+    options=StringsOptions,
 )

@@ -52,7 +52,7 @@ def string_faults(sample: PackagedSample) -> Iterator[str]:
         yield "the first line of its txt is not the canonical spanning tree"
 
 
-def _anew(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
+def _contact_mismatches(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
     """Check face contacts with the kit; it does not know those of stretched parts."""
     if not languages()[sample.record["language"]].graphs or _edges(sample) != "faces" or sample.shape.is_stretched:
         return
@@ -99,4 +99,4 @@ def _neighbourhoods(types: TypeArray, edges: Sequence[Sequence[int]] | IntArray)
     return {kind: list(multisets.values()) for kind, multisets in distinct.items()}
 
 
-AUDIT = Audit(faults=string_faults, recheck=_anew)
+AUDIT = Audit(faults=string_faults, recheck=_contact_mismatches)

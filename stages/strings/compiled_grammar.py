@@ -67,7 +67,7 @@ def patterns_json(grammar: CompiledGrammar) -> dict[str, Any]:
 
 
 def _hub_pairs(grammar: Grammar) -> set[tuple[int, int]]:
-    """Return pairs of types, in both orders, that dock and one of which is a hub."""
+    """Return pairs of types, in both orders, that dock and include a hub."""
     pairs = {(docking.a, docking.b) for docking in grammar.dockings if {docking.a, docking.b} & set(grammar.hubs)}
     return pairs | {(b, a) for a, b in pairs}
 
@@ -98,7 +98,7 @@ def _patterns(grammar: Grammar, kind: int, near_hub: set[tuple[int, int]]) -> It
 
 
 def _seen_together(observed: list[Multiset], around: list[int]) -> list[list[int]]:
-    """Return the maximal sets of types every two of which occur in one multiset."""
+    """Return the maximal sets of types that occur pairwise in one multiset."""
     import networkx as nx
 
     together = nx.Graph()

@@ -1,5 +1,6 @@
-"""`make bench`: measures every piece beside a public peer in the same run, and prints one Markdown table,
-which marks what differs from the last kept report, `tests/bench/report.md`, by more than noise.
+"""`make bench`: measures every piece and a public peer in the same run, and prints one Markdown table.
+
+It marks what differs from the last kept report, `tests/bench/report.md`, by more than noise.
 
 python -m tests.bench [--json FILE] [--keep] [PIECE...]   (a piece is the part of a file name after `bench_`)
 """
@@ -14,14 +15,14 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
-from tests.bench.kept import HEADER, figures, keep, row
+from tests.bench.kept import TABLE_HEADER, figures, keep, row
 from tests.bench.measure import Measure
 
-KEPT = Path(__file__).parent / "report.json"
+KEPT_REPORT = Path(__file__).parent / "report.json"
 
 
 def measures(pieces: list[str]) -> Iterator[Measure]:
-    """The measures of the named pieces, of all if none is named, as they come."""
+    """Yield the measures of the named pieces, or of all."""
     found = sorted(path.stem.removeprefix("bench_") for path in Path(__file__).parent.glob("bench_*.py"))
     unknown = set(pieces) - set(found)
     if unknown:
@@ -32,23 +33,23 @@ def measures(pieces: list[str]) -> Iterator[Measure]:
 
 def main() -> None:
     """Measure, print the table, write the JSON."""
-    parser = argparse.ArgumentParser(prog="python -m tests.bench", description="Measure every piece beside a peer.")
+    parser = argparse.ArgumentParser(prog="python -m tests.bench", description="Measure every piece and a peer.")
     parser.add_argument("pieces", nargs="*", help="pieces to measure; all if none is named")
     parser.add_argument("--json", type=Path, help="also write the measures to this file")
     parser.add_argument(
         "--keep", action="store_true", help="make this the kept report, tests/bench/report.md and .json"
     )
-    asked = parser.parse_args()
+    arguments = parser.parse_args()
     made: list[Measure] = []
-    kept = figures(KEPT)
-    print(HEADER, flush=True)
-    for measure in measures(asked.pieces):
+    kept = figures(KEPT_REPORT)
+    print(TABLE_HEADER, flush=True)
+    for measure in measures(arguments.pieces):
         made.append(measure)
         print(row(measure, kept), flush=True)
-    if asked.json is not None:
-        asked.json.write_text(json.dumps([asdict(measure) for measure in made], indent=1) + "\n")
-    if asked.keep:
-        keep(KEPT, made)
+    if arguments.json is not None:
+        arguments.json.write_text(json.dumps([asdict(measure) for measure in made], indent=1) + "\n")
+    if arguments.keep:
+        keep(KEPT_REPORT, made)
 
 
 if __name__ == "__main__":

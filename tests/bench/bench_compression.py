@@ -1,4 +1,4 @@
-"""Shapes packed as string and categories, and restored, a second, beside their types and poses as JSON in gzip."""
+"""Shapes per second packed as string and categories, and restored; the peer: types and poses as JSON in gzip."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.strings.compression import Codebook, decode_shape, encode_shape, pack, unpack
 from tests.bench.measure import Measure, rate
 
-BATCH = 10
+SHAPES_PER_CALL = 10
 
 
 def bench() -> Iterator[Measure]:
-    """Shapes a second and core, of the larger castle that comes with Shapemill."""
+    """Shapes per second and core, of the larger shipped castle."""
     shapes = tuple(ShapeFile(path=path) for path in sorted(Path("datasets/exemplars/castle").glob("*.glb")))
     kit = read_kit(KitConfig(name="castle", shapes=shapes).resolve(STRICTEST))
     book, assembly = Codebook(kit, "all"), kit.exemplars[0].assembly
@@ -26,22 +26,22 @@ def bench() -> Iterator[Measure]:
     packed = pack(book, encode_shape(book, assembly, encoded))
 
     def packing() -> int:
-        return len([pack(book, encode_shape(book, assembly, encoded)) for _ in range(BATCH)])
+        return len([pack(book, encode_shape(book, assembly, encoded)) for _ in range(SHAPES_PER_CALL)])
 
     def restoring() -> int:
-        return len([decode_shape(book, unpack(book, packed)) for _ in range(BATCH)])
+        return len([decode_shape(book, unpack(book, packed)) for _ in range(SHAPES_PER_CALL)])
 
     def zipped() -> bytes:
         arrays = (assembly.types, assembly.poses, assembly.edges)
-        return gzip.compress(json.dumps([each.tolist() for each in arrays]).encode())
+        return gzip.compress(json.dumps([array.tolist() for array in arrays]).encode())
 
     text = zipped()
 
     def zipping() -> int:
-        return len([zipped() for _ in range(BATCH)])
+        return len([zipped() for _ in range(SHAPES_PER_CALL)])
 
     def unzipping() -> int:
-        return len([[np.array(each) for each in json.loads(gzip.decompress(text))] for _ in range(BATCH)])
+        return len([[np.array(values) for values in json.loads(gzip.decompress(text))] for _ in range(SHAPES_PER_CALL)])
 
     size, note = f"{len(assembly)} parts", f"{len(packed)} bytes; the peer's {len(text):,}"
     yield Measure(f"shapes packed, {size}", "shapes", rate(packing, 0.5), "JSON in gzip", rate(zipping, 0.5), note)

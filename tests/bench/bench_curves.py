@@ -1,4 +1,4 @@
-"""Swept, revolved and exported meshes a second, beside trimesh's on the same curves."""
+"""Swept, revolved and exported meshes per second; the peer: trimesh on the same curves."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OUTLINE = [(0.2, 0), (0.6, 0.2), (0.4, 0.8), (0.1, 0.8), (0.05, 0.9), (0.15, 1.0
 
 
 def bench() -> Iterator[Measure]:
-    """Meshes a second and core, each from its parameters on. trimesh sweeps with shapely alone, but turns its torus."""
+    """Meshes per second and core, made from parameters. trimesh sweeps with shapely alone, but turns its torus."""
     import trimesh
 
     outline = np.concatenate([[[0.0, 0.0]], bezier(OUTLINE, 10).points[:, :2], [[0.0, 1.1]]])

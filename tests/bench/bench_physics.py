@@ -1,4 +1,4 @@
-"""Shapes a second: rootedness and stability of box furniture, beside trimesh with FCL and the published metrics."""
+"""Rooted and stable box furniture: shapes judged per second; peers: trimesh with FCL, and the published metrics."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stages.shape.physics.settings import PhysicsConfig
 from tests.bench.measure import Measure, rate
 
 AUTHORS_ROOTED, AUTHORS_STABLE = 1 / 0.024, 1 / 0.52
-"""Shapes a second of the metrics of shapeassembly's authors, the middle of 16 to 32 ms and of 335 to 710 ms."""
+"""Shapes per second of the metrics of shapeassembly's authors, the middle of 16 to 32 ms and of 335 to 710 ms."""
 
 
 def chair() -> FloatArray:
@@ -28,7 +28,7 @@ def chair() -> FloatArray:
 
 
 def bench() -> Iterator[Measure]:
-    """Each with all that is needed for a shape never seen before; the peer asks FCL for the distances alone."""
+    """Each judgement is of a new shape, with all its preparation; the peer only computes distances with FCL."""
     import trimesh
 
     corners = chair()
@@ -42,7 +42,7 @@ def bench() -> Iterator[Measure]:
 
     def distances() -> int:
         manager = trimesh.collision.CollisionManager()
-        bodies = [trimesh.Trimesh(each, BOX_FACES, process=False) for each in corners]
+        bodies = [trimesh.Trimesh(box, BOX_FACES, process=False) for box in corners]
         for index, body in enumerate(bodies):
             manager.add_object(str(index), body)
         for body in bodies:

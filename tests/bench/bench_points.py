@@ -1,4 +1,4 @@
-"""Points a second: uniform, visible and farthest, beside trimesh, Open3D and fpsample on the same input."""
+"""Uniform, visible and farthest points per second; peers: trimesh, Open3D and fpsample on the same input."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from stages.programs.files import random_shapes
 from stages.programs.program import build_shape, find_program
 from tests.bench.measure import Measure, rate
 
-UNIFORM, PICKED, POOL = 2048, 1500, 30_000
+UNIFORM_POINTS, SELECTED_POINTS, POOL_POINTS = 2048, 1500, 30_000
 
 
 def bumpy_sheet(cells: int = 71) -> tuple[np.ndarray, np.ndarray]:
@@ -27,7 +27,7 @@ def bumpy_sheet(cells: int = 71) -> tuple[np.ndarray, np.ndarray]:
 
 
 def bench() -> Iterator[Measure]:
-    """Clouds a second and core. Each peer does what its users call; trimesh keeps the areas from call to call."""
+    """Clouds per second and core. Peers run by their public functions; trimesh caches areas between calls."""
     import open3d
     import trimesh
 
@@ -39,31 +39,31 @@ def bench() -> Iterator[Measure]:
     )
 
     def uniform() -> int:
-        return len(sample_surface(vertices, faces, UNIFORM, rng)[0]) // UNIFORM
+        return len(sample_surface(vertices, faces, UNIFORM_POINTS, rng)[0]) // UNIFORM_POINTS
 
     def uniform_trimesh() -> int:
-        return len(trimesh.sample.sample_surface(peer_mesh, UNIFORM, seed=0)[0]) // UNIFORM
+        return len(trimesh.sample.sample_surface(peer_mesh, UNIFORM_POINTS, seed=0)[0]) // UNIFORM_POINTS
 
     def uniform_open3d() -> int:
-        return len(open3d_mesh.sample_points_uniformly(UNIFORM).points) // UNIFORM
+        return len(open3d_mesh.sample_points_uniformly(UNIFORM_POINTS).points) // UNIFORM_POINTS
 
     ours = rate(uniform, seconds=0.5)
-    name = f"points, {UNIFORM} uniform of {len(faces)} triangles"
+    name = f"points, {UNIFORM_POINTS} uniform of {len(faces)} triangles"
     yield Measure(name, "clouds", ours, "trimesh", rate(uniform_trimesh, seconds=0.5))
     yield Measure(name, "clouds", ours, "Open3D", rate(uniform_open3d, seconds=0.5))
 
     yield from _visible(rng)
-    pool = sample_surface(vertices, faces, POOL, rng)[0]
+    pool = sample_surface(vertices, faces, POOL_POINTS, rng)[0]
     open3d_pool = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(pool))
 
     def farthest() -> int:
-        return len(farthest_points(pool, PICKED, start=0)) // PICKED
+        return len(farthest_points(pool, SELECTED_POINTS, start=0)) // SELECTED_POINTS
 
     def farthest_open3d() -> int:
-        return len(open3d_pool.farthest_point_down_sample(PICKED).points) // PICKED
+        return len(open3d_pool.farthest_point_down_sample(SELECTED_POINTS).points) // SELECTED_POINTS
 
     ours = rate(farthest, seconds=0.5)
-    name = f"points, {PICKED} farthest of {POOL}"
+    name = f"points, {SELECTED_POINTS} farthest of {POOL_POINTS}"
     yield Measure(name, "clouds", ours, "Open3D", rate(farthest_open3d, seconds=0.5))
     try:
         import fpsample
@@ -72,7 +72,7 @@ def bench() -> Iterator[Measure]:
         return
 
     def farthest_fpsample() -> int:
-        return len(fpsample.bucket_fps_kdline_sampling(pool, PICKED, h=7, start_idx=0)) // PICKED
+        return len(fpsample.bucket_fps_kdline_sampling(pool, SELECTED_POINTS, h=7, start_idx=0)) // SELECTED_POINTS
 
     fpsample_rate = rate(farthest_fpsample, seconds=0.5)
     yield Measure(name, "clouds", ours, "fpsample", fpsample_rate, "fpsample ignores the start it is given")
@@ -82,7 +82,7 @@ def _visible(rng: np.random.Generator) -> Iterator[Measure]:
     """Clouds of what a scanner sees of ten chairs."""
     chair = find_program("chair")
     shapes = [build_shape(chair, values) for values in random_shapes(chair, 10, 0)]
-    for uniform, picked, pool in ((UNIFORM, 0, 1), (0, PICKED, POOL)):
+    for uniform, picked, pool in ((UNIFORM_POINTS, 0, 1), (0, SELECTED_POINTS, POOL_POINTS)):
 
         def visible(uniform: int = uniform, picked: int = picked, pool: int = pool) -> int:
             return sum(len(sample_cloud(shape, uniform, picked, pool, "visible", rng).points) > 0 for shape in shapes)

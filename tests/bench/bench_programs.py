@@ -1,4 +1,4 @@
-"""Programs: shapes a second and core, beside what an asset takes in a public generator."""
+"""Programs: shapes per second and core, compared with a public generator of assets."""
 
 from __future__ import annotations
 
@@ -13,23 +13,30 @@ from stages.programs.program import Program, build_shape, find_program, program_
 from stages.programs.sampling import Sampler, ValueIndex, all_value_indices
 from tests.bench.measure import Measure, rate
 
-SHAPES = 50
-INFINIGEN = 1 / 0.36
-"""Chairs a second of Infinigen's chair factory on a core like ours, as measured beside this project."""
+SHAPES_PER_PROGRAM = 50
+INFINIGEN_RATE = 1 / 0.36
+"""Chairs per second of Infinigen's chair factory on the same kind of core."""
 
 
 def bench() -> Iterator[Measure]:
-    """Random shapes of each program as triangles; then samples of the protocol, each checked for effect."""
+    """Random shapes of each program as triangles; then samples of the protocol, checked for effect."""
     for name in program_names():
         program = find_program(name)
         sampler, rng = Sampler(program, Share(), off_grid=False), np.random.default_rng(1)
-        shapes = [sampler.find(None, rng) for _ in range(SHAPES)]
+        shapes = [sampler.find(None, rng) for _ in range(SHAPES_PER_PROGRAM)]
 
         def build(program: Program = program, shapes: list[dict[str, Value]] = shapes) -> int:
             return sum(1 for values in shapes if len(build_shape(program, values)))
 
-        peer, theirs = ("Infinigen chair factory", INFINIGEN) if name == "chair" else ("", None)
-        yield Measure(f"programs, {name}", "shapes", rate(build), peer, theirs, f"{SHAPES} random shapes, triangulated")
+        peer, theirs = ("Infinigen chair factory", INFINIGEN_RATE) if name == "chair" else ("", None)
+        yield Measure(
+            f"programs, {name}",
+            "shapes",
+            rate(build),
+            peer,
+            theirs,
+            f"{SHAPES_PER_PROGRAM} random shapes, triangulated",
+        )
         every = itertools.cycle(all_value_indices(program))
 
         def sample(

@@ -1,5 +1,7 @@
-"""How the time for listing all replacements grows with the graph: crops of real models, operations by dummy edges
-(substructures §4.3) and moves along rigid motions."""
+"""The time to list all replacements, by size of the graph, in crops of real models.
+
+Replacements are operations by count of dummy edges (substructures §4.3), and moves along rigid motions.
+"""
 
 from __future__ import annotations
 
@@ -22,32 +24,34 @@ from stages.variations.substructures.ordered_graph import OrderedGraph
 from stages.variations.substructures.region_swaps import RegionSwaps
 from tests.bench.measure import Measure
 
-REAL = Path("../shared/exemplars")
+REAL_MODELS = Path("../shared/exemplars")
 MODELS = ("a12_dungeon_room_large", "a15_dungeon_full", "a17_temple_peripteros", "a25_dome")
-SIZES = (20, 40, 70, 100, 150, 220, 350)
+CROP_SIZES = (20, 40, 70, 100, 150, 220, 350)
 ANY_WAY = -1
-"""Motions need not be upright: the dome stands along another axis than the others."""
+"""Motions need not be upright: the dome has another up axis than the others."""
 
 Crop = tuple[Assembly, OrderedGraph]
 
 
 def bench() -> Iterator[Measure]:
-    """Graphs of 70 parts, or all there are, a second; the note has seconds by size and the exponent of whole lists."""
-    for name in MODELS if REAL.is_dir() else ():
-        path = REAL / name / "model.glb"
+    """Graphs of 70 parts, or of all parts, per second; the note has seconds by size and the exponent of full lists."""
+    for name in MODELS if REAL_MODELS.is_dir() else ():
+        path = REAL_MODELS / name / "model.glb"
         contact = ContactConfig(kinds=("point", "line", "face"))
         config = KitConfig(name="bench", shapes=(ShapeFile(path=path),), contact=contact)
         kit, _ = build_kit(config.resolve(STRICTEST), [read_model(path)])
         whole = kit.exemplars[0].assembly
-        crops = [_crop(kit, whole, size) for size in sorted({min(size, len(whole)) for size in SIZES})]
+        crops = [_crop(kit, whole, size) for size in sorted({min(size, len(whole)) for size in CROP_SIZES})]
         short = name.split("_")[0]
-        for dummies in (0, 1, 2):
-            yield _growth(f"all replacements, growth, {short}, dummies {dummies}", crops, partial(_operations, dummies))
+        for dummy_edges in (0, 1, 2):
+            yield _growth(
+                f"all replacements, growth, {short}, dummies {dummy_edges}", crops, partial(_operations, dummy_edges)
+            )
         yield _growth(f"all replacements, growth, {short}, moves", crops, partial(_moves, kit))
 
 
-def _operations(dummies: int, crop: Crop) -> Operations:
-    return find_operations(crop[1], crop[1], dummies, by_docking=True)
+def _operations(dummy_edges: int, crop: Crop) -> Operations:
+    return find_operations(crop[1], crop[1], dummy_edges, by_docking=True)
 
 
 def _moves(kit: Kit, crop: Crop) -> RegionSwaps:
@@ -65,18 +69,18 @@ def _growth(name: str, crops: Sequence[Crop], listed: Callable[[Crop], Operation
         cut = "" if found.is_whole else ", cut short"
         notes.append(f"{len(crop[0])}: {len(found):,} in {seconds[-1]:.3g} s{cut}")
         at_70 = seconds[-1] if len(crop[0]) <= 70 else at_70
-    sizes = np.log([len(each) for each, _ in crops])[is_whole]
+    sizes = np.log([len(assembly) for assembly, _ in crops])[is_whole]
     exponent = f"exponent {np.polyfit(sizes, np.log(seconds)[is_whole], 1)[0]:.2f}; " if sum(is_whole) > 2 else ""
     return Measure(name, "graphs", 1.0 / at_70, note=f"{exponent}{'; '.join(notes)}")
 
 
 def _crop(kit: Kit, assembly: Assembly, size: int) -> Crop:
-    """The `size` parts that are met first, breadth first, from the part nearest to the middle, and their graph."""
+    """Return the first `size` parts, breadth first from the part nearest to the middle, and their graph."""
     places = assembly.poses[:, :3, 3]
     waiting = [int(np.linalg.norm(places - places.mean(axis=0), axis=1).argmin())]
     neighbours, met = assembly.neighbours(), set(waiting)
     for part in waiting:
-        fresh = [each for each in neighbours[part] if each not in met]
+        fresh = [neighbour for neighbour in neighbours[part] if neighbour not in met]
         met.update(fresh)
         waiting += fresh
     crop = assembly.select(np.array(sorted(waiting[:size])))

@@ -1,7 +1,7 @@
-"""ShapeAssembly programs a second, beside the rate that is stated for their authors' interpreter.
+"""ShapeAssembly programs per second, compared with the published rate of their authors' interpreter.
 
-With the published programs beside the project: 1,000 of each category; without: the twelve that we ship. The authors'
-interpreter executes 53 to 78 programs a second on one thread of a machine with two cores; the higher rate stands here.
+With the published programs next to the project: 1,000 of each category; without: the twelve shipped ones. The authors'
+interpreter executes 53 to 78 programs per second on one thread of a machine with two cores; the higher rate is used.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from tests.bench.measure import Measure, rate
 
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = ROOT.parent / "shared" / "shapeassembly" / "programs.tar.xz"
-AUTHORS, STATED = "their authors', as stated", 78.0
-EACH = 1000
+PUBLISHED_NAME, PUBLISHED_RATE = "their authors', as stated", 78.0
+MAX_PROGRAMS = 1000
 
 
 def category_texts() -> dict[str, list[str]]:
-    """The texts of the published programs of each category, at most EACH, or of those that we ship."""
+    """Return the texts of the published programs by category, at most MAX_PROGRAMS, or of the shipped ones."""
     if not SHARED.is_file():
         return {"shipped": [text for _, text in program_texts(ROOT / "datasets" / "exemplars" / "programs")]}
     categories = ("chair", "table", "storage")
-    return {each: [text for _, text in program_texts(SHARED, f"data/{each}")][:EACH] for each in categories}
+    return {name: [text for _, text in program_texts(SHARED, f"data/{name}")][:MAX_PROGRAMS] for name in categories}
 
 
 def _differentiate(programs: list[AssemblyProgram]) -> int:
@@ -40,16 +40,20 @@ def _differentiate(programs: list[AssemblyProgram]) -> int:
 
 
 def bench() -> Iterator[Measure]:
-    """Programs a second and core: read, executed one by one and together, differentiated."""
+    """Programs per second and core: parsed, executed one by one and together, differentiated."""
     torch.set_num_threads(1)
     for category, texts in category_texts().items():
         programs = [parse(text) for text in texts]
         few = programs[:50]
         for name, work, peer in [
             ("read", lambda texts=texts: len([parse(text) for text in texts]), None),
-            ("executed one by one", lambda programs=programs: len([execute(each) for each in programs]), STATED),
-            ("executed together", lambda programs=programs: len(execute_all(programs)), STATED),
+            (
+                "executed one by one",
+                lambda programs=programs: len([execute(program) for program in programs]),
+                PUBLISHED_RATE,
+            ),
+            ("executed together", lambda programs=programs: len(execute_all(programs)), PUBLISHED_RATE),
             ("forward and backward", lambda few=few: _differentiate(few), None),
         ]:
             ours = rate(work, seconds=0.7, rounds=2)
-            yield Measure(f"{category} programs {name}", "programs", ours, AUTHORS if peer else "", peer)
+            yield Measure(f"{category} programs {name}", "programs", ours, PUBLISHED_NAME if peer else "", peer)

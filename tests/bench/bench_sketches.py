@@ -1,4 +1,4 @@
-"""Sketches a second and core: whole line drawings, and the buffers behind them, on a shape of 7,000 triangles."""
+"""Sketches per second and core: whole line drawings, and their buffers, of a shape of 7,000 triangles."""
 
 from __future__ import annotations
 
@@ -19,22 +19,23 @@ from stages.sketches.image import png_bytes
 from stages.sketches.settings import StrokeOptions
 from tests.bench.measure import Measure, rate
 
-SIZE, SUPERSAMPLE = 224, 2
-COLUMNS, SIDES = 6, 40
+IMAGE_SIZE, SUPERSAMPLE_SIDE = 224, 2
+COLUMN_COUNT, COLUMN_SIDES = 6, 40
 
 
 def bench() -> Iterator[Measure]:
-    """Drawings of 224 x 224 with 2 x 2 supersampling, PNG included, by each backend; then the buffers alone."""
+    """Drawings of 224 x 224 with 2 x 2 supersampling, PNG included, by backend; then the buffers alone."""
     views = [Camera(azimuth, elevation) for azimuth, elevation in ((-40.0, 25.0), (35.0, 15.0), (25.0, 55.0))]
     backends: list[RendererName] = ["egl", "raster"] if check_triangle("egl") is None else ["raster"]
     triangles = int(_colonnade().triangle_first[-1])
-    note = f"{SIZE}x{SIZE}, {SUPERSAMPLE}x{SUPERSAMPLE}, {triangles:,} triangles, {len(_colonnade())} parts"
+    size = f"{IMAGE_SIZE}x{IMAGE_SIZE}, {SUPERSAMPLE_SIDE}x{SUPERSAMPLE_SIDE}"
+    note = f"{size}, {triangles:,} triangles, {len(_colonnade())} parts"
     for backend in backends:
 
         def sketches(backend: RendererName = backend) -> int:
             scene = _colonnade()
             for view in views:
-                png_bytes(draw_sketch(scene, view, SIZE, SUPERSAMPLE, StrokeOptions(), backend)[0])
+                png_bytes(draw_sketch(scene, view, IMAGE_SIZE, SUPERSAMPLE_SIDE, StrokeOptions(), backend)[0])
             return len(views)
 
         yield Measure(f"sketches, {backend}", "sketches", rate(sketches), note=note)
@@ -43,7 +44,7 @@ def bench() -> Iterator[Measure]:
         def buffers(backend: RendererName = backend) -> int:
             scene = _colonnade()
             for view in views:
-                render_buffers(scene, view, (SIZE, SIZE), SUPERSAMPLE, backend)
+                render_buffers(scene, view, (IMAGE_SIZE, IMAGE_SIZE), SUPERSAMPLE_SIDE, backend)
             return len(views)
 
         ours = rate(buffers)
@@ -53,9 +54,9 @@ def bench() -> Iterator[Measure]:
 
 
 def _pyrender_buffers(views: list[Camera]) -> float:
-    """Views a second of pyrender as its manual uses it: one node a part, a colour for each in a segmentation pass.
+    """Views per second of pyrender, used as in its manual: a node per part, and its colour in a segmentation pass.
 
-    Normals, which ours include, would take it a further pass with a shader of one's own.
+    Our buffers include normals, which would take pyrender another pass with a custom shader.
     """
     pyrender = load_pyrender()
     import trimesh
@@ -70,7 +71,7 @@ def _pyrender_buffers(views: list[Camera]) -> float:
         meshes.append(pyrender.Mesh.from_trimesh(mesh, smooth=False))
     nodes = [kept.add(meshes[mesh], pose=pose) for mesh, pose in zip(scene.mesh_of, scene.placed, strict=True)]
     colors = {node: (index % 255 + 1, index // 255, 0) for index, node in enumerate(nodes)}
-    side = SIZE * SUPERSAMPLE
+    side = IMAGE_SIZE * SUPERSAMPLE_SIDE
     renderer = pyrender.OffscreenRenderer(side, side)
     cameras = []
     for view in views:
@@ -90,14 +91,14 @@ def _pyrender_buffers(views: list[Camera]) -> float:
 
 
 def _colonnade() -> Scene:
-    """Two rows of round columns on plinths, under beams: a new assembly of one kit each time."""
+    """Return two rows of round columns on plinths, under beams, as a new assembly."""
     poses, types = [], []
     for row in range(2):
-        for column in range(COLUMNS):
+        for column in range(COLUMN_COUNT):
             for kind, height in ((0, 0.1), (1, 1.2), (0, 2.3)):
                 poses.append((1.2 * column, height, 3.0 * row))
                 types.append(kind)
-    for column in range(COLUMNS - 1):
+    for column in range(COLUMN_COUNT - 1):
         for row in range(2):
             poses.append((1.2 * column + 0.6, 2.55, 3.0 * row))
             types.append(2)
@@ -109,7 +110,7 @@ def _colonnade() -> Scene:
 
 
 def _prism(sides: int, radius: float, height: float, stretch: float = 1.0) -> tuple[FloatArray, IntArray]:
-    """An upright prism of several drums, its first corner on the diagonal, `stretch` times as long in x."""
+    """Return an upright prism of five drums, its first corner on the diagonal, scaled in x by `stretch`."""
     turn = 2 * np.pi * np.arange(sides) / sides + np.pi / 4
     levels = np.linspace(-height / 2, height / 2, 6)
     flat = [stretch * radius * np.cos(turn), radius * np.sin(turn)]
@@ -134,7 +135,7 @@ _KIT = Kit(
     name="colonnade",
     types=(
         _type("plinth", _prism(4, 0.6, 0.2)),
-        _type("column", _prism(SIDES, 0.36, 2.0)),
+        _type("column", _prism(COLUMN_SIDES, 0.36, 2.0)),
         _type("beam", _prism(4, 0.3, 0.3, 2.8)),
     ),
     exemplars=(),

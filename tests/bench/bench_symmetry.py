@@ -1,5 +1,4 @@
-"""How the time from a mesh to its grammar grows with its triangles: subdivided facades, merged kits and models
-(symmetry §5)."""
+"""The time to extract a grammar, by count of triangles: subdivided facades, merged kits and models (symmetry §5)."""
 
 from __future__ import annotations
 
@@ -19,28 +18,29 @@ from stages.symmetry.surface.welding import weld
 from tests.bench.measure import Measure
 from tests.stages.symmetry.planted import wall
 
-RADIUS = 0.016
-LEAST = 250_000
-"""Triangles from which on a model is large enough."""
-STEPS = 6
-SHIPPED = Path("datasets/exemplars/castle")
-REAL = Path("../shared/exemplars")
+SIMILARITY_RADIUS = 0.016
+MIN_TRIANGLES = 250_000
+SUBDIVISION_STEPS = 6
+SHIPPED_MODELS = Path("datasets/exemplars/castle")
+REAL_MODELS = Path("../shared/exemplars")
 
 
 def bench() -> Iterator[Measure]:
-    """Triangles a CPU second to a grammar, one core, in a process of its own; the note has what was found, CPU seconds
-    of the steps, and peak memory; that of the facade seconds by size as well."""
+    """Triangles per CPU second, on one core, in a separate process.
+
+    The note has the size of the grammar, CPU seconds by step, and peak memory; for the facade also seconds by size.
+    """
     seconds = {}
-    for steps in range(STEPS):
+    for steps in range(SUBDIVISION_STEPS):
         found = _alone(partial(_facade, steps))
         seconds[found[0]] = found[1]
-    yield _measure("facade of 20 windows", found, "; ".join(f"{n:,}: {each:.3g} s" for n, each in seconds.items()))
-    for path in (*sorted(SHIPPED.glob("*.glb"))[:1], *sorted(REAL.glob("u0[16]*/model.*"))):
+    yield _measure("facade of 20 windows", found, "; ".join(f"{n:,}: {took:.3g} s" for n, took in seconds.items()))
+    for path in (*sorted(SHIPPED_MODELS.glob("*.glb"))[:1], *sorted(REAL_MODELS.glob("u0[16]*/model.*"))):
         yield _measure(f"{path.parent.name}, subdivided", _alone(partial(_subdivided, path)))
 
 
 def split(corners: FloatArray) -> FloatArray:
-    """Triangles (f, 3, 3), each in four (4 f, 3, 3)."""
+    """Split triangles (f, 3, 3) into four (4 f, 3, 3)."""
     middles = (corners + np.roll(corners, -1, axis=1)) / 2
     tips = [np.stack([corners[:, k], middles[:, k], middles[:, k - 1]], axis=1) for k in range(3)]
     return np.concatenate([*tips, middles])
@@ -56,7 +56,7 @@ def _facade(steps: int) -> tuple[SurfaceMesh, str]:
 def _subdivided(path: Path) -> tuple[SurfaceMesh, str]:
     model = read_model(path, "components")
     triangles = model_surface(model).corners
-    while len(triangles) < LEAST:
+    while len(triangles) < MIN_TRIANGLES:
         triangles = split(triangles)
     return _grey(triangles), model.up or "y"
 
@@ -70,7 +70,7 @@ Found = tuple[int, float, str]
 
 
 def _alone(made: Callable[[], tuple[SurfaceMesh, str]]) -> Found:
-    """Triangles, CPU seconds and a note of the grammar of a mesh, made and searched in a process of its own."""
+    """Return triangles, CPU seconds and a note of the grammar of a mesh, in a separate process."""
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         return pool.apply(_grammar, (made,))
 
@@ -81,10 +81,10 @@ def _grammar(made: Callable[[], tuple[SurfaceMesh, str]]) -> Found:
     source, up = made()
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.process_time()
-    found = extract_grammar(source, "bench", RADIUS, "z" if up == "z" else "y", np.random.default_rng(0))
+    found = extract_grammar(source, "bench", SIMILARITY_RADIUS, "z" if up == "z" else "y", np.random.default_rng(0))
     spent = time.process_time() - start
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    parts = ", ".join(f"{name} {each:.1f}" for name, each in found.seconds.items())
+    parts = ", ".join(f"{name} {took:.1f}" for name, took in found.seconds.items())
     note = (
         f"{len(source.faces):,} triangles in {spent:.1f} s ({parts}); {len(found.grid):,} cells, {found.transforms} "
         f"transforms, {len(found.docked_pieces)} docked pieces, {len(found.grammar.productions)} productions, "

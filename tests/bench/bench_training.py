@@ -1,9 +1,8 @@
-"""Strings and programs that a VAE learns from a second and core, beside one trained as in MOSES, and beside one program
-at a time as in shapeassembly §6.2.
+"""Strings and programs that train a VAE per second and core.
 
-The peer of strings has the same sizes and sees the same strings. As in MOSES it draws its batches at random, whatever
-the lengths, sorts each by length, reads it as a packed sequence and writes it as a packed sequence, without a mask. The
-peer of programs is our own model with batches of one: its assemblies of a level are still batched.
+The peer of strings is trained as in MOSES, with the same sizes and strings: random batches of all lengths, sorted by
+length, encoded and decoded as packed sequences, without a mask. The peer of programs is our own model with batches of
+one program, as in shapeassembly §6.2; the assemblies of a level are still batched.
 """
 
 from __future__ import annotations
@@ -43,14 +42,14 @@ from stages.variations.settings import SearchConfig
 from tests.bench.bench_shapeassembly import category_texts
 from tests.bench.measure import Measure, rate
 
-SHAPES = 60
+VARIANT_COUNT = 60
 
 
 def bench() -> Iterator[Measure]:
-    """Strings of the castle that comes with Shapemill, forward, backward and one step of Adam."""
+    """Strings of the shipped castle: forward, backward and one step of Adam."""
     set_deterministic(1)
     strings, vocabulary, most = castle_strings()
-    note = f"{int(np.median(strings.lengths))} tokens in the median"
+    note = f"{int(np.median(strings.lengths))} tokens (median)"
     entry = StringVaeConfig(name="bench")
     peer = rate(moses_steps(strings, len(vocabulary), entry), 4.0, 2)
     arms: dict[str, dict[str, Any]] = {
@@ -62,21 +61,21 @@ def bench() -> Iterator[Measure]:
     for name, settings in arms.items():
         arm = StringVaeConfig.model_validate({"name": "bench", **settings})
         learner = StringVaeTask(new_model(arm, vocabulary, most, 0), {}, arm, strings, strings, vocabulary, True)
-        ours = rate(our_steps(learner), 4.0, 2)
+        ours = rate(string_vae_steps(learner), 4.0, 2)
         yield Measure(f"string VAE learns, {name}", "strings", ours, "as in MOSES", peer, note)
     yield _programs_measure()
 
 
 def _programs_measure() -> Measure:
-    """Forward, backward and a step of Adam on the programs of a category; what is not learnt from left out."""
-    learnt = []
+    """Forward, backward and a step of Adam on the programs of a category."""
+    assemblies = []
     for text in next(iter(category_texts().values())):
         with suppress(ProgramError):
-            learnt.append(assembly_lines(parse(text)))
+            assemblies.append(assembly_lines(parse(text)))
     rates = {}
     for batch in (64, 1):
         entry = ProgramVaeConfig(name="bench", kind="program_vae", batch_size=batch)
-        programs = ProgramCorpus.of(list(islice(cycle(learnt), max(len(learnt), batch))))
+        programs = ProgramCorpus.of(list(islice(cycle(assemblies), max(len(assemblies), batch))))
         learner = ProgramVaeTask(new_program_vae(entry, 0), {}, entry, programs, programs)
         rates[batch] = rate(_steps(learner, lambda levels: len(levels[0].lines)), 4.0, 2)
     note = "batches of 64, levels of one batched in both"
@@ -84,35 +83,39 @@ def _programs_measure() -> Measure:
 
 
 def castle_strings() -> tuple[StringCorpus, Vocabulary, int]:
-    """Nine strings of each of SHAPES variants."""
+    """Return nine strings per variant, of VARIANT_COUNT variants."""
     shapes = tuple(ShapeFile(path=path) for path in sorted(Path("datasets/exemplars/castle").glob("*.glb")))
     kit = read_kit(KitConfig(name="castle", shapes=shapes).resolve(STRICTEST))
     rng = np.random.default_rng(0)
-    found, _ = Search(ContactOracle(kit), SearchConfig()).run(rng, SHAPES, 10**9, "bench", lambda count: None)
+    found, _ = Search(ContactOracle(kit), SearchConfig()).run(rng, VARIANT_COUNT, 10**9, "bench", lambda count: None)
     writer = KitStrings(kit, "all")
-    written = [[each.string for each in writer.strings(writer.graph(new.assembly), 8, rng)] for new in found]
+    written = [[encoded.string for encoded in writer.strings(writer.graph(new.assembly), 8, rng)] for new in found]
     cycles = 12
-    vocabulary, rules = Vocabulary(writer.alphabet, cycles), compile_grammar(kit.grammar, len(kit.labels), cycles)
-    codes = [np.append(vocabulary.codes(each), END_TOKEN).astype(np.int64) for of_shape in written for each in of_shape]
-    masks = [np.packbits(masks_along(rules, cycles, each)[0], axis=-1, bitorder="little") for each in codes]
+    vocabulary, grammar = Vocabulary(writer.alphabet, cycles), compile_grammar(kit.grammar, len(kit.labels), cycles)
+    codes = [
+        np.append(vocabulary.codes(string), END_TOKEN).astype(np.int64) for of_shape in written for string in of_shape
+    ]
+    masks = [np.packbits(masks_along(grammar, cycles, tokens)[0], axis=-1, bitorder="little") for tokens in codes]
     types = len(kit.labels)
     strings = StringCorpus(
         tokens=np.concatenate(codes).astype(np.int16),
         first=np.cumsum([0, *map(len, codes)]),
         masks=np.concatenate(masks),
         graph=np.arange(len(codes), dtype=np.int32),
-        histograms=np.stack([np.bincount(each, minlength=types + 1)[1 : types + 1] for each in codes]).astype(np.int32),
+        histograms=np.stack([np.bincount(tokens, minlength=types + 1)[1 : types + 1] for tokens in codes]).astype(
+            np.int32
+        ),
     )
     return strings, vocabulary, max(map(len, codes))
 
 
-def our_steps(learner: StringVaeTask) -> Any:
-    """A function that trains one step and says how many strings it saw."""
+def string_vae_steps(learner: StringVaeTask) -> Any:
+    """Return a function that trains one step and returns its count of strings."""
     return _steps(learner, lambda batch: len(batch.codes))
 
 
 def _steps(learner: Any, seen: Callable[[Any], int]) -> Any:
-    """A function that trains one step and says how much of a batch it saw."""
+    """Return a function that trains one step and returns the size of its batch."""
     optimizer = torch.optim.Adam(learner.module.parameters())
     stream, noise, steps = learner.batches(np.random.default_rng(0)), torch.Generator().manual_seed(0), count()
 
@@ -127,14 +130,14 @@ def _steps(learner: Any, seen: Callable[[Any], int]) -> Any:
 
 
 def moses_steps(strings: StringCorpus, tokens: int, entry: StringVaeConfig) -> Any:
-    """The same for the peer."""
+    """Return the same function for the peer."""
     model = _Moses(entry, tokens)
     optimizer = torch.optim.Adam(model.parameters())
     rng = np.random.default_rng(0)
-    each = [torch.from_numpy(part.astype(np.int64)) for part in np.split(strings.tokens, strings.first[1:-1])]
+    tokens_of = [torch.from_numpy(part.astype(np.int64)) for part in np.split(strings.tokens, strings.first[1:-1])]
 
     def step() -> int:
-        chosen = sorted((each[row] for row in rng.choice(len(each), entry.batch_size)), key=len, reverse=True)
+        chosen = sorted((tokens_of[row] for row in rng.choice(len(tokens_of), entry.batch_size)), key=len, reverse=True)
         _descend(model, optimizer, model(chosen, entry.kl_weight))
         return len(chosen)
 
@@ -159,14 +162,14 @@ class _Moses(nn.Module):
         self.logits = nn.Linear(entry.hidden, tokens)
 
     def forward(self, strings: list[Tensor], weight: float) -> Tensor:
-        _, last = self.encoder(pack_sequence([self.embedding(each) for each in strings]))
+        _, last = self.encoder(pack_sequence([self.embedding(tokens) for tokens in strings]))
         summary = torch.cat([last[0], last[1]], dim=-1)
         mean, log_variance = self.mean(summary), self.log_variance(summary)
         points = mean + torch.exp(0.5 * log_variance) * torch.randn_like(mean)
-        shown = [torch.cat([each.new_full((1,), END_TOKEN), each[:-1]]) for each in strings]
+        shown = [torch.cat([tokens.new_full((1,), END_TOKEN), tokens[:-1]]) for tokens in strings]
         seen = [
-            torch.cat([self.embedding(each), point.expand(len(each), -1)], dim=-1)
-            for each, point in zip(shown, points, strict=True)
+            torch.cat([self.embedding(tokens), point.expand(len(tokens), -1)], dim=-1)
+            for tokens, point in zip(shown, points, strict=True)
         ]
         written, _ = pad_packed_sequence(self.decoder(pack_sequence(seen), self.first(points)[None])[0], True)
         wanted = nn.utils.rnn.pad_sequence(strings, batch_first=True, padding_value=-1)

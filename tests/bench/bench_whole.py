@@ -1,8 +1,7 @@
-"""Samples a CPU second over the whole way, a stage each: small datasets made by one worker, compiled code at hand.
+"""Samples per CPU second of whole datasets and of each stage: small datasets, one worker, compiled code cached.
 
-CPU seconds are those of the run and all its processes, starting included, so a stage that makes little of a small
-dataset mostly shows what starting costs. A second turn over the finished dataset, which finds nothing to do, is what
-the mill takes for itself.
+CPU seconds are those of the run and all its processes, including their start, which dominates a stage that makes
+little. A second run over the finished dataset finds nothing to do and measures the overhead of the pipeline.
 """
 
 from __future__ import annotations
@@ -26,8 +25,10 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @dataclass(frozen=True)
 class Dataset:
-    """A config and what is smaller in it: `small`, by section; `few` for the turn before that compiles. `needs`: a
-    folder without which it is left out."""
+    """A config with smaller values by section: `small` to measure, `few` for the run before, which compiles.
+
+    It is skipped without the folder `needs`.
+    """
 
     config: str
     small: Mapping[str, Any]
@@ -53,7 +54,7 @@ DATASETS = (
 
 
 def bench() -> Iterator[Measure]:
-    """For each dataset the whole way, then its stages."""
+    """Measure each dataset as a whole, then its stages."""
     stages = upstream(find_stages(), "package")
     for dataset in DATASETS:
         if not (ROOT / dataset.needs).exists():
@@ -65,9 +66,11 @@ def bench() -> Iterator[Measure]:
             again = _seconds(dataset, dataset.small, out, stages)
             samples = _samples(out)
         spent = sum(seconds.values())
-        note = f"{samples} samples in {spent:.1f} CPU s; a turn that finds all done: {sum(again.values()):.1f} CPU s"
-        yield Measure(f"{dataset.config}: the whole way", "samples", samples / spent, note=note)
-        yield Measure(f"{dataset.config}: without turns' own cost", "samples", samples / (spent - sum(again.values())))
+        note = f"{samples} samples in {spent:.1f} CPU s; a run over finished shards: {sum(again.values()):.1f} CPU s"
+        yield Measure(f"{dataset.config}: the whole pipeline", "samples", samples / spent, note=note)
+        yield Measure(
+            f"{dataset.config}: without the overhead of runs", "samples", samples / (spent - sum(again.values()))
+        )
         for stage in stages:
             if seconds[stage] - again[stage] > 0.02 * spent:
                 said = f"{seconds[stage]:.1f} CPU s, {seconds[stage] / spent:.0%}"
@@ -75,7 +78,7 @@ def bench() -> Iterator[Measure]:
 
 
 def _seconds(dataset: Dataset, changes: Mapping[str, Any], out: Path, stages: list[str]) -> dict[str, float]:
-    """CPU seconds of each stage of one turn."""
+    """Return the CPU seconds of each stage of one run."""
     config = yaml.safe_load((ROOT / "configs" / f"{dataset.config}.yaml").read_text())
     for section, keys in changes.items():
         config[section] = {**config.get(section, {}), **keys}
@@ -94,13 +97,13 @@ def _seconds(dataset: Dataset, changes: Mapping[str, Any], out: Path, stages: li
 
 
 def _children() -> float:
-    """CPU seconds of all processes that this one has started and that have ended."""
+    """Return the CPU seconds of all finished child processes."""
     times = os.times()
     return times.children_user + times.children_system
 
 
 def _samples(out: Path) -> int:
-    """Samples of the one dataset in a folder."""
+    """Return the count of samples of the dataset in a folder."""
     from pyarrow import parquet
 
     rows: int = parquet.read_metadata(next(out.glob("*-index/*.parquet"))).num_rows

@@ -35,7 +35,7 @@ from stages.variations.settings import SearchConfig, StretchConfig, VariantRequi
 from stages.variations.substructures.alignments import find_region_swaps
 from stages.variations.substructures.docking_sites import docking_graph
 from stages.variations.substructures.operations import find_operations
-from tests.bench.furniture import FURNITURE, MEANINGS, side_by_side
+from tests.bench.furniture import FURNITURE, PATTERNS_BY_MEANING, side_by_side
 from tests.bench.variety import Finds, configured, explore
 
 REAL = Path("../shared/exemplars")
@@ -82,7 +82,10 @@ def _furniture() -> Family:
     """Return a kit with types by meaning, stretched at most fourfold."""
     paths = [REAL / folder / "model.glb" for folder in FURNITURE]
     config = KitConfig(
-        name="furniture", shapes=tuple(ShapeFile(path=path) for path in paths), types="meaning", label_map=MEANINGS
+        name="furniture",
+        shapes=tuple(ShapeFile(path=path) for path in paths),
+        types="meaning",
+        label_map=PATTERNS_BY_MEANING,
     )
     chosen = {
         **STRICTEST,

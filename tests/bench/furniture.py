@@ -1,7 +1,7 @@
-"""Six pieces of furniture and a shop, by six makers, as one family by meaning: what they need to be put side by side.
+"""Models of furniture and a shop, by six makers, as one family with types by meaning.
 
-Each is turned upright, its front towards -y, put on the ground and made one unit tall; their makers count their parts,
-so what these mean is said here.
+They are turned upright, the front towards -y, placed on the ground and scaled to height 1. Their parts have numbers
+and no names, so their meanings are listed here.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ FURNITURE = {
     "h09_chair_ivar_0668": 0,
     "h10_shop_building": -90,
 }
-"""By how many degrees about the vertical each is turned."""
-LYING = ("h10_shop_building",)
-"""Those whose files have y up, not z."""
-MEANINGS: dict[str, tuple[str, ...]] = {
+"""Rotation about the vertical, in degrees, by model."""
+Y_UP_MODELS = ("h10_shop_building",)
+"""Models whose files have y up, not z."""
+PATTERNS_BY_MEANING: dict[str, tuple[str, ...]] = {
     "body": (
         "h01*/type0[0-5].*", "h03*/sektion.*", "h04*/*", "h06*/type00.*", "h06*/type0[2345].*", "h09*/type0[04].*",
         "h10*/type0[01245].*",
@@ -38,21 +38,21 @@ MEANINGS: dict[str, tuple[str, ...]] = {
     "seat": ("h09*/type01.*",),
     "rail": ("h09*/type0[23].*",),
 }  # fmt: skip
-"""What parts mean, coarsely: a handle is made of three parts in one, of one in another. Windows keep their names."""
+"""Patterns of parts by meaning. Windows keep their names."""
 
 
 def side_by_side(models: Sequence[Model]) -> list[Model]:
-    """The models of the folders FURNITURE, upright, their fronts one way, on the ground, all of them one unit tall."""
+    """Return the models of the folders FURNITURE, upright, with equal fronts, on the ground and of height 1."""
     return [_placed(model, model.path.resolve().parent.name) for model in models]
 
 
 def _placed(model: Model, name: str) -> Model:
     angle = np.deg2rad(FURNITURE[name])
     turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
-    if name in LYING:
+    if name in Y_UP_MODELS:
         turn = turn @ np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    placed = [each.vertices @ (turn @ each.pose[:3, :3]).T + turn @ each.pose[:3, 3] for each in model.parts]
-    low, high = (look([look(each, axis=0) for each in placed], axis=0) for look in (np.min, np.max))
+    placed = [part.vertices @ (turn @ part.pose[:3, :3]).T + turn @ part.pose[:3, 3] for part in model.parts]
+    low, high = (extreme([extreme(points, axis=0) for points in placed], axis=0) for extreme in (np.min, np.max))
     origin, size = np.array([*(low + high)[:2] / 2, low[2]]), high[2] - low[2]
     parts = []
     for part in model.parts:

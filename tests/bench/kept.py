@@ -12,31 +12,30 @@ from pathlib import Path
 
 from tests.bench.measure import Measure
 
-HEADER = "| what | ours, a second and core | peer | ratio | change | note |\n|---|---:|---:|---:|---:|---|"
-NOISE = 0.25
-"""Share by which a figure may differ from the last kept one by noise: on a busy machine with two threads a core, CPU
-seconds of the same work were seen to differ by a fifth."""
+TABLE_HEADER = "| what | ours, a second and core | peer | ratio | change | note |\n|---|---:|---:|---:|---:|---|"
+NOISE_SHARE = 0.25
+"""Relative difference from the last kept figure that may be noise: CPU seconds differ by a fifth on a busy machine."""
 
 
 def figures(path: Path) -> dict[str, float]:
-    """Our figures of a kept report by name; none where there is none."""
+    """Return our figures of a kept report by name; empty without a report."""
     if not path.is_file():
         return {}
-    return {each["name"]: each["ours"] for each in json.loads(path.read_text())["measures"]}
+    return {entry["name"]: entry["ours"] for entry in json.loads(path.read_text())["measures"]}
 
 
 def change(measure: Measure, kept: dict[str, float]) -> str:
-    """How a measure differs from the last kept one, in bold beyond noise; `new` for one that was not there."""
+    """Return the change from the last kept measure, in bold beyond noise; `new` without one."""
     before = kept.get(measure.name)
     if not before:
         return "new" if kept else "–"
     ratio = measure.ours / before
     said = f"{ratio - 1:+.0%}"
-    return said if 1 - NOISE <= ratio <= 1 / (1 - NOISE) else f"**{said}**"
+    return said if 1 - NOISE_SHARE <= ratio <= 1 / (1 - NOISE_SHARE) else f"**{said}**"
 
 
 def row(measure: Measure, kept: dict[str, float]) -> str:
-    """One measure as a row of the table."""
+    """Return a measure as a row of the table."""
     peer = f"{_figure(measure.peer)} ({measure.peer_name})" if measure.peer is not None else "–"
     ratio = f"{measure.ours / measure.peer:.2g}×" if measure.peer else "–"
     ours = f"{_figure(measure.ours)} {measure.unit}"
@@ -44,8 +43,7 @@ def row(measure: Measure, kept: dict[str, float]) -> str:
 
 
 def keep(path: Path, made: Sequence[Measure]) -> None:
-    """Write the JSON `path` and the Markdown beside it, with date and size of the machine; figures of pieces that were
-    not measured now stay in neither."""
+    """Write the report as JSON to `path` and as Markdown next to it, with date and size of the machine."""
     kept = figures(path)
     machine = {
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
@@ -56,11 +54,11 @@ def keep(path: Path, made: Sequence[Measure]) -> None:
     }
     said = (
         f"Measured on {machine['date']}, {machine['cores']} cores ({machine['machine']}), {machine['memory_gb']} GB of "
-        f"memory, load {machine['load']} over five minutes. Bold: more than {NOISE:.0%} from the last kept report."
+        f"memory, load {machine['load']} over five minutes. Bold: over {NOISE_SHARE:.0%} from the last kept report."
     )
-    table = "\n".join([HEADER, *(row(each, kept) for each in made)])
+    table = "\n".join([TABLE_HEADER, *(row(measure, kept) for measure in made)])
     path.with_suffix(".md").write_text(f"# What Shapemill takes\n\n{said}\n\n{table}\n")
-    path.write_text(json.dumps({**machine, "measures": [asdict(each) for each in made]}, indent=1) + "\n")
+    path.write_text(json.dumps({**machine, "measures": [asdict(measure) for measure in made]}, indent=1) + "\n")
 
 
 def _figure(value: float) -> str:

@@ -1,4 +1,4 @@
-"""One figure of `make bench`: our rate beside that of a public peer, measured in the same run."""
+"""One figure of `make bench`: our rate and that of a public peer, measured in the same run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Measure:
-    """`ours` and `peer` in `unit` a second and core; `peer` is None where no public peer does the same."""
+    """`ours` and `peer` in `unit` per second and core; `peer` stays empty without a public peer."""
 
     name: str
     unit: str
@@ -20,7 +20,7 @@ class Measure:
 
 
 def rate(work: Callable[[], int], seconds: float = 2.0, rounds: int = 3) -> float:
-    """Items a second of `work` (which returns how many it made), the best of `rounds` rounds of about `seconds`."""
+    """Return items per second of `work`, which returns its count: the best of `rounds` rounds of about `seconds`."""
     best = 0.0
     work()
     for _ in range(rounds):

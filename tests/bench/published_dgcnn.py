@@ -1,4 +1,4 @@
-"""The network that the geocode paper recovers clouds with, in plain torch: what ours is measured beside (§3.3)."""
+"""The network of the geocode paper for clouds, in plain torch, as a peer of ours (§3.3)."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from torch.nn.functional import cross_entropy
 
 
 class PublishedDGCNN(nn.Module):
-    """DGCNN: k 20, widths 16, 16, 32, 64, embedding 64; a perceptron 128-128-64-n a parameter, dropout a half. A graph
-    is made anew of all distances before each convolution, and every edge is in memory."""
+    """DGCNN: k 20, widths 16, 16, 32, 64, embedding 64; a perceptron 128-128-64-n per parameter, dropout 0.5.
+
+    Before each convolution, a new graph is made from all distances, with every edge in memory.
+    """
 
     def __init__(self, classes: Sequence[int]) -> None:
         super().__init__()

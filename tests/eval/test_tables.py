@@ -116,7 +116,7 @@ def test_reference_value_needs_a_column() -> None:
 
 
 def test_failing_table_is_reported_and_others_are_made(tmp_path: Path) -> None:
-    """Tables of an extension, one of which fails, and those of the project, whose dataset is missing."""
+    """An extension has a table that fails; the tables of the project lack their dataset."""
     tables = tmp_path / "extension" / "eval" / "tables"
     tables.mkdir(parents=True)
     text = (

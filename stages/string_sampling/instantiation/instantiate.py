@@ -33,7 +33,7 @@ from stages.variations.kernels.tables import kit_tables
 MIN_NODES = 64
 """Room for nodes from the start."""
 VALUES_PER_NODE = 256
-"""Mean room for values; a node has as many as there are placements next to one part."""
+"""Mean capacity of the values of a node; a node has a value per placement next to one part."""
 MAX_SLOT_ARRANGEMENTS = 16
 """Arrangements checked against a grammar of slots."""
 
@@ -53,7 +53,7 @@ class Instantiation:
     assembly: Assembly | None
     """Its parts in the order of the graph's nodes."""
     reason: str
-    """Why there is none; else empty."""
+    """Why there is no assembly; else empty."""
     placements: int
     """Parts placed, also those taken back."""
 

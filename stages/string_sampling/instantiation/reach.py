@@ -26,7 +26,7 @@ BUCKET_TOLERANCES = 16.0
 """Side of a bucket."""
 TOLERANCE_PER_DOCKING = 0.5
 """Error of each docking in a chain, in pose tolerances."""
-UNLIMITED = -1
+UNLIMITED_POSES = -1
 """In place of the number of poses: any pose is reached."""
 N_POSES, N_NODES = 0, 1
 
@@ -43,7 +43,7 @@ class ChainReach(NamedTuple):
     children: np.ndarray  # int64 (t,): its first child, or -1
     siblings: np.ndarray  # int64 (t,): the next child of its parent, or -1
     starts: np.ndarray  # int64 (t,)
-    sizes: np.ndarray  # int64 (t,): number of poses, or UNLIMITED
+    sizes: np.ndarray  # int64 (t,): number of poses, or UNLIMITED_POSES
     counts: np.ndarray  # int64 (2,)
 
 
@@ -93,12 +93,12 @@ def can_reach(kit, placements, reach, orientation, sequence, length, target_orie
         node = orientation
         for index in range(length):
             node = _child(kit, placements, reach, node, sequence[index])
-            if node < 0 or reach.sizes[node] == UNLIMITED:
+            if node < 0 or reach.sizes[node] == UNLIMITED_POSES:
                 break
         if node >= 0:
             break
         _reset(reach, len(placements.orientation_types))
-    if reach.sizes[node] == UNLIMITED:
+    if reach.sizes[node] == UNLIMITED_POSES:
         return True
     slack = kit.limits[0] * (1.0 + TOLERANCE_PER_DOCKING * length)
     end = reach.starts[node] + reach.sizes[node]
@@ -152,7 +152,7 @@ def _child(kit, placements, reach, node, label):
                 continue
             if new == start + MAX_POSES:
                 # its poses stay in their buckets, but the node no longer uses them
-                reach.sizes[child] = UNLIMITED
+                reach.sizes[child] = UNLIMITED_POSES
                 return child
             reach.counts[N_POSES] += 1
             reach.orientations[new] = orientation

@@ -39,7 +39,7 @@ def test_number_of_shapes_judged_as_dry_blocks_is_limited() -> None:
         assert found["dry stable %"] == share
 
 
-def test_table_has_a_row_for_each_name_with_its_shares() -> None:
+def test_table_has_a_row_per_name_with_its_shares() -> None:
     post = solid(box(0.1, 0.1, 2, at=(0, 0, 1)))  # tips at a push of a twentieth of its weight
     results = judge_by_name([("b", STABLE), ("a", FLOATING), ("b", FLOATING), ("c", post)], PhysicsConfig())
     table = physical_table(results, PhysicsConfig(), 9, PUBLISHED[:1])

@@ -21,7 +21,7 @@ from pipeline.config import StrictModel
 ROOT = Path(__file__).resolve().parents[3]
 DEFAULT = ROOT / "configs" / "default.yaml"
 
-TABLE = '''"""A table of two sections, the second of which is killed the first time."""
+TABLE = '''"""A table of two sections; the second is killed the first time."""
 import os, signal
 from functools import partial
 from pathlib import Path

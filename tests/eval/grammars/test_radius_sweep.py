@@ -10,7 +10,7 @@ from tests.command import shapemill
 from tests.stages.symmetry.planted import mesh, wall
 
 
-def test_sweep_has_a_row_for_each_radius_and_a_figure(tmp_path: Path) -> None:
+def test_sweep_has_a_row_per_radius_and_a_figure(tmp_path: Path) -> None:
     vertices, faces = mesh(wall(3)[..., [1, 2, 0]])  # y points up
     lines = [f"v {x:g} {y:g} {z:g}" for x, y, z in vertices.tolist()]
     lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]

@@ -8,10 +8,12 @@ import pytest
 from eval.grammars.similarity import COLUMNS, Similarity, lay_side_by_side, r_similarity, similarity_row
 from tests.stages.symmetry.planted import box, moved, screw, spiral_stair, wall
 
-RADIUS = 0.16
+SIMILARITY_RADIUS = 0.16
 
 
-def similarity(exemplar: np.ndarray, shape: np.ndarray, radius: float = RADIUS, probes: int = 500) -> Similarity:
+def similarity(
+    exemplar: np.ndarray, shape: np.ndarray, radius: float = SIMILARITY_RADIUS, probes: int = 500
+) -> Similarity:
     return r_similarity(exemplar, shape, radius, probes, np.random.default_rng(0))
 
 
@@ -68,7 +70,7 @@ class TestNotSimilar:
         shape = wall(6)
         largest = _largest(shape)
         found = similarity(wall(4), np.delete(shape, largest, 0), probes=2000)
-        low, high = shape[largest].min(axis=0) - RADIUS, shape[largest].max(axis=0) + RADIUS
+        low, high = shape[largest].min(axis=0) - SIMILARITY_RADIUS, shape[largest].max(axis=0) + SIMILARITY_RADIUS
         assert found.share < 1.0
         assert ((found.worst > low) & (found.worst < high)).all()
         assert found.matched[((found.probes < low) | (found.probes > high)).any(axis=1)].all()
@@ -76,7 +78,7 @@ class TestNotSimilar:
     def test_new_box_is_located_at_its_contact(self) -> None:
         found = similarity(wall(4), np.concatenate([wall(4), box((2.9, -0.1, 1.9), (3.2, 0.05, 2.1))]), probes=2000)
         assert found.share < 1.0
-        assert np.abs(found.worst - (3.05, 0.0, 2.0)).max() < 0.15 + RADIUS
+        assert np.abs(found.worst - (3.05, 0.0, 2.0)).max() < 0.15 + SIMILARITY_RADIUS
 
     def test_larger_radius_detects_taller_window(self) -> None:
         taller = wall(4)
@@ -89,8 +91,8 @@ class TestNotSimilar:
         sheet = wall(3)[np.isclose(np.abs(np.ptp(wall(3)[..., 1], axis=1)), 0)]
         assert similarity(wall(3), sheet, probes=40).share < 1.0
 
-    def test_surface_without_area_is_refused(self) -> None:
-        with pytest.raises(ValueError, match="without area"):
+    def test_surface_without_area_is_rejected(self) -> None:
+        with pytest.raises(ValueError, match="has no area"):
             similarity(wall(3), np.zeros((2, 3, 3)))
 
 
@@ -99,10 +101,12 @@ class TestTable:
         exemplars = [wall(4), wall(4, 3)]
         longest = max(np.ptp(exemplar.reshape(-1, 3), axis=0).max() for exemplar in exemplars)
         holed = np.delete(wall(6), _largest(wall(6)), 0)
-        row = similarity_row("walls", exemplars, [wall(6), holed], RADIUS / longest, 1500, np.random.default_rng(0))
+        row = similarity_row(
+            "walls", exemplars, [wall(6), holed], SIMILARITY_RADIUS / longest, 1500, np.random.default_rng(0)
+        )
         cells = dict(zip(COLUMNS, row, strict=True))
         assert (cells["exemplars"], cells["shapes"], cells["probes"]) == (2, 2, 3000)
-        assert cells["radius"] == pytest.approx(RADIUS)
+        assert cells["radius"] == pytest.approx(SIMILARITY_RADIUS)
         assert cells["similar %"] == 50.0
         assert 50.0 < cells["matched %"] < 100.0
         assert 0.0 < cells["worst"] < 1.0

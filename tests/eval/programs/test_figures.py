@@ -65,7 +65,7 @@ def test_figure_7_counts_copies_and_new_structures() -> None:
     assert neighbours_table([row]).rows == (row,)
 
 
-def test_figures_8_and_9_have_a_picture_for_each_sample() -> None:
+def test_figures_8_and_9_have_a_picture_per_sample() -> None:
     edits = edits_figure("vae-box-0", "box", PROGRAMS, np.random.default_rng(0))
     samples = samples_figure("box", {"one": boxes_of_programs(PROGRAMS), "other": boxes_of_programs(PROGRAMS[:1])})
     assert min(_size(edits)[0], _size(samples)[0]) > 2 * PICTURE_WIDTH

@@ -63,7 +63,7 @@ def test_true_values_are_exact_and_base_values_are_not() -> None:
     assert parameter_chart([true, base], indistinguishable_parameters(true, shapes)).startswith(b"\x89PNG")
 
 
-def test_table_has_a_row_for_each_method_and_references_of_its_programs() -> None:
+def test_table_has_a_row_per_method_and_references_of_its_programs() -> None:
     trained = model()
     ((name, shapes, inputs),) = held_out(trained, 2, np.random.default_rng(1))
     assert [given.points.shape for given in inputs if given.points is not None] == [(2048, 3)] * 2

@@ -18,7 +18,7 @@ from eval.recovery.robustness import (
     external_rows,
     external_table,
 )
-from eval.tables.recovery_robustness import Options, _sections
+from eval.tables.recovery_robustness import RecoveryRobustnessOptions, _sections
 from pipeline.errors import ConfigError
 from stages.recovery.inputs import RecoveryInput
 from stages.training.recovery.clouds import frame_of
@@ -78,7 +78,7 @@ def test_corruption_depends_on_seed_alone() -> None:
             assert not np.array_equal(cloud_of_seed.points, differs.points)
 
 
-def test_tables_have_a_row_for_each_method(tmp_path: Path) -> None:
+def test_tables_have_a_row_per_method(tmp_path: Path) -> None:
     trained = model()
     shape = next(random_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)))
     corrupted = corrupted_inputs(trained, "half missing", [shape], [RecoveryInput("one", cloud())], 0)
@@ -109,7 +109,7 @@ def test_external_shapes_are_sections_of_their_own(tmp_path: Path) -> None:
     run = load_dataset_run(CHAIRS, tmp_path)
 
     def names(corrupted: int, *external: Path) -> list[str]:
-        options = Options(programs=("chair",), corrupted=corrupted, external=external)
+        options = RecoveryRobustnessOptions(programs=("chair",), corrupted=corrupted, external=external)
         return [section.name for section in _sections(run, options)]
 
     assert names(0, folder) == ["chair, points, from scans"]

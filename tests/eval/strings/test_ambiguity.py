@@ -44,6 +44,6 @@ def test_disconnected_shapes_are_left_out(instantiator: Instantiator) -> None:
     assert measured(instantiator, apart) == Ambiguity(0, 8, 0.0, 0.0, 0.0)
 
 
-def test_table_has_a_row_for_each_kit() -> None:
+def test_table_has_a_row_per_kit() -> None:
     (row,) = ambiguity_table([("toy", Ambiguity(3, 8, 2.5, 90.0, 80.0))]).rows
     assert row == ("toy", 3, 8, 2.5, 90.0, 80.0)

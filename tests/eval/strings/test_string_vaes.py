@@ -133,7 +133,7 @@ def test_structure_table_has_reference_rows() -> None:
     assert "| sand castle, naive (strings, Table 2) |  | 102 | 4.71 | 12.2 |" in table.markdown()
 
 
-def test_each_decision_of_each_model_has_its_own_rng() -> None:
+def test_every_decision_of_every_model_has_its_own_rng() -> None:
     model = random_vae("masked")
     streams = [
         model_rng(1, as_trained(model, seed), decision).random() for seed in (0, 1) for decision in ("path", "prior")

@@ -55,7 +55,7 @@ def variant(step: int, generation: int, graph: bytes) -> KeptVariant:
     return KeptVariant(step, generation, graph, found=None, index=0)  # type: ignore[arg-type]
 
 
-def test_sizes_count_new_graphs_and_strings_of_each_step() -> None:
+def test_sizes_count_new_graphs_and_strings_per_step() -> None:
     variants = [variant(1, 1, b"a"), variant(1, 2, b"b"), variant(2, 1, b"a"), variant(3, 5, b"c"), variant(3, 2, b"c")]
     strings = {b"a": 9, b"b": 2, b"c": 4}
     assert sizes_by(variants, lambda kept: kept.round, strings) == {
@@ -106,7 +106,7 @@ def test_generation_is_one_above_the_highest_parent(run: DatasetRun) -> None:
     assert all(np.isfinite(kept.assembly.poses).all() for kept in variants)
 
 
-def test_growth_table_has_rows_and_pictures_of_each_kit(run: DatasetRun, tmp_path: Path) -> None:
+def test_growth_table_has_rows_and_pictures_of_every_kit(run: DatasetRun, tmp_path: Path) -> None:
     table = find_tables()["growth"]
     assert table.missing(run) == ""
     assert "make exemplars" in table.missing(load_dataset_run(run.config.path, tmp_path))

@@ -207,7 +207,7 @@ def test_pickle_instead_of_weights_is_rejected(bare: Path, tmp_path: Path) -> No
     assert "is a pickle" in rejected(bare, tmp_path, {}, b"\x80\x04K\x01.")
 
 
-def test_variations_and_string_sampling_exclude_each_other(tmp_path: Path) -> None:
+def test_variations_and_string_sampling_are_exclusive(tmp_path: Path) -> None:
     code, said = run(write_config(tmp_path, samples_per_kit=5), tmp_path, "string_sampling")
     assert code == 2
     assert "variations.samples_per_kit: 0" in said

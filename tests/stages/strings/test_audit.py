@@ -42,7 +42,7 @@ def sample(strings: list[str], said: Edges | None) -> PackagedSample:
 
 @pytest.fixture(scope="module")
 def places(tmp_path_factory: pytest.TempPathFactory) -> DatasetPaths:
-    """The mill's folders with the kit in them."""
+    """Return the folders of the pipeline, with the kit in them."""
     found = DatasetPaths(tmp_path_factory.mktemp("made"), "blocks")
     folder = found.stage("exemplars").root
     folder.mkdir(parents=True)

@@ -1,4 +1,4 @@
-"""Edge categories: each token's place beside the part that it hangs on, and back to poses."""
+"""Edge categories encode the relative poses of tokens, and are decoded to poses."""
 
 from __future__ import annotations
 

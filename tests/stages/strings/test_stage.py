@@ -1,4 +1,4 @@
-"""The stage on the real mill, behind two small stages that make a kit and a collection."""
+"""Stage `strings` in the pipeline, after two small stages that make a kit and a collection."""
 
 from __future__ import annotations
 
@@ -121,16 +121,16 @@ def config(flaw: str = "", count: int = 8, edges: Edges = "all") -> Config:
 def make_here(wanted: Config, out: Path, stages: Sequence[str] = tuple(STAGES)) -> dict[str, str]:
     """Make stages in this process; the shards that failed, with what they said."""
     places, failed = DatasetPaths(out, wanted.name), {}
-    survey = Inventory(wanted, STAGES, places)
+    inventory = Inventory(wanted, STAGES, places)
     for name in stages:
         places.stage(name).make()
-        surveyed = survey.stage(name)
-        while fresh := [shard for shard in surveyed.missing if shard.name not in failed]:
+        of_stage = inventory.stage(name)
+        while fresh := [shard for shard in of_stage.missing if shard.name not in failed]:
             for shard in fresh:
-                report = make_shard(survey.job(name, shard))
+                report = make_shard(inventory.job(name, shard))
                 if report.status != "done":
                     failed[shard.name] = report.message
-            survey.refresh(name)
+            inventory.refresh(name)
     return failed
 
 
@@ -177,7 +177,7 @@ def test_shapes_with_equal_graphs_have_equal_canonical_strings(made: Path) -> No
     assert first[1:] != again[1:]
 
 
-def test_corpora_have_each_string_once_by_kit_and_split(made: Path) -> None:
+def test_corpora_have_unique_strings_by_kit_and_split(made: Path) -> None:
     files = {file.name for file in (made / "toys-corpus").iterdir()}
     corpus = {f"{kit}-{split}.txt" for kit in KITS for split in ("train", "val")}
     assert files == corpus | {"vocabulary.json", "statistics.json"}
@@ -221,9 +221,9 @@ def test_the_statistics_agree_with_the_files(made: Path) -> None:
 
 
 def test_the_report_counts_the_corpus(made: Path) -> None:
-    survey = Inventory(config(), STAGES, DatasetPaths(made, "toys"))
+    inventory = Inventory(config(), STAGES, DatasetPaths(made, "toys"))
     total = sum(len(lines(made, f"{kit}-{split}.txt")) for kit in KITS for split in ("train", "val"))
-    report = STAGE.report(survey.stage("strings").view)
+    report = STAGE.report(inventory.stage("strings").view)
     assert len(report) == 1 + len(KITS)
     assert report[1].startswith("castle: ")
     assert report[1].endswith("cycle rank 10 (median), 21 at most"), "of grids of 3 x 4 to 4 x 8"
@@ -260,8 +260,8 @@ def test_a_sample_with_a_wrong_graph_hash_fails_its_shard(tmp_path: Path) -> Non
 
 def test_shapes_that_are_not_connected_are_rejected_and_counted(tmp_path: Path) -> None:
     assert make_here(config("not connected"), tmp_path) == {}
-    survey = Inventory(config("not connected"), STAGES, DatasetPaths(tmp_path, "toys"))
-    records = survey.stage("strings").records
+    inventory = Inventory(config("not connected"), STAGES, DatasetPaths(tmp_path, "toys"))
+    records = inventory.stage("strings").records
     for shard in SPLITS:
         assert records[shard].rejects == {"shape graph is not connected": 1}
         assert records[shard].samples == 3
@@ -306,13 +306,13 @@ def test_a_string_of_several_graphs_occurs_once_in_a_corpus_of_trees(tmp_path: P
     assert len(set(train)) == len(train)
     assert statistics["chain"]["val"]["in_other_splits_dropped"] > 0
     assert statistics["chain"]["train"]["in_other_splits_dropped"] == 0
-    survey = Inventory(config("rings in val", edges="tree", count=40), STAGES, DatasetPaths(tmp_path, "toys"))
-    assert "of other splits dropped" in STAGE.report(survey.stage("strings").view)[0]
+    inventory = Inventory(config("rings in val", edges="tree", count=40), STAGES, DatasetPaths(tmp_path, "toys"))
+    assert "of other splits dropped" in STAGE.report(inventory.stage("strings").view)[0]
 
 
 def test_the_card_describes_edges_and_lengths_of_strings(trees: Path) -> None:
-    survey = Inventory(config(edges="tree"), STAGES, DatasetPaths(trees, "toys"))
-    meaning, table = MEMBERS.card(survey.stage("strings").view)
+    inventory = Inventory(config(edges="tree"), STAGES, DatasetPaths(trees, "toys"))
+    meaning, table = MEMBERS.card(inventory.stage("strings").view)
     assert meaning.startswith(EDGE_DESCRIPTIONS["tree"])
     castle = next(line for line in table.splitlines() if line.startswith("| castle |"))
     assert "| 0, at most 0 | 10, at most 21 |" in castle

@@ -166,7 +166,7 @@ def test_room_depends_on_the_graph_alone(roads: Instantiator, monkeypatch: pytes
 
 
 @pytest.mark.parametrize("switch", ["constrained", "backtracks", "closes"])
-def test_each_step_beyond_the_paper_is_optional(roads: Instantiator, switch: str) -> None:
+def test_steps_beyond_the_paper_are_optional(roads: Instantiator, switch: str) -> None:
     names = loop(1, 1)
     found = instantiate_names(roads, names, cycle(len(names)), SolverMethod(**{switch: False}, budget=20_000))
     assert found.assembly is not None, found.reason
