@@ -16,7 +16,7 @@ from stages.symmetry.sections.slabs import slab_pieces
 from tests.stages.symmetry.planted import area as surface_area
 from tests.stages.symmetry.planted import blocks, box, mesh, one_object, wall
 
-CRANE = Path(__file__).resolve().parents[5] / "shared/exemplars/u04_tower_crane/model.glb"
+CRANE = Path(__file__).resolve().parents[4] / "shared/exemplars/u04_tower_crane/model.glb"
 
 
 def truss(bays: int) -> np.ndarray:
