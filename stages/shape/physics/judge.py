@@ -165,11 +165,6 @@ def judge_of(meshes: tuple[PartMesh, ...], up: Literal["y", "z"], config: Physic
     return Judge(meshes, up, config)
 
 
-def judge_shape(shape: Shape, config: PhysicsConfig) -> Validity:
-    """Return the physical validity of one shape. Raises ValueError for a shape without parts, extent or weight."""
-    return Judge(shape.meshes, shape.up, config).validity(shape.assembly)
-
-
 def physical_fields(validity: Validity) -> dict[str, Any]:
     """Return the `physics` field of a sample's record, rounded so that noise of last digits changes no bytes."""
     values = {field.name: getattr(validity, field.name) for field in fields(validity) if field.name != "joints"}

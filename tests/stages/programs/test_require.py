@@ -8,7 +8,7 @@ import pytest
 from stages.programs.draws import Share
 from stages.programs.program import build_shape, find_program
 from stages.programs.sampling import Sampler
-from stages.shape.physics.judge import judge_shape
+from stages.shape.physics.judge import Judge
 from stages.shape.physics.settings import PhysicsConfig, Requirements
 
 OVERHANG = find_program("tests.stages.programs.overhang")
@@ -19,7 +19,8 @@ def test_only_stable_shapes_are_kept_and_others_counted(physics: PhysicsConfig) 
     sampler = Sampler(OVERHANG, Share(), off_grid=False, require=Requirements(stable=True, physics=physics))
     rng = np.random.default_rng(7)
     kept = [sampler.find(None, rng) for _ in range(20)]
-    assert all(judge_shape(build_shape(OVERHANG, values), physics).stable for values in kept)
+    shapes = [build_shape(OVERHANG, values) for values in kept]
+    assert all(Judge(shape.meshes, shape.up, physics).validity(shape.assembly).stable for shape in shapes)
     # the plate weighs as much as the post; they fall once their common middle is beyond the foot of the post
     assert max(values["reach"] for values in kept) <= 0.4
     assert sampler.refused["any", "not stable"] > 0

@@ -12,8 +12,9 @@ import pytest
 from stages.shape.collection.packaged import PackagedSample
 from stages.shape.geometry.bounds import shape_bounds
 from stages.sketches.audit import AUDIT
-from stages.sketches.image import png_array, png_bytes
+from stages.sketches.image import png_bytes
 from stages.sketches.settings import Augmentation
+from tests.stages.sketches.png import png_array
 from tests.stages.sketches.test_cameras import VIEWS, lopsided, sketch
 
 LINE_WIDTH_PIXELS = 1.8

@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from stages.sketches.image import augment, dilate, erode, flip, png_array, png_bytes
+from stages.sketches.image import augment, dilate, erode, flip, png_bytes
 from stages.sketches.settings import Augmentation
+from tests.stages.sketches.png import png_array
 
 SIZES = st.tuples(st.integers(1, 40), st.integers(1, 40), st.integers(0, 9999))
 

@@ -20,11 +20,11 @@ from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, write_sample
 from stages.shape.views.raster import RasterRenderer
 from stages.shape.views.renderer_check import check_in_subprocess
-from stages.sketches.image import png_array
 from stages.sketches.settings import Augmentation, SketchesConfig, SketchView
 from stages.sketches.stage import STAGE
 from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
 from tests.stages.shape.views.solids import box, cylinder, kit_of, part_type, posed
+from tests.stages.sketches.png import png_array
 
 SHARDS = {"toys-train-000000": ("train", 3), "toys-val-000000": ("val", 2)}
 

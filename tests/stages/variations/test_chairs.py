@@ -16,7 +16,7 @@ from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Kit
-from stages.shape.physics.judge import judge_shape
+from stages.shape.physics.judge import Judge
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample
 from stages.shape.shape import kit_shape
@@ -57,7 +57,8 @@ def test_legs_backs_and_arms_are_exchanged_within_their_labels(kit: Kit, found: 
 def test_assembled_chairs_stand_like_their_parents(kit: Kit, found: list[Variant]) -> None:
     shapes = [*(exemplar.assembly for exemplar in kit.exemplars), *(variant.assembly for variant in found[::4])]
     for assembly in shapes:
-        validity = judge_shape(kit_shape(kit, assembly), PhysicsConfig())
+        shape = kit_shape(kit, assembly)
+        validity = Judge(shape.meshes, shape.up, PhysicsConfig()).validity(shape.assembly)
         assert validity.rooted
         assert validity.stable
 
