@@ -41,8 +41,8 @@ def cell_of(features: Float32Array, axes: Sequence[Axis], resolution: int) -> Ce
 class Archive:
     """Counts of variants by cell and by histogram."""
 
-    def __init__(self, quota: int) -> None:
-        self.cell_quota = quota
+    def __init__(self, cell_quota: int) -> None:
+        self.cell_quota = cell_quota
         self._cells, self._histograms = _Tally(), _Tally()
 
     def add(self, cell: Cell, histogram: int) -> Place:
