@@ -12,7 +12,7 @@ PRODUCER = Producer(
     is_requested=lambda config: config.section(PebblesConfig).heaps > 0,
     sentence="pebbles are thrown on a heap.",
     splits="Every heap is thrown separately.",
-    apart=False,
+    graphs_share_split=False,
     lineage=lambda _: {"drawn": RecordField({"type": "integer", "minimum": 0, "description": "which throw it was"})},
     card=lambda _: ["No pebble was harmed."],
 )
