@@ -1,1 +1,1 @@
-"""Curve programs: parameters with names and ranges in, parts of a shape out (geocode §3)."""
+"""Shape programs: named parameters with ranges in, parts of a shape out (geocode §3)."""

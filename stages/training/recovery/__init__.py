@@ -1,1 +1,1 @@
-"""Recovery: point clouds and drawings back to the parameters of a program (geocode §3.3)."""
+"""The recovery network: its training shapes, model and losses (geocode §3.3)."""
