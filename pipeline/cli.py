@@ -36,7 +36,7 @@ from pipeline.options import (
     load_dataset,
     run_stages,
 )
-from pipeline.registry import find_stages, folders_with, upstream
+from pipeline.registry import find_stages, folders_with
 from pipeline.stall_timeout import DEFAULT_STALL_MINUTES
 
 DATASET_COMMANDS = typer.Typer()
@@ -67,8 +67,7 @@ def run(
         hint = f"did you mean {close}?" if close else f"stages are {', '.join(stages)}"
         raise ConfigError(f"there is no stage {stage}; {hint}")
     _, loaded, paths = load_dataset(context, config, out, seed)
-    last = next(name for name in reversed(stages) if not stages[name].publishes_incomplete)
-    names = [stage] if stage else upstream(stages, last)
+    names = [stage] if stage else [name for name in stages if not stages[name].publishes_incomplete]
     how = {"part": part, "retries": retries, "only": only, "stall_minutes": stall_timeout, "cluster": cluster}
     run_stages(names, stages, loaded, paths, workers, **how)
 

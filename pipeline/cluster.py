@@ -71,9 +71,9 @@ class ClusterWorkers:
             if timeout is not None and time.monotonic() - begun >= timeout:
                 break
             time.sleep(0.02)
-        there = self._workers()
+        addresses = self._workers()
         for future, (address, job) in list(self._busy.items()):
-            if future.done() or address not in there:
+            if future.done() or address not in addresses:
                 del self._busy[future]
                 yield job, _report(future) if future.done() else None
 

@@ -200,15 +200,15 @@ def _explain(schema: Mapping[str, Any], error: Mapping[str, Any]) -> str:
         key, kinds = field["discriminator"]["propertyName"], field["discriminator"]["mapping"]
         given = error["input"].get(key) if isinstance(error["input"], Mapping) else None
         return f"{key} {'is missing' if given is None else f'is {given}'}; it is one of {', '.join(kinds)}"
-    described = f" ({field['description']})" if field.get("description") else ""
+    suffix = f" ({field['description']})" if field.get("description") else ""
     if kind == "missing":
-        return f"is missing{described}"
+        return f"is missing{suffix}"
     if kind == "value_error":
         return str(error["ctx"]["error"])
     wanted = error["msg"][0].lower() + error["msg"][1:]
     if kind in {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}:
         wanted = f"must lie in {_range(field)}" if _range(field) else wanted
-    return f"{wanted}, and is {_shown(json.dumps(error['input']))}{described}"
+    return f"{wanted}, and is {_shown(json.dumps(error['input']))}{suffix}"
 
 
 def _known(key: str, known: Iterable[str]) -> str:

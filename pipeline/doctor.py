@@ -84,22 +84,22 @@ def machine_checks(out: Path) -> Iterator[MachineCheck]:
 
 
 def _python() -> MachineCheck:
-    found = platform.python_version()
-    if found.startswith("3.11."):
-        return MachineCheck("python", "ok", found)
-    return MachineCheck("python", "FAILED", found, "install Python 3.11, remove .venv, run `make setup`")
+    installed = platform.python_version()
+    if installed.startswith("3.11."):
+        return MachineCheck("python", "ok", installed)
+    return MachineCheck("python", "FAILED", installed, "install Python 3.11, remove .venv, run `make setup`")
 
 
 def _locked_versions() -> MachineCheck:
     pinned = [line.split("==") for line in _LOCK.read_text().splitlines() if "==" in line and not line.startswith("#")]
     wrong = []
-    for name, wanted in pinned:
+    for name, locked in pinned:
         try:
-            found = version(name).partition("+")[0]
+            installed = version(name).partition("+")[0]
         except PackageNotFoundError:
-            found = "missing"
-        if found != wanted:
-            wrong.append(f"{name} is {found}, not {wanted}")
+            installed = "missing"
+        if installed != locked:
+            wrong.append(f"{name} is {installed}, not {locked}")
     if not wrong:
         return MachineCheck("versions", "ok", f"{len(pinned)} packages as in requirements.lock")
     more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""

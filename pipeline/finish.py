@@ -47,7 +47,7 @@ def publish(state: StageInventory, paths: DatasetPaths) -> None:
     wanted = {_inside(target): file for target, file in sorted(state.stage.publish(state.view).items())}
     listing = state.paths.published
     before = _listed(listing)
-    gone = [target for target in before if target not in wanted]
+    unpublished = [target for target in before if target not in wanted]
     if set(before) != set(wanted):
         # Files are listed before they are written, so that a kill leaves none that is not listed.
         _write(listing, json_bytes(sorted(map(str, {*before, *wanted}))))
@@ -56,9 +56,9 @@ def publish(state: StageInventory, paths: DatasetPaths) -> None:
         if record is None or file not in record.files:
             raise ValueError(f"stage {state.stage.name} publishes {file!r}, which is no file of its shards")
         _put(state.paths.root / file, paths.out / target, record.files[file]["sha256"])
-    for target in gone:
+    for target in unpublished:
         _unpublish(paths.out, target)
-    if gone:
+    if unpublished:
         _write(listing, json_bytes(sorted(map(str, wanted))))
 
 

@@ -37,16 +37,16 @@ def _altered(state: StageInventory, paths: DatasetPaths) -> Iterator[Path]:
     """Yield the published files that are missing, or have other bytes than the stage gave them."""
     for target, file in state.stage.publish(state.view).items():
         path, original = paths.out / target, state.paths.root / file
-        noted = state.records[file.partition(".")[0]].files[file]["sha256"]
+        recorded = state.records[file.partition(".")[0]].files[file]["sha256"]
         # A link to a file of the shard was checked with the shard.
         linked = path.is_file() and original.is_file() and path.samefile(original)
-        if not linked and not (path.is_file() and file_digest(path) == noted):
+        if not linked and not (path.is_file() and file_digest(path) == recorded):
             yield path
 
 
 def corrupted_files(record: ShardRecord, paths: StagePaths) -> list[Path]:
     """Return the files of a shard that are missing or whose bytes differ from its record."""
-    digests = {paths.root / file: noted["sha256"] for file, noted in record.files.items()}
+    digests = {paths.root / file: recorded["sha256"] for file, recorded in record.files.items()}
     return [path for path, digest in digests.items() if not path.is_file() or file_digest(path) != digest]
 
 

@@ -113,9 +113,9 @@ class Inventory:
         """Return the job of a shard of stage `name` whose inputs exist."""
         state = self._states[name]
         inputs = {
-            f"{stage}/{file}": noted["sha256"]
+            f"{stage}/{file}": entry["sha256"]
             for stage, _, other in (source.partition("/") for source in shard.inputs)
-            for file, noted in self.stage(stage).records[other].files.items()
+            for file, entry in self.stage(stage).records[other].files.items()
         }
         return Job(
             stage=name,

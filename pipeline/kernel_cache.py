@@ -227,9 +227,9 @@ def _read(file: Path, package: str) -> list[_Statement]:
     note = read_note(str(file), "kernels", key)
     if note is None:
         body = ast.parse(source, file).body
-        found = [statement for node in body if not is_prose(node) for statement in _parsed(node, package)]
-        here = {name for statement in found for name in statement.binds}
-        note = {"statements": [item._replace(loads=[n for n in item.loads if n in here]) for item in found]}
+        statements = [statement for node in body if not is_prose(node) for statement in _parsed(node, package)]
+        here = {name for statement in statements for name in statement.binds}
+        note = {"statements": [item._replace(loads=[n for n in item.loads if n in here]) for item in statements]}
         write_note(str(file), "kernels", key, note)
     return [_Statement(*fields) for fields in note["statements"]]
 

@@ -29,11 +29,11 @@ def _prune_stage(state: StageInventory) -> int:
     published = set(state.stage.publish(state.view).values())
     unneeded = {name: record for name, record in state.records.items() if published.isdisjoint(record.files)}
     files = [state.paths.root / file for record in unneeded.values() for file in record.files]
-    there = [path for path in files if path.exists()]
+    existing = [path for path in files if path.exists()]
     checksums = {name: record.checksum() for name, record in unneeded.items()}
-    if there and read_json(state.paths.pruned) != checksums:
+    if existing and read_json(state.paths.pruned) != checksums:
         write_atomically(state.paths.pruned, json_bytes(checksums))
-    freed = sum(path.stat().st_size for path in there)
-    for path in there:
+    freed = sum(path.stat().st_size for path in existing)
+    for path in existing:
         remove(path)
     return freed

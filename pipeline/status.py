@@ -71,7 +71,7 @@ def _failures(state: StageInventory) -> dict[str, str]:
     """Return the message of each quarantined shard that has not been made since."""
     failures = {}
     for shard in state.missing:
-        noted = read_json(state.paths.failed / f"{shard.name}.json")
-        if isinstance(noted, dict) and noted.get("fingerprint") == state.fingerprints[shard.name]:
-            failures[shard.name] = str(noted["message"])
+        failure = read_json(state.paths.failed / f"{shard.name}.json")
+        if isinstance(failure, dict) and failure.get("fingerprint") == state.fingerprints[shard.name]:
+            failures[shard.name] = str(failure["message"])
     return failures

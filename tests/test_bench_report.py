@@ -6,7 +6,7 @@ from tests.bench.kept import change, figures, keep, row
 from tests.bench.measure import Measure
 
 
-def test_a_kept_report_marks_what_differs_from_the_one_before_by_more_than_noise(tmp_path):
+def test_report_marks_changes_beyond_noise(tmp_path):
     path = tmp_path / "report.json"
     assert figures(path) == {}
     keep(

@@ -103,7 +103,7 @@ def test_two_workers_make_the_same_folder(made: tuple[Path, Path]) -> None:
     assert digests(two) == digests(one)
 
 
-def test_a_kill_in_every_stage_and_another_go_make_the_same_folder(made: tuple[Path, Path]) -> None:
+def test_kill_in_every_stage_and_another_run_make_the_same_folder(made: tuple[Path, Path]) -> None:
     config, one = made
     killed = one.with_name("killed")
     alive = []
@@ -115,9 +115,7 @@ def test_a_kill_in_every_stage_and_another_go_make_the_same_folder(made: tuple[P
     assert digests(killed) == digests(one)
 
 
-def test_every_table_about_kits_can_be_made_of_it_and_stands_in_the_report(
-    made: tuple[Path, Path], tmp_path: Path
-) -> None:
+def test_every_table_about_kits_is_in_the_report(made: tuple[Path, Path], tmp_path: Path) -> None:
     config, one = made
     for name in ("small", ".work"):
         (tmp_path / name).symlink_to(one / name)

@@ -78,7 +78,7 @@ def test_samples_of_a_new_producer_have_what_all_stages_add(made: tuple[Path, st
         assert record["physics"]["rooted"]
 
 
-def test_what_they_say_of_themselves_stands_in_card_croissant_index_and_manifest(made: tuple[Path, str]) -> None:
+def test_declarations_of_extensions_are_in_card_croissant_index_and_manifest(made: tuple[Path, str]) -> None:
     folder = made[0] / "heaps"
     card = (folder / "README.md").read_text()
     for said in (
@@ -96,7 +96,7 @@ def test_what_they_say_of_themselves_stands_in_card_croissant_index_and_manifest
     assert "mass.npy" in {load["name"] for load in json.loads((folder / "manifest.json").read_text())["members"]}
 
 
-def test_a_table_of_theirs_is_found_and_stands_in_the_report(made: tuple[Path, str]) -> None:
+def test_table_of_an_extension_is_found_and_in_the_report(made: tuple[Path, str]) -> None:
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "tests" / "example_project")}
     command = [
         sys.executable,
@@ -120,6 +120,6 @@ def test_a_table_of_theirs_is_found_and_stands_in_the_report(made: tuple[Path, s
         assert said in report
 
 
-def test_a_dataset_of_theirs_is_verified(made: tuple[Path, str]) -> None:
+def test_dataset_of_an_extension_is_verified(made: tuple[Path, str]) -> None:
     assert "geometry" in made[1]
     assert "faults" not in made[1]

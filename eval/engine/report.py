@@ -111,9 +111,9 @@ def _facts(run: DatasetRun, started: datetime) -> list[tuple[str, str]]:
         ("Config", f"{run.config.path}, seed {run.config.seed}"),
     ]
     if manifest:
-        made_with = manifest["software"]["shapemill"]
+        version = manifest["software"]["shapemill"]
         facts.append(("Dataset", f"{manifest['name']} {manifest['version']}, seed {manifest['seed']}"))
-        facts.append(("Dataset made by", f"shapemill {made_with}"))
+        facts.append(("Dataset made by", f"shapemill {version}"))
         changed = _changed_sections(run)
         if changed:
             facts.append(("Changed since then", f"sections of the config: {', '.join(changed)}"))

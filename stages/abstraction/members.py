@@ -65,12 +65,12 @@ def figures(plan: Plan) -> Mapping[str, float] | None:
 
 
 def _card(plan: Plan) -> Sequence[str]:
-    found = figures(plan)
-    if found is None:
+    totals = figures(plan)
+    if totals is None:
         return []
     return [
-        f"{found['programs']:,} of {found['samples']:,} samples have a ShapeAssembly program of their parts' boxes "
-        f"(`{PROGRAM}`), with {found['lines']:.1f} lines and an F-score of {found['f_score']:.1f} % on average."
+        f"{totals['programs']:,} of {totals['samples']:,} samples have a ShapeAssembly program of their parts' boxes "
+        f"(`{PROGRAM}`), with {totals['lines']:.1f} lines and an F-score of {totals['f_score']:.1f} % on average."
     ]
 
 

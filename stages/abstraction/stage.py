@@ -36,39 +36,39 @@ def run_shard(task: Task) -> Outcome:
         shape = collection.shape(sample)
         try:
             hierarchy = hierarchy_of(shape, config.children, boxes)
-            found = extract(hierarchy, CATEGORY_RULES["any"], config.gates, config.cleaning)
+            extracted = extract(hierarchy, CATEGORY_RULES["any"], config.gates, config.cleaning)
         except Rejected as error:
             nothing = {"refused": error.reason, "f_score": 0, "lines": 0, "leaves": 0, "centre": [0, 0, 0], "scale": 0}
             return {PROGRAM: b"", "json": json_bytes({"program": nothing})}
-        fields = _fields(found)
+        fields = _fields(extracted)
         sums["programs"] += 1
         sums["f_score"] += fields["f_score"]
         sums["lines"] += fields["lines"]
-        return {PROGRAM: print_program(found.program).encode(), "json": json_bytes({"program": fields})}
+        return {PROGRAM: print_program(extracted.program).encode(), "json": json_bytes({"program": fields})}
 
     samples = add_members(task, abstracted)
     return Outcome(samples, {"split": task.shard.params["split"], "samples": samples, **sums})
 
 
-def _fields(found: ExtractedProgram) -> dict[str, Any]:
+def _fields(extracted: ExtractedProgram) -> dict[str, Any]:
     return {
         "refused": PROGRAM_FOUND,
-        "f_score": round(found.f_score, 3),
-        "lines": sum(1 + len(block.lines) for block in found.program.blocks),
-        "leaves": found.leaves,
-        "centre": [float(f"{coordinate:.9g}") for coordinate in found.center],
-        "scale": float(f"{found.scale:.9g}"),
+        "f_score": round(extracted.f_score, 3),
+        "lines": sum(1 + len(block.lines) for block in extracted.program.blocks),
+        "leaves": extracted.leaves,
+        "centre": [float(f"{coordinate:.9g}") for coordinate in extracted.center],
+        "scale": float(f"{extracted.scale:.9g}"),
     }
 
 
 def report(plan: Plan) -> Sequence[str]:
     """Describe how many samples have a program, and how well these fit."""
-    found = figures(plan)
-    if found is None:
+    totals = figures(plan)
+    if totals is None:
         return []
     return [
-        f"{found['programs']:,} of {found['samples']:,} samples have a program, mean F-score {found['f_score']:.1f} %, "
-        f"{found['lines']:.1f} lines"
+        f"{totals['programs']:,} of {totals['samples']:,} samples have a program, "
+        f"mean F-score {totals['f_score']:.1f} %, {totals['lines']:.1f} lines"
     ]
 
 

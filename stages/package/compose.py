@@ -52,23 +52,23 @@ def compose_dataset(task: Task) -> Outcome:
         "sha256": index.digest(),
         "columns": column_kinds(),
     }
-    known = language_of(params["producer"]).decoder(task).sources
+    sources_by_name = language_of(params["producer"]).decoder(task).sources
     of_shards = ((shard["split"], _read(task, f"{shard['name']}.classes.json")) for shard in shards)
-    classes = count_classes(Classes.of(known), of_shards)
-    listed = table_bytes(classes)
-    counted = {"path": CLASSES, "count": len(classes), "sha256": hashlib.sha256(listed).hexdigest()}
-    sources = {name: source.sentence for name, source in known.items() if name in tallies}
+    classes = count_classes(Classes.of(sources_by_name), of_shards)
+    class_table = table_bytes(classes)
+    class_file = {"path": CLASSES, "count": len(classes), "sha256": hashlib.sha256(class_table).hexdigest()}
+    sources = {name: source.sentence for name, source in sources_by_name.items() if name in tallies}
     text = CardText(**params["card_text"], origins=params["origins"])
     files = {
         CARD: card(facts, shards, members, tallies, sources, classes, text).encode(),
-        CROISSANT: _text(croissant(facts, shards, members, indexed, counted, params["origins"], citation(facts))),
+        CROISSANT: _text(croissant(facts, shards, members, indexed, class_file, params["origins"], citation(facts))),
         SCHEMA: _text(params["schema"]),
-        CLASSES: listed,
+        CLASSES: class_table,
     }
     digests = {file: hashlib.sha256(content).hexdigest() for file, content in files.items()}
     digests[PREVIEW] = file_digest(task.input("package", f"{params['preview']}.png"))
     document = manifest(
-        *(facts, params["sections"], shards, members, digests, indexed, counted),
+        *(facts, params["sections"], shards, members, digests, indexed, class_file),
         *(params["measures"], params["software"], params["origins"]),
     )
     files[MANIFEST] = _text({**document, "graphs_share_split": params["graphs_share_split"]})

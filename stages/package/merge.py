@@ -56,8 +56,8 @@ def merge_shard(task: Task) -> Outcome:
                 task.progress(writer.samples, total)
     with task.output(f"{task.shard.name}.jsonl") as listing:
         listing.writelines(json_bytes(row) for row in rows)
-    with task.output(f"{task.shard.name}.classes.json") as counted:
-        counted.write(json_bytes(tally.counts()))
+    with task.output(f"{task.shard.name}.classes.json") as class_counts:
+        class_counts.write(json_bytes(tally.counts()))
     summary = {
         "path": path,
         "split": split,
@@ -77,27 +77,27 @@ def _samples(
     readers = {stage: read_shard(task.input(stage, f"{task.shard.name}.tar")) for stage in stages}
     heads = {stage: next(reader, None) for stage, reader in readers.items()}
     for sample in collection.samples():
-        made: dict[str, dict[str, bytes]] = {}
+        added_by_stage: dict[str, dict[str, bytes]] = {}
         for stage, reader in readers.items():
             head = heads[stage]
             if head is not None and head[0] == sample.key:
-                made[stage] = head[1]
+                added_by_stage[stage] = head[1]
                 heads[stage] = next(reader, None)
-        missing = [stage for stage in readers if stage not in made]
+        missing = [stage for stage in readers if stage not in added_by_stage]
         if missing:
             task.reject(sample.key, f"refused by {missing[0]}")
         else:
-            yield sample, *_merged(sample.key, made)
+            yield sample, *_merged(sample.key, added_by_stage)
     left = [f"{head[0]} of {stage}" for stage, head in heads.items() if head is not None]
     if left:
         raise ShardFailed(f"no sample of the collection has this key: {', '.join(left)}")
 
 
-def _merged(key: str, made: Mapping[str, dict[str, bytes]]) -> tuple[dict[str, bytes], dict[str, Any]]:
+def _merged(key: str, added_by_stage: Mapping[str, dict[str, bytes]]) -> tuple[dict[str, bytes], dict[str, Any]]:
     """Merge members and fields of all stages. Raises ShardFailed where two stages add the same."""
     members: dict[str, bytes] = {}
     fields: dict[str, Any] = {}
-    for stage, added in made.items():
+    for stage, added in added_by_stage.items():
         own = json.loads(added.pop("json", b"{}"))
         twice = [*(members.keys() & added.keys()), *(fields.keys() & own.keys())]
         if twice:

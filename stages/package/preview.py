@@ -47,22 +47,22 @@ def draw_preview(task: Task) -> Outcome:
     backend = sketches.renderer
     camera = BELOW if sketches.views[0].elevation < 0 else ABOVE
     collection, shards = Collection(task), params["shards"]
-    made = {stage: _members(task, stage, shards) for stage in params["rows"]}
+    members_by_stage = {stage: _members(task, stage, shards) for stage in params["rows"]}
     samples = [sample for shard in shards for sample in collection.samples(shard)]
-    whole = [sample for sample in samples if all(sample.key in added for added in made.values())]
-    whole = whole[:: -(-len(whole) // MAX_PREVIEW_CANDIDATES)]
-    shown = varied([(sample, collection.shape(sample)) for sample in whole], config.previewed)
-    variants = [Cell(_picture(shape, camera, backend), part_count(shape)) for _, shape in shown]
-    sections = [Section("Shapes", _rows(variants), f"{len(shown)} of {params['of']:,}")]
+    complete = [sample for sample in samples if all(sample.key in added for added in members_by_stage.values())]
+    complete = complete[:: -(-len(complete) // MAX_PREVIEW_CANDIDATES)]
+    chosen = varied([(sample, collection.shape(sample)) for sample in complete], config.previewed)
+    variants = [Cell(_picture(shape, camera, backend), part_count(shape)) for _, shape in chosen]
+    sections = [Section("Shapes", _rows(variants), f"{len(chosen)} of {params['of']:,}")]
     exemplars = [
         Cell(_picture(shape, ABOVE, backend), caption) for caption, shape in collection.decoder.shown(PREVIEW_COLUMNS)
     ]
     if exemplars:
         sections.insert(0, Section("Exemplars", _rows(exemplars), "input"))
-    for stage, added in made.items():
+    for stage, added in members_by_stage.items():
         row = members()[stage].row
         if row is not None:
-            cells = [Cell(row.draw(added[sample.key], camera, CELL_PIXELS)) for sample, _ in shown[:PREVIEW_COLUMNS]]
+            cells = [Cell(row.draw(added[sample.key], camera, CELL_PIXELS)) for sample, _ in chosen[:PREVIEW_COLUMNS]]
             sections.append(Section(row.title, _rows(cells), row.caption(task.config)))
     with task.output(f"{task.shard.name}.png") as stream:
         stream.write(picture_png(contact_sheet(sections, params["title"], CELL_PIXELS)))
@@ -115,9 +115,9 @@ def _trimmed(row: Sequence[Cell]) -> list[Cell]:
             .reshape(height, -1)
             .any(axis=1)
         )
-        shown = np.flatnonzero(marked)
-        tops.append(shown[0] / height if len(shown) else 0.5)
-        ends.append((shown[-1] + 1) / height if len(shown) else 0.5)
+        content_rows = np.flatnonzero(marked)
+        tops.append(content_rows[0] / height if len(content_rows) else 0.5)
+        ends.append((content_rows[-1] + 1) / height if len(content_rows) else 0.5)
     top, end = max(min(tops) - CELL_PAD_SHARE, 0.0), min(max(ends) + CELL_PAD_SHARE, 1.0)
     return [
         Cell(cell.picture[round(top * len(cell.picture)) : round(end * len(cell.picture))], cell.caption)

@@ -51,17 +51,17 @@ def plan(plan: Plan) -> list[Shard]:
     if not filled:
         return merged
     read = language_of(producer).reads(plan)
-    shown = [shard["name"] for shard in filled[:MAX_PREVIEW_SHARDS]]
-    rows = [stage for stage, added in members().items() if added.row and shown[0] in plan.shards(stage)]
+    preview_shards = [shard["name"] for shard in filled[:MAX_PREVIEW_SHARDS]]
+    rows = [stage for stage, added in members().items() if added.row and preview_shards[0] in plan.shards(stage)]
     preview = {
         "producer": producer,
         "title": plan.config.title or plan.config.name,
         "of": sum(shard["samples"] for shard in filled),
-        "shards": shown,
+        "shards": preview_shards,
         "rows": rows,
     }
-    drawn = (*read, *(f"{stage}/{name}" for name in shown for stage in (producer, *rows)))
-    picture = Shard(PREVIEW_SHARD, preview, drawn, member_modules())
+    preview_inputs = (*read, *(f"{stage}/{name}" for name in preview_shards for stage in (producer, *rows)))
+    picture = Shard(PREVIEW_SHARD, preview, preview_inputs, member_modules())
     declared, language = producers()[producer], language_of(producer)
     origins = declared.origins(plan)
     params = {
@@ -131,15 +131,15 @@ def publish(plan: Plan) -> Mapping[str, str]:
 
 def report(plan: Plan) -> Sequence[str]:
     """Describe the finished dataset."""
-    drawn = plan.summary("package", PREVIEW_SHARD)
-    if drawn is None or plan.summary("package", DATASET_SHARD) is None:
+    preview = plan.summary("package", PREVIEW_SHARD)
+    if preview is None or plan.summary("package", DATASET_SHARD) is None:
         return []
     summaries = [plan.summary("package", shard) or {} for shard in plan.shards("package")]
     shards = [summary for summary in summaries if summary.get("path")]
     samples, size = sum(shard["samples"] for shard in shards), sum(shard["bytes"] for shard in shards) / 1e6
     return [
         f"dataset {plan.config.name}: {samples:,} samples in {len(shards)} shards, {size:,.1f} MB",
-        f"preview drawn by {drawn['renderer']}, {drawn['renderer_version']}",
+        f"preview drawn by {preview['renderer']}, {preview['renderer_version']}",
     ]
 
 

@@ -109,9 +109,9 @@ def check_splits(manifest: Mapping[str, Any], rows: Sequence[SampleRow], finding
             findings.fault("splits", where, f"has the graph of {first}, which is in {first_split}")
     findings.look("splits", len(rows))
     for split, samples in manifest["splits"].items():
-        found = sum(row[2] == split for row in rows)
-        if found != samples and len(rows) == manifest["samples"]:
-            findings.fault("splits", MANIFEST, f"counts {samples} samples of {split}, the shards have {found}")
+        count = sum(row[2] == split for row in rows)
+        if count != samples and len(rows) == manifest["samples"]:
+            findings.fault("splits", MANIFEST, f"counts {samples} samples of {split}, the shards have {count}")
 
 
 def check_classes(folder: Path, tally: ClassCounts, findings: Findings) -> None:
@@ -130,10 +130,10 @@ def check_classes(folder: Path, tally: ClassCounts, findings: Findings) -> None:
         return
     findings.look("classes", len(listed))
     for what, split, number in sorted(stated.keys() | tally.keys()):
-        counted, found = stated.get((what, split, number), 0), tally[what, split, number]
-        if counted != found:
+        counted, actual = stated.get((what, split, number), 0), tally[what, split, number]
+        if counted != actual:
             findings.fault(
-                "classes", CLASSES, f"counts {counted} {what} of class {number} in {split}; there are {found}"
+                "classes", CLASSES, f"counts {counted} {what} of class {number} in {split}; there are {actual}"
             )
 
 

@@ -105,8 +105,8 @@ def array_faults(sample: PackagedSample, declared: list[dict[str, Any]]) -> Iter
         if array.dtype != np.dtype(member["dtype"]) or array.ndim != len(member["shape"]):
             yield f"{name} is {array.dtype} of {array.ndim} dimensions, not {member['dtype']} of {len(member['shape'])}"
             continue
-        for wanted, found in zip(member["shape"], array.shape, strict=True):
-            if (wanted if isinstance(wanted, int) else lengths.setdefault(wanted, found)) != found:
+        for wanted, actual in zip(member["shape"], array.shape, strict=True):
+            if (wanted if isinstance(wanted, int) else lengths.setdefault(wanted, actual)) != actual:
                 yield f"{name} has shape {array.shape}, not ({', '.join(map(str, member['shape']))})"
         if array.dtype.kind == "f" and not np.isfinite(array).all():
             yield f"{name} holds what is not a number"
@@ -150,9 +150,9 @@ def _part_faults(record: Mapping[str, Any], shape: Shape) -> Iterator[str]:
     for index, (part, name, label, number) in enumerate(
         zip(parts, shape.part_names, shape.part_labels.tolist(), shape.part_classes.tolist(), strict=True)
     ):
-        found = part["name"], part["label"], part["class"], part["instance"]
-        if found != (name, shape.labels[label], number, index):
-            yield f"its json calls part {index} {found}, and its source {(name, shape.labels[label], number, index)}"
+        actual = part["name"], part["label"], part["class"], part["instance"]
+        if actual != (name, shape.labels[label], number, index):
+            yield f"its json calls part {index} {actual}, and its source {(name, shape.labels[label], number, index)}"
             return
     poses = np.array([part["pose"] for part in parts])
     placed = shape.placements
@@ -179,22 +179,24 @@ def _count_faults(sample: PackagedSample) -> Iterator[str]:
             yield f"its json counts {sample.record['counts'][name]} {name} and lists {count}"
 
 
-def _same_mesh(found: bytes, made: bytes, size: float) -> bool:
+def _same_mesh(actual: bytes, expected: bytes, size: float) -> bool:
     """Whether two GLBs are equal up to the last digits of positions and matrices, which vary by processor."""
-    if found == made:
+    if actual == expected:
         return True
-    if len(found) != len(made) or found[:4] != b"glTF":
+    if len(actual) != len(expected) or actual[:4] != b"glTF":
         return False
-    starts = [28 + int.from_bytes(content[12:16], "little") for content in (found, made)]
+    starts = [28 + int.from_bytes(content[12:16], "little") for content in (actual, expected)]
     try:
-        one, two = (json.loads(content[20 : start - 8]) for content, start in zip((found, made), starts, strict=True))
+        actual_header, expected_header = (
+            json.loads(content[20 : start - 8]) for content, start in zip((actual, expected), starts, strict=True)
+        )
     except ValueError:
         return False
-    if not _alike(one, two, ROUNDING_SHARE * size):
+    if not _alike(actual_header, expected_header, ROUNDING_SHARE * size):
         return False
-    bodies = [content[start:] for content, start in zip((found, made), starts, strict=True)]
-    placed = {accessor["bufferView"] for accessor in two["accessors"] if "min" in accessor}
-    for number, view in enumerate(two["bufferViews"]):
+    bodies = [content[start:] for content, start in zip((actual, expected), starts, strict=True)]
+    placed = {accessor["bufferView"] for accessor in expected_header["accessors"] if "min" in accessor}
+    for number, view in enumerate(expected_header["bufferViews"]):
         begin = view.get("byteOffset", 0)
         stored, wanted = (body[begin : begin + view["byteLength"]] for body in bodies)
         if number not in placed and stored != wanted:
@@ -206,15 +208,15 @@ def _same_mesh(found: bytes, made: bytes, size: float) -> bool:
     return True
 
 
-def _alike(found: Any, made: Any, near: float) -> bool:
+def _alike(actual: Any, expected: Any, near: float) -> bool:
     """Whether two JSON values are equal, numbers that are no whole ones being as near as `near`."""
-    if isinstance(made, float) and isinstance(found, int | float):
-        return abs(found - made) <= near
-    if isinstance(made, dict) and isinstance(found, dict):
-        return found.keys() == made.keys() and all(_alike(found[name], made[name], near) for name in made)
-    if isinstance(made, list) and isinstance(found, list):
-        return len(found) == len(made) and all(_alike(*item, near) for item in zip(found, made, strict=True))
-    return bool(found == made)
+    if isinstance(expected, float) and isinstance(actual, int | float):
+        return abs(actual - expected) <= near
+    if isinstance(expected, dict) and isinstance(actual, dict):
+        return actual.keys() == expected.keys() and all(_alike(actual[name], expected[name], near) for name in expected)
+    if isinstance(expected, list) and isinstance(actual, list):
+        return len(actual) == len(expected) and all(_alike(*item, near) for item in zip(actual, expected, strict=True))
+    return bool(actual == expected)
 
 
 def _glb_fault(sample: PackagedSample) -> str:
@@ -234,10 +236,10 @@ def _glb_fault(sample: PackagedSample) -> str:
         if name not in scene.graph.nodes_geometry:
             return f"{name} is not in its glb"
         pose, geometry = scene.graph.get(name)
-        found, mesh = scene.geometry[geometry], shape.meshes[shape.assembly.types[part]]
-        stored = np.asarray(found.triangles) @ pose[:3, :3].T + pose[:3, 3]
+        actual, mesh = scene.geometry[geometry], shape.meshes[shape.assembly.types[part]]
+        stored = np.asarray(actual.triangles) @ pose[:3, :3].T + pose[:3, 3]
         placed = shape.assembly.poses[part]
-        made = mesh.vertices[mesh.faces] @ placed[:3, :3].T + placed[:3, 3]
-        if stored.shape != made.shape or np.abs(stored - made).max() > 1e-5 * sample.size:
+        expected = mesh.vertices[mesh.faces] @ placed[:3, :3].T + placed[:3, 3]
+        if stored.shape != expected.shape or np.abs(stored - expected).max() > 1e-5 * sample.size:
             return f"{name} has another surface in its glb than its source makes"
     return "its glb is not the one that its record says"

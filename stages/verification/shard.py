@@ -149,15 +149,15 @@ def _indexed(index: Path | None, path: str) -> dict[str, dict[str, Any]] | None:
 
 
 def _misplaced(
-    found: Mapping[str, Any] | None, record: Mapping[str, Any], path: str, offset: int, size: int
+    row: Mapping[str, Any] | None, record: Mapping[str, Any], path: str, offset: int, size: int
 ) -> Iterator[str]:
     """Yield a fault where the index row of a sample is missing or wrong."""
-    if found is None:
+    if row is None:
         yield "is not where the index says, or not in it"
         return
     with suppress(KeyError, TypeError):  # other checks report a record without these fields
         wanted = index_row(record, path, offset, size)
-        wrong = [name for name in wanted if found.get(name) != wanted[name]]
+        wrong = [name for name in wanted if row.get(name) != wanted[name]]
         if wrong:
             yield f"the index has another {', '.join(wrong)}"
 

@@ -40,12 +40,12 @@ def interrupted() -> bytes:
     raise KeyboardInterrupt
 
 
-def test_answer_comes_back_whole() -> None:
+def test_child_returns_the_whole_answer() -> None:
     content = np.random.default_rng(0).bytes(5_000_000)
     assert in_child(lambda: content, cpu_seconds=20, memory_mb=200) == content
 
 
-def test_refusal_keeps_its_class_and_its_words() -> None:
+def test_refusal_keeps_class_and_message() -> None:
     with pytest.raises(Refused, match=r"^the file, line 3: 'x' is no number$"):
         in_child(refuse, cpu_seconds=20, memory_mb=200, refusal=Refused)
 
@@ -61,7 +61,7 @@ def test_refusal_keeps_its_class_and_its_words() -> None:
         (lambda: {}["key"], "something is in it that its reader does not know"),
     ],
 )
-def test_escape_is_one_sentence(work: Callable[[], bytes], reported: str) -> None:
+def test_unexpected_error_is_one_sentence(work: Callable[[], bytes], reported: str) -> None:
     with pytest.raises(ChildFailed) as caught:
         in_child(work, cpu_seconds=10, memory_mb=200)
     assert str(caught.value).startswith(reported)

@@ -21,7 +21,7 @@ def shapemill(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
-def test_stages_are_found_by_folder_and_stand_after_what_they_read() -> None:
+def test_stages_are_found_by_folder_and_ordered_by_inputs() -> None:
     stages = find_stages(PACKAGE)
     assert set(stages) == {"grain", "flour", "salt", "bread"}
     assert [name for name in stages if name != "salt"] == ["grain", "flour", "bread"]
@@ -66,7 +66,7 @@ def test_help_groups_the_commands_of_engine_and_rooms_and_imports_nothing_heavy(
     assert not {"numpy", "scipy", "numba", "torch", "trimesh", "joblib"} & set(imported)
 
 
-def test_status_names_the_shards_that_are_set_aside(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_status_names_quarantined_shards(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config(flour={"trouble": {"harvest1-1": "fails"}})
     run_toy_stages(config, tmp_path / "out", "salt", "grain", "flour")
     status = shapemill("status", "--config", config, "--out", tmp_path / "out")
@@ -74,7 +74,7 @@ def test_status_names_the_shards_that_are_set_aside(tmp_path: Path, write_config
     assert [line.split()[1:3] for line in status.stdout.splitlines() if line.startswith("flour ")] == [["5/6", "1"]]
 
 
-def test_seed_of_the_command_line_stands_in_place_of_the_configs(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_seed_of_the_command_line_replaces_that_of_the_config(tmp_path: Path, write_config: WriteConfig) -> None:
     shapemill("run", "grain", "--config", write_config(), "--out", tmp_path / "asked", "--seed", 11)
     run_toy_stages(write_config(seed=11), tmp_path / "written", "grain")
     assert made(tmp_path / "asked") == made(tmp_path / "written")
@@ -90,7 +90,7 @@ def test_seed_of_the_command_line_stands_in_place_of_the_configs(tmp_path: Path,
         (("run", "flour"), "flour reads grain, and 2 of its 2 shards are not made"),
     ],
 )
-def test_wrong_call_exits_with_2_and_says_what_is_right(
+def test_wrong_call_exits_with_2_and_names_the_right_one(
     tmp_path: Path, write_config: WriteConfig, arguments: tuple[str, ...], message: str
 ) -> None:
     given = arguments if "--config" in arguments else (*arguments, "--config", str(write_config()))
@@ -107,7 +107,9 @@ def test_wrong_config_exits_with_2_before_any_work(tmp_path: Path, write_config:
     assert not (tmp_path / "out").exists()
 
 
-def test_verify_finds_a_flipped_byte_and_the_next_run_mends_it(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_verify_finds_a_flipped_byte_and_the_next_run_rebuilds_the_shard(
+    tmp_path: Path, write_config: WriteConfig
+) -> None:
     config, out = write_config(), tmp_path / "out"
     run_toy_stages(config, out)
     whole = made(out)

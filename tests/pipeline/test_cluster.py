@@ -57,7 +57,7 @@ def cluster() -> Iterator[Cluster]:
 
 
 @pytest.mark.slow
-def test_cluster_makes_the_same_bytes_though_workers_die_and_a_shard_kills_its_own(
+def test_cluster_makes_the_same_bytes_despite_dying_workers(
     tmp_path: Path, write_config: WriteConfig, cluster: Cluster
 ) -> None:
     out = tmp_path / "out"
@@ -82,7 +82,7 @@ def test_cluster_makes_the_same_bytes_though_workers_die_and_a_shard_kills_its_o
 
 
 @pytest.mark.slow
-def test_shard_ends_with_the_run_that_wanted_it_and_the_cluster_stays(
+def test_shard_ends_with_its_run_and_the_cluster_survives(
     tmp_path: Path, write_config: WriteConfig, cluster: Cluster
 ) -> None:
     out, small = tmp_path / "out", {"fields": 1, "wanted": 1}

@@ -68,7 +68,7 @@ def names(*starts: str) -> set[str]:
     return {module for module in transitive_imports(starts) if not module.startswith("pipeline")}
 
 
-def test_every_way_of_importing_is_followed_wherever_it_stands(write: Write) -> None:
+def test_every_kind_of_import_is_followed_anywhere_in_a_file(write: Write) -> None:
     write("barn/hall.py", "import barn.stairs.steps\nfrom barn import cellar\ndef late():\n    from . import attic\n")
     write("barn/stairs/steps.py", "from ..garden import *\nfrom yard.gate import Hinge as latch\n")
     write("barn/garden.py", "import numpy, json, nowhere\nif True:\n    import yard.shed as shed\n")
@@ -79,7 +79,7 @@ def test_every_way_of_importing_is_followed_wherever_it_stands(write: Write) -> 
     assert names("yard.gate") == {"yard", "yard.gate"}
 
 
-def test_package_may_lie_in_several_folders(write: Write, tmp_path: Path) -> None:
+def test_package_may_have_several_folders(write: Write, tmp_path: Path) -> None:
     write("barn/__init__.py", f"__path__.append({str(tmp_path / 'annex')!r})")
     write("barn/hall.py", "import barn.guests")
     (tmp_path / "annex").mkdir()
@@ -88,7 +88,7 @@ def test_package_may_lie_in_several_folders(write: Write, tmp_path: Path) -> Non
     assert names("barn.hall") == {"barn", "barn.hall", "barn.guests"}
 
 
-def test_start_that_is_not_there_is_reported(write: Write) -> None:
+def test_missing_start_is_reported(write: Write) -> None:
     with pytest.raises(ValueError, match=r"no Python file of module barn\.none"):
         transitive_imports(["barn.none"])
 
@@ -129,7 +129,7 @@ def test_every_word_of_code_counts(write: Write, edited: str) -> None:
     assert {module for module in before if before[module] != after[module]} == {"barn.stairs"}
 
 
-def test_what_a_folder_declares_beside_its_stage_counts(write: Write) -> None:
+def test_declarations_in_the_folder_of_a_stage_count(write: Write) -> None:
     write("barn/stone/stage.py", "")
     write("barn/stone/language.py", "import barn.words")
     write("barn/stone/other.py", "")
@@ -187,7 +187,7 @@ def test_engine_code_counts_only_where_it_makes_bytes() -> None:
         assert engine == {"pipeline", "pipeline.errors", "pipeline.randomness", "pipeline.shards"} | own, name
 
 
-def test_chair_does_not_know_the_vase() -> None:
+def test_chair_does_not_import_the_vase() -> None:
     library = {f"stages.programs.library.{item}" for item in ("cabinet", "ceiling_lamp", "chair", "table", "vase")}
     assert not library & names(*entry_points("stages.programs.stage"))
     chair = names(*entry_points("stages.programs.stage", ["stages.programs.library.chair"]))
@@ -216,7 +216,7 @@ class TestNotes:
         (found,) = (tmp_path / "src/barn/__pycache__").glob("loft.*.imports.json")
         return found
 
-    def test_says_what_the_file_says(self, digests: Callable[[str], dict[str, str]], tmp_path: Path) -> None:
+    def test_note_follows_the_file(self, digests: Callable[[str], dict[str, str]], tmp_path: Path) -> None:
         first = digests("import barn.stone\nGRIT = 1")
         assert self.note(tmp_path).is_file()
         assert digests("") == first
@@ -233,7 +233,7 @@ class TestNotes:
         assert digests("") == first
         assert self.note(tmp_path).read_bytes() == whole
 
-    def test_are_not_needed(self, digests: Callable[[str], dict[str, str]], tmp_path: Path) -> None:
+    def test_notes_are_optional(self, digests: Callable[[str], dict[str, str]], tmp_path: Path) -> None:
         first = digests("GRIT = 1")
         folder = self.note(tmp_path).parent
         for path in folder.iterdir():

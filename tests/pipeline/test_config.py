@@ -64,7 +64,7 @@ def test_sections_left_out_take_their_defaults(tmp_path: Path) -> None:
     assert config.section(Bakery).loaves == []
 
 
-def test_override_stands_in_place_of_the_file(tmp_path: Path) -> None:
+def test_override_replaces_the_value_of_the_file(tmp_path: Path) -> None:
     assert load(tmp_path, "name: bread\nseed: 3\n", seed=8).seed == 8
 
 
@@ -145,7 +145,7 @@ def test_all_mistakes_are_reported_together(tmp_path: Path) -> None:
     assert len(mistakes(tmp_path, "name: B\nseed: x\noven: {heat: 1, mode: 2}\nbakery: {loafs: 1}\n")) == 5
 
 
-def test_missing_file_names_the_nearest_that_is_there(tmp_path: Path) -> None:
+def test_missing_file_names_the_nearest_existing_one(tmp_path: Path) -> None:
     (tmp_path / "sourdough.txt").write_text("wait")
     reported = mistakes(tmp_path, f"name: bread\nbakery:\n  recipe: {tmp_path}/sourdoughs.txt\n")
     assert reported == [
@@ -153,7 +153,7 @@ def test_missing_file_names_the_nearest_that_is_there(tmp_path: Path) -> None:
     ]
 
 
-def test_missing_folder_names_the_last_that_is_there(tmp_path: Path) -> None:
+def test_missing_folder_names_the_last_existing_parent(tmp_path: Path) -> None:
     (reported,) = mistakes(tmp_path, f"name: bread\nbakery:\n  recipe: {tmp_path}/a/b/c.txt\n")
     assert reported.endswith(f"there is no file a/b/c.txt; of its folders {tmp_path} is the last that is there")
 
@@ -204,12 +204,12 @@ def test_hostile_config_is_one_short_mistake(tmp_path: Path, text: str) -> None:
 
 
 @pytest.mark.parametrize("value", ["0", "[]", "''", "false"])
-def test_section_that_holds_another_thing_is_no_default(tmp_path: Path, value: str) -> None:
+def test_section_of_another_type_is_no_default(tmp_path: Path, value: str) -> None:
     (reported,) = mistakes(tmp_path, f"name: bread\noven: {value}\n")
     assert reported.startswith("bread.yaml:2: oven: input should be an object, and is ")
 
 
-def test_aliases_that_stand_for_little_are_read(tmp_path: Path) -> None:
+def test_small_aliases_are_read(tmp_path: Path) -> None:
     text = "name: bread\nbakery:\n  loaves:\n    - &rye {flour: rye}\n    - *rye\n"
     assert [loaf.flour for loaf in load(tmp_path, text).section(Bakery).loaves] == ["rye", "rye"]
 

@@ -10,7 +10,7 @@ from tests.pipeline.test_config import Bakery
 from tests.stages.shape.collection.absent import ABSENT_STAGES
 
 
-def test_keys_of_entries_of_several_kinds_say_whose_they_are() -> None:
+def test_keys_of_alternative_models_name_their_kind() -> None:
     """What all kinds know stands once, before what each knows besides."""
     stage = replace(next(iter(ABSENT_STAGES.values())), config=Bakery)
     rows = [
@@ -30,7 +30,7 @@ def test_keys_of_entries_of_several_kinds_say_whose_they_are() -> None:
     assert ("`bakery.loaves[].grams`", "Weight; unit: grams") in [(row[0], row[-1]) for row in rows]
 
 
-def test_what_people_wrote_above_the_keys_stays(tmp_path: Path) -> None:
+def test_text_above_the_keys_is_kept(tmp_path: Path) -> None:
     stages = {"bakery": replace(next(iter(ABSENT_STAGES.values())), config=Bakery)}
     (tmp_path / "bakery.md").write_text("# Section `bakery`\n\nBread.\n\n## Keys\n\nold\n")
     assert outdated_pages(tmp_path, stages) == ["dataset", "bakery"]

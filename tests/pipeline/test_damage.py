@@ -43,7 +43,7 @@ def again(before: dict[str, int], out: Path) -> set[str]:
         (2, ["flour/harvest1-0", "grain/harvest1-0"], {"salt": {"spoons": 2}}, ("salt", "bread")),
     ],
 )
-def test_damage_is_named_and_mended_and_the_bytes_are_those_of_an_undisturbed_run(
+def test_corruption_is_named_and_rebuilt_to_the_same_bytes(
     tmp_path: Path,
     write_config: WriteConfig,
     workers: int,
@@ -67,7 +67,7 @@ def test_damage_is_named_and_mended_and_the_bytes_are_those_of_an_undisturbed_ru
     assert made(out) == made(tmp_path / "calm")
 
 
-def test_damage_in_the_running_stage_itself_is_mended(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_corruption_in_the_running_stage_is_rebuilt(tmp_path: Path, write_config: WriteConfig) -> None:
     out = tmp_path / "out"
     run_toy_stages(write_config(), out, "grain")
     whole, before = made(out), dict(record_times(out))
@@ -78,7 +78,7 @@ def test_damage_in_the_running_stage_itself_is_mended(tmp_path: Path, write_conf
     assert made(out) == whole
 
 
-def test_input_that_comes_back_with_other_bytes_is_read_again(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_input_rebuilt_with_other_bytes_is_read_again(tmp_path: Path, write_config: WriteConfig) -> None:
     out = tmp_path / "out"
     run_toy_stages(write_config(), out)
     before = dict(record_times(out))
@@ -97,7 +97,7 @@ def test_input_that_comes_back_with_other_bytes_is_read_again(tmp_path: Path, wr
     assert "6 shards are rebuilt: an input has other bytes" in (out / WORK / "log.txt").read_text()
 
 
-def test_record_with_a_flipped_byte_has_its_shard_made_again(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_record_with_a_flipped_byte_has_its_shard_rebuilt(tmp_path: Path, write_config: WriteConfig) -> None:
     out = tmp_path / "out"
     run_toy_stages(write_config(), out)
     whole = made(out)
@@ -125,7 +125,7 @@ class Other(StrictModel):
     """Nothing to say."""
 
 
-def test_disk_that_damages_what_was_made_again_just_now_stops_everything(tmp_path: Path) -> None:
+def test_disk_that_corrupts_a_rebuilt_shard_stops_everything(tmp_path: Path) -> None:
     stages = {
         "first": Stage("first", __name__, StrictModel, (), lambda _: [Shard("a")], write_file, lambda _: 0),
         "second": Stage(
@@ -193,7 +193,7 @@ def test_corrupted_files_of_the_engine_are_replaced(tmp_path: Path, write_config
         remove(stage / "failed/bag-1.json")
 
 
-def test_folder_in_place_of_a_shard_is_taken_for_damage(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_folder_in_place_of_a_shard_counts_as_corruption(tmp_path: Path, write_config: WriteConfig) -> None:
     out, config = tmp_path / "out", write_config(grain={"fields": 1, "wanted": 8})
     run_toy_stages(config, out, "grain")
     whole = made(out)

@@ -73,7 +73,7 @@ def planned(places: DatasetPaths, asked: Config) -> tuple[dict[str, list[str]], 
     return {row[0]: [row[1], row[2], " ".join(row[3:5])] for row in rows}, [*lines[:first], *lines[last + 1 :]]
 
 
-def test_a_trial_of_few_samples_is_scaled_to_what_is_asked_and_leaves_nothing(tmp_path: Path) -> None:
+def test_trial_is_scaled_to_the_requested_samples_and_leaves_no_files(tmp_path: Path) -> None:
     rows, notes = planned(DatasetPaths(tmp_path, "toys"), config())
     assert rows == {
         "corn": ["4", "400", "400.0 kB"],
@@ -85,7 +85,7 @@ def test_a_trial_of_few_samples_is_scaled_to_what_is_asked_and_leaves_nothing(tm
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
-def test_what_is_made_is_counted_and_needs_no_trial(tmp_path: Path) -> None:
+def test_finished_stages_are_counted_without_a_trial(tmp_path: Path) -> None:
     places, asked = DatasetPaths(tmp_path, "toys"), config(250)
     for name in STAGES:
         run_stage(name, STAGES, asked, places, workers=1)
@@ -94,7 +94,7 @@ def test_what_is_made_is_counted_and_needs_no_trial(tmp_path: Path) -> None:
     assert not any("trial" in note for note in notes)
 
 
-def test_what_is_made_of_a_stage_tells_what_the_rest_will_take(tmp_path: Path) -> None:
+def test_finished_shards_of_a_stage_predict_the_rest(tmp_path: Path) -> None:
     places, asked = DatasetPaths(tmp_path, "toys"), config(250)
     for name in STAGES:
         run_stage(name, STAGES, asked, places, workers=1)

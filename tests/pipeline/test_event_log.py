@@ -53,7 +53,7 @@ def test_time_left_does_not_jump_when_shards_end_together() -> None:
     assert max(map(abs, steps)) < 0.1 * max(answers)
 
 
-def test_what_was_done_before_the_start_says_nothing_of_the_pace() -> None:
+def test_work_before_the_start_does_not_change_the_pace() -> None:
     answers = dict(reported(lambda now: 900 + now, 1000, 60))
     assert answers[50.0] == pytest.approx(50, abs=1)
 
@@ -63,7 +63,7 @@ def test_time_left_is_unknown_without_a_count_and_at_the_end() -> None:
     assert TimeLeft().after(5.0, 5.0, 10.0) is None
 
 
-def test_figures_count_samples_where_the_plan_says_how_many_there_will_be() -> None:
+def test_progress_counts_samples_where_the_plan_has_their_number() -> None:
     known = Progress(planned=24, done=12, failed=1, work=1200, worked=512.6, samples=500, rejects=7)
     assert progress_text(known, 41.0, 58.2) == (
         "512 of 1,200 samples, 12 of 24 shards, 7 rejects, 1 quarantined, 41s elapsed, about 58s left"
@@ -104,7 +104,7 @@ def test_a_terminal_shows_a_bar_with_samples_while_it_works_and_none_afterwards(
     assert left[2:] == [""]
 
 
-def test_a_stage_without_a_plan_says_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_stage_without_a_plan_prints_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     idle = Stage("idle", 1, StrictModel, (), lambda _: [], lambda _: Outcome(0), lambda _: 0)
     config = Config("toys", "1.0.0", 0, {"idle": StrictModel()}, tmp_path / "toys.yaml")
     assert run_stage("idle", {"idle": idle}, config, DatasetPaths(tmp_path, "toys"), workers=1).left == 0

@@ -78,7 +78,7 @@ def test_shard_whose_worker_dies_once_is_made_by_another(tmp_path: Path, write_c
     assert (tmp_path / "marks/harvest1-0").read_text() == "xx"
 
 
-def test_shard_that_keeps_killing_its_worker_is_set_aside_and_the_rest_is_made(
+def test_shard_that_keeps_killing_its_worker_is_quarantined_and_the_rest_is_made(
     tmp_path: Path, write_config: WriteConfig
 ) -> None:
     config = write_config(flour={"trouble": {"harvest0-1": "dies"}})
@@ -103,7 +103,7 @@ def test_shard_that_fails_once_is_made_at_the_second_try(tmp_path: Path, write_c
     assert (tmp_path / "marks/harvest0-1").read_text() == "xx"
 
 
-def test_failing_shard_is_tried_three_times_then_set_aside_until_the_next_run(
+def test_failing_shard_is_tried_three_times_then_quarantined_until_the_next_run(
     tmp_path: Path, write_config: WriteConfig
 ) -> None:
     config = write_config(flour={"trouble": {"harvest2-0": "fails"}})
@@ -201,7 +201,7 @@ def test_second_run_in_the_same_place_is_refused(tmp_path: Path, write_config: W
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_signal_ends_the_run_with_its_workers_stopped_ones_too_and_leaves_whole_files(
+def test_signal_ends_the_run_and_all_workers_and_leaves_complete_files(
     tmp_path: Path, write_config: WriteConfig, number: int, code: int
 ) -> None:
     config = write_config(flour={"seconds": 0.5})

@@ -72,7 +72,7 @@ def test_fingerprint_depends_on_everything_that_bytes_depend_on() -> None:
     assert of() == of()
 
 
-def test_changed_shard_changes_what_reads_it_and_nothing_else(tmp_path: Path) -> None:
+def test_changed_shard_changes_only_its_readers(tmp_path: Path) -> None:
     before = prints(tmp_path, FIRST, SECOND)
     changed = stage("first", Shard("a", {"size": 2}), Shard("b", {"size": 1}))
     after = prints(tmp_path, changed, SECOND)
@@ -116,7 +116,7 @@ def test_plan_sees_only_the_stages_and_sections_that_it_reads(tmp_path: Path) ->
         seen[0].shards("third")
 
 
-def test_record_survives_its_way_to_disk_and_back(tmp_path: Path) -> None:
+def test_record_survives_writing_and_reading(tmp_path: Path) -> None:
     record = ShardRecord(
         "s",
         "a",
@@ -135,7 +135,7 @@ def test_record_survives_its_way_to_disk_and_back(tmp_path: Path) -> None:
     assert read_record(tmp_path / "none.json") is None
 
 
-def test_record_with_a_flipped_byte_counts_as_none(tmp_path: Path) -> None:
+def test_record_with_a_flipped_byte_is_ignored(tmp_path: Path) -> None:
     record = ShardRecord("s", "a", "f" * 64, {}, {}, {"a.tar": {"sha256": "0", "bytes": 3}}, 2, {}, 0.5, 9, {"k": 10})
     path, content = tmp_path / "a.json", record.to_bytes()
     for place in range(len(content) - 1):

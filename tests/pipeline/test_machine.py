@@ -38,7 +38,7 @@ def set_up(project: Path, tools: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_set_up_names_the_packages_where_there_is_no_apt(tmp_path: Path) -> None:
+def test_set_up_names_the_packages_without_apt(tmp_path: Path) -> None:
     tools = tmp_path / "tools"
     tools.mkdir()
     done = set_up(project_with_missing_library(tmp_path / "project"), tools)
@@ -80,7 +80,7 @@ def test_doctor_finds_a_library_that_does_not_load_and_names_the_package(tmp_pat
     assert lines[-1] == "2 of these must be mended"
 
 
-def test_workers_count_alike_whatever_the_shell_says(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_workers_have_the_same_environment_in_every_shell(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Kernels of OpenBLAS for other processors give other last digits; a worker has the same ones everywhere."""
     from pipeline.workers import _ENVIRONMENT
 

@@ -81,7 +81,7 @@ def test_train_names_the_model_that_was_asked_for() -> None:
     assert not any("--only" in run for run in calls("train"))
 
 
-def test_recover_looks_at_the_input_that_was_given() -> None:
+def test_recover_reads_the_given_input() -> None:
     (run,) = calls("recover", "PROGRAM=chair", "INPUT=-odd name.ply", "OUT=/data")
     assert run[2:] == [
         "recover", "--out", "/data", "--program", "chair", "--up", "", "--", "-odd name.ply",
@@ -108,7 +108,7 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     }  # fmt: skip
 
 
-def test_every_target_gets_every_value_as_it_was_said(tmp_path: Path) -> None:
+def test_every_target_gets_every_value_unchanged(tmp_path: Path) -> None:
     said = nasty(tmp_path)
     targets = ("package", "plan", "status", "verify", "inspect", "eval", "doctor", "clean")
     arguments = [f"{name}={said}" for name in VARIABLES]
@@ -129,7 +129,7 @@ def test_values_from_the_environment_are_as_safe(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("target", "variable"), [("status", "CONFIG"), ("inspect", "MESH"), ("inspect", "PROGRAM")])
-def test_the_error_names_the_file_that_was_said(tmp_path: Path, target: str, variable: str) -> None:
+def test_the_error_names_the_given_file(tmp_path: Path, target: str, variable: str) -> None:
     said = nasty(tmp_path)
     done = make(target, f"{variable}={said}", f"PYTHON={sys.executable}", f"OUT={tmp_path / 'out'}")
     assert done.returncode == 2

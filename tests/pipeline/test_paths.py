@@ -16,7 +16,7 @@ def test_a_file_comes_with_its_folders_and_its_path(tmp_path: Path) -> None:
     assert path.read_bytes() == b"first"
 
 
-def test_who_reads_the_old_file_meanwhile_reads_all_of_it(tmp_path: Path) -> None:
+def test_reader_of_the_old_file_gets_all_of_it(tmp_path: Path) -> None:
     path = write_file(tmp_path / "a.txt", b"first")
     with path.open("rb") as stream:
         write_file(path, b"second")
@@ -34,12 +34,12 @@ def test_a_file_that_cannot_be_written_is_named_and_leaves_nothing(tmp_path: Pat
 
 
 @pytest.mark.parametrize("file", ["", "/etc/passwd", "../other/file", "a/../b", "a//b", ".work/a/file", "./a"])
-def test_what_other_datasets_publish_is_looked_for_below_the_output_folder_alone(file: str, tmp_path: Path) -> None:
+def test_published_files_are_searched_only_below_the_output_folder(file: str, tmp_path: Path) -> None:
     places = DatasetPaths(tmp_path, "one")
     assert places.published("other-models/a/weights") == tmp_path / "other-models/a/weights"
     with pytest.raises(ValueError, match="no file below the output folder"):
         places.published(file)
 
 
-def test_a_trial_finds_what_is_published_beside_the_dataset_itself(tmp_path: Path) -> None:
+def test_trial_finds_files_published_in_the_output_folder(tmp_path: Path) -> None:
     assert DatasetPaths(tmp_path / "trial", "one", tmp_path).published("other/file") == tmp_path / "other/file"

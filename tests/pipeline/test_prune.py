@@ -40,7 +40,9 @@ def test_the_dataset_is_the_same_and_another_run_finds_nothing_to_do(tmp_path: P
     assert made(out) == before
 
 
-def test_verify_finds_it_whole_and_status_counts_what_is_on_the_disk(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_verify_accepts_a_pruned_dataset_and_status_counts_existing_files(
+    tmp_path: Path, write_config: WriteConfig
+) -> None:
     config, out = write_config(keep="dataset"), tmp_path / "out"
     run_toy_stages(config, out)
     loaded = load(config)
@@ -51,7 +53,7 @@ def test_verify_finds_it_whole_and_status_counts_what_is_on_the_disk(tmp_path: P
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_what_is_needed_again_is_made_again_and_goes_again(
+def test_pruned_files_are_rebuilt_on_demand_and_pruned_again(
     tmp_path: Path, write_config: WriteConfig, workers: int
 ) -> None:
     edited = {"salt": {"spoons": 2}}
@@ -67,7 +69,7 @@ def test_what_is_needed_again_is_made_again_and_goes_again(
     assert "was pruned" in (out / WORK / "log.txt").read_text()
 
 
-def test_keep_all_brings_it_back(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_keep_all_rebuilds_pruned_files(tmp_path: Path, write_config: WriteConfig) -> None:
     run_toy_stages(write_config(), tmp_path / "all")
     out = tmp_path / "out"
     run_toy_stages(write_config(keep="dataset"), out)
@@ -76,7 +78,7 @@ def test_keep_all_brings_it_back(tmp_path: Path, write_config: WriteConfig) -> N
     assert kept == made(tmp_path / "all")
 
 
-def test_a_kill_while_files_go_leaves_records_that_count(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_kill_while_pruning_leaves_valid_records(tmp_path: Path, write_config: WriteConfig) -> None:
     """The note is there before the first file goes; what is left goes at the end of the next run."""
     run_toy_stages(write_config(), tmp_path / "all")
     config, out = write_config(keep="dataset"), tmp_path / "out"

@@ -111,7 +111,7 @@ def test_shards_no_longer_planned_are_removed(tmp_path: Path, write_config: Writ
     assert [path.name for path in (salt / "records").iterdir()] == ["bag-0.json"]
 
 
-def test_missing_or_shortened_file_is_made_again(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_missing_or_shortened_file_is_rebuilt(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config()
     run_toy_stages(config, tmp_path / "out", "grain")
     whole = made(tmp_path / "out")
@@ -122,7 +122,7 @@ def test_missing_or_shortened_file_is_made_again(tmp_path: Path, write_config: W
     assert made(tmp_path / "out") == whole
 
 
-def test_unreadable_record_counts_as_none(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_unreadable_record_is_ignored(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config()
     run_toy_stages(config, tmp_path / "out", "grain")
     record = tmp_path / "out" / WORK / "grain/records/harvest0-0.json"
@@ -130,7 +130,7 @@ def test_unreadable_record_counts_as_none(tmp_path: Path, write_config: WriteCon
     assert run_toy_stages(config, tmp_path / "out", "grain")["grain"].made == 1
 
 
-def test_files_left_half_written_are_removed(tmp_path: Path, write_config: WriteConfig) -> None:
+def test_half_written_files_are_removed(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config()
     run_toy_stages(config, tmp_path / "out", "grain")
     whole = made(tmp_path / "out")
@@ -250,7 +250,7 @@ class LoomsConfig(StrictModel):
     colour: str = "red"
 
 
-def test_nothing_runs_beside_a_shard_that_takes_all_threads(tmp_path: Path) -> None:
+def test_shard_with_all_threads_runs_alone(tmp_path: Path) -> None:
     threads = {"a": 1, "b": 2, "c": 1, "d": 1, "e": 9}
     weave(tmp_path, stage_of([Shard(name, threads=count) for name, count in threads.items()]), workers=2)
     spans = {name: json.loads((tmp_path / WORK / f"looms/{name}.json").read_text()) for name in threads}
@@ -259,7 +259,7 @@ def test_nothing_runs_beside_a_shard_that_takes_all_threads(tmp_path: Path) -> N
         assert all(span[1] <= began or ended <= span[0] for name, span in spans.items() if name != wide)
 
 
-def test_only_what_was_asked_for_is_made_with_what_it_reads(tmp_path: Path) -> None:
+def test_only_makes_the_named_shards_and_their_inputs(tmp_path: Path) -> None:
     shards = [Shard("wool"), Shard("sock-0", inputs=("looms/wool",)), Shard("sock-1", inputs=("looms/sock-0",))]
     stages = stage_of([*shards, Shard("sock2"), Shard("hat")])
     assert weave(tmp_path, stages, only="sock") == 3
@@ -269,7 +269,7 @@ def test_only_what_was_asked_for_is_made_with_what_it_reads(tmp_path: Path) -> N
     assert weave(tmp_path, stages) == 2
 
 
-def test_stage_may_publish_what_is_whole_before_all_is_made(tmp_path: Path) -> None:
+def test_stage_may_publish_complete_results_before_all_shards_are_made(tmp_path: Path) -> None:
     def whole(plan: Plan) -> dict[str, str]:
         return {f"woven/{name}": f"{name}.json" for name in ("a", "b") if plan.summary("looms", name) is not None}
 

@@ -33,7 +33,7 @@ def bag(tmp_path: Path, write_config: WriteConfig) -> Job:
     return inventory.job("salt", Shard("bag-0", {"samples": 1}))
 
 
-def test_shard_without_progress_is_ended_tried_again_and_set_aside_and_the_rest_is_made(
+def test_stalled_shard_is_killed_retried_and_quarantined_and_the_rest_is_made(
     tmp_path: Path, write_config: WriteConfig, capfd: pytest.CaptureFixture[str]
 ) -> None:
     config = write_config(
@@ -55,7 +55,7 @@ def test_shard_without_progress_is_ended_tried_again_and_set_aside_and_the_rest_
     assert not [pid for pid in descendants(os.getpid()) - before if "LokyProcess" in _command(pid)]
 
 
-def test_what_counts_as_progress_is_that_something_changes(bag: Job) -> None:
+def test_any_change_counts_as_progress(bag: Job) -> None:
     places = bag.paths.stage("salt")
     watch, start, growing = StallWatch(0.025, places), time.monotonic(), places.root / ".bag-0.txt.tmp"
     (places.progress / "bag-0").write_text("1 4")
@@ -87,7 +87,7 @@ def test_time_in_which_the_engine_was_stopped_does_not_count(bag: Job) -> None:
     assert not watch.stalled([bag])
 
 
-def test_idle_worker_that_was_stopped_does_not_hold_the_end(bag: Job, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stopped_idle_worker_does_not_delay_the_end(bag: Job, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "_EXIT_SECONDS", 0.5)
     crew, before = Workers(1, bag.paths.worker_output), descendants(os.getpid())
     crew.submit(bag)

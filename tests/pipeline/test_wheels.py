@@ -71,7 +71,7 @@ def dynamic_names(path: Path) -> tuple[set[str], set[str]]:
     return known, needed
 
 
-def test_what_is_pinned_is_all_that_the_code_asks_for_and_all_that_this_needs() -> None:
+def test_pinned_packages_are_those_that_the_code_needs() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"].values()
     asked = [Requirement(item) for item in (*project["dependencies"], *(item for extra in extras for item in extra))]
@@ -91,7 +91,7 @@ def test_what_is_pinned_is_all_that_the_code_asks_for_and_all_that_this_needs() 
     assert {name for name, _ in reached} == set(versions), "requirements.lock pins what nothing asks for"
 
 
-def test_no_compiler_is_needed_to_install_what_is_pinned() -> None:
+def test_pinned_packages_install_without_a_compiler() -> None:
     for name in built_here():
         assert not list(elf_files(distribution(name))), f"{name} has no wheel and is not plain Python"
 

@@ -47,9 +47,7 @@ def nodes(part: PartNode) -> list[PartNode]:
 
 
 @pytest.mark.parametrize(("count", "storeys", "children"), [(4, 1, 9), (4, 5, 9), (6, 7, 5), (3, 4, 2)])
-def test_every_part_is_a_leaf_once_and_assemblies_are_small_and_hang_together(
-    count: int, storeys: int, children: int
-) -> None:
+def test_every_part_is_one_leaf_and_assemblies_are_small_and_connected(count: int, storeys: int, children: int) -> None:
     shape = towers(count, storeys)
     root = hierarchy_of(shape, children, Boxes()).root
     leaves = list(root.leaves())

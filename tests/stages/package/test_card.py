@@ -23,7 +23,7 @@ CLASSES = {"sha256": "12" * 32}
 SHARD = {"path": "data/train/toy.tar", "split": "train", "samples": 1, "bytes": 1, "sha256": "34" * 32}
 
 
-def test_the_table_gives_credit_and_says_what_is_not_stated() -> None:
+def test_origin_table_gives_credit_and_names_what_is_missing() -> None:
     *_, said, unsaid = origin_table([{**ORIGIN, **SAID}, {**ORIGIN, **UNSAID}]).splitlines()
     assert said == (
         "| tower/model.glb | castle | Jane \\| Doe | https://example.org | MIT | Copyright (c) Jane | `abababababab…` |"
@@ -31,7 +31,7 @@ def test_the_table_gives_credit_and_says_what_is_not_stated() -> None:
     assert unsaid == "| tower/model.glb | castle |  |  | not stated |  | `abababababab…` |"
 
 
-def test_croissant_says_what_the_dataset_is_based_on() -> None:
+def test_croissant_names_the_origins() -> None:
     said, unsaid = croissant(FACTS, [SHARD], [], INDEX, CLASSES, [{**ORIGIN, **SAID}, {**ORIGIN, **UNSAID}], "cited")[
         "isBasedOn"
     ]

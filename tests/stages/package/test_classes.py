@@ -35,7 +35,7 @@ def tally(*legs: int) -> dict[str, dict[str, Any]]:
     return counted.counts()
 
 
-def test_shapes_and_parts_are_added_up_by_split() -> None:
+def test_shapes_and_parts_are_counted_by_split() -> None:
     table = count_classes(CLASSES, [("train", tally(3, 4)), ("train", tally(3)), ("test", tally(5))])
     assert [(item["shapes"], item["parts"]) for item in table] == [
         ({"train": 3, "test": 1}, {"train": 10, "test": 5}),

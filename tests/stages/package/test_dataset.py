@@ -74,7 +74,7 @@ def test_the_json_has_the_same_fields_in_every_sample_and_nothing_empty(toy_fold
     assert not [place for record in records for place in empty_values(record)]
 
 
-def test_the_json_says_what_the_collection_holds(toy_folder: Path) -> None:
+def test_record_agrees_with_the_collection(toy_folder: Path) -> None:
     samples = all_samples(toy_folder)
     sample = toy_samples("val", 3, 2)[1]
     record = json.loads(samples[sample.key]["json"])
@@ -98,7 +98,7 @@ def test_the_json_says_what_the_collection_holds(toy_folder: Path) -> None:
     assert record["points"] == {"farthest": 16, "uniform": 64, "surface": "all", "centre": [0, 0, 0], "scale": 1.0}
 
 
-def test_classes_are_listed_with_what_has_them_by_split(toy_folder: Path) -> None:
+def test_classes_are_listed_with_their_counts_by_split(toy_folder: Path) -> None:
     """Recounted from the records; ids are indices of the list, and colours those of the kits' types."""
     table = json.loads((toy_folder / "classes.json").read_text())
     assert [item["id"] for item in table] == list(range(4))
@@ -147,7 +147,7 @@ def test_mesh_points_poses_and_bounds_share_upright_coordinates(toy_folder: Path
     assert checked == {"blocks", "planks"}
 
 
-def test_the_camera_of_a_record_sees_the_mesh_file_where_the_ink_is(toy_folder: Path) -> None:
+def test_camera_of_a_record_projects_the_mesh_onto_the_ink(toy_folder: Path) -> None:
     import PIL.Image
     import trimesh
 
@@ -179,7 +179,7 @@ def test_a_row_of_the_index_leads_to_its_sample(toy_folder: Path) -> None:
         assert row["text"] == record["text"]
 
 
-def test_the_card_has_what_hugging_face_asks_for(toy_folder: Path) -> None:
+def test_card_has_the_metadata_of_hugging_face(toy_folder: Path) -> None:
     _, front, text = (toy_folder / "README.md").read_text().split("---\n", 2)
     header = yaml.safe_load(front)
     assert header["license"] == "mit"
@@ -205,15 +205,13 @@ def test_checksums_cover_every_file_and_the_manifest_the_index(toy_folder: Path)
 
 
 @pytest.mark.slow
-def test_nothing_in_the_folder_depends_on_where_or_with_how_many_workers_it_was_made(
-    toy_folder: Path, tmp_path: Path
-) -> None:
+def test_folder_does_not_depend_on_location_or_number_of_workers(toy_folder: Path, tmp_path: Path) -> None:
     again = make_toy(tmp_path / "elsewhere", toy_config(), workers=2)
     assert digests(again) == digests(toy_folder)
     assert digests(again.parent / "toy-index") == digests(toy_folder.parent / "toy-index")
 
 
-def test_a_smaller_config_takes_its_old_shards_away_and_nothing_of_others(toy_folder: Path, tmp_path: Path) -> None:
+def test_smaller_config_removes_its_old_shards_and_nothing_else(toy_folder: Path, tmp_path: Path) -> None:
     shutil.copytree(toy_folder.parent, tmp_path / "out")
     (tmp_path / "out/toy/notes.txt").write_text("mine")
     folder = make_toy(tmp_path / "out", toy_config(shards=1))
@@ -223,7 +221,7 @@ def test_a_smaller_config_takes_its_old_shards_away_and_nothing_of_others(toy_fo
     assert (folder / "notes.txt").read_text() == "mine"
 
 
-def test_a_sample_that_one_stage_has_refused_is_left_out_and_counted(toy_folder: Path) -> None:
+def test_sample_refused_by_a_stage_is_left_out_and_counted(toy_folder: Path) -> None:
     assert REFUSED not in all_samples(toy_folder)
     manifest = json.loads((toy_folder / "manifest.json").read_text())
     assert manifest["samples"] == 23
@@ -232,7 +230,7 @@ def test_a_sample_that_one_stage_has_refused_is_left_out_and_counted(toy_folder:
     assert json.loads(line) == {"item": REFUSED, "reason": "refused by sketches", "detail": "", "count": 1}
 
 
-def test_a_new_title_makes_card_and_picture_again_and_no_shard(toy_folder: Path, tmp_path: Path) -> None:
+def test_new_title_rebuilds_card_and_picture_and_no_shard(toy_folder: Path, tmp_path: Path) -> None:
     shutil.copytree(toy_folder.parent, tmp_path / "out")
     config = replace(toy_config(), title="Other")
     result = run_stage("package", TOY_STAGES, config, DatasetPaths(tmp_path / "out", "toy"), 1)
@@ -252,5 +250,5 @@ def test_a_new_title_makes_card_and_picture_again_and_no_shard(toy_folder: Path,
         ({"a": [[1.0], []]}, ["a[1]"]),
     ],
 )
-def test_empty_values_are_found_where_they_stand(value: object, places: list[str]) -> None:
+def test_empty_values_are_located(value: object, places: list[str]) -> None:
     assert list(empty_values(value)) == places

@@ -50,7 +50,7 @@ def test_every_field_is_described(toy_folder: Path) -> None:
         (lambda record: record.update(contact_tolerance=0.0), "contact_tolerance: "),
     ],
 )
-def test_what_breaks_it_is_named(
+def test_violations_are_named(
     toy_folder: Path, records: list[Record], change: Callable[[Record], object], said: str
 ) -> None:
     record = json.loads(json.dumps(records[0]))
@@ -61,5 +61,5 @@ def test_what_breaks_it_is_named(
 
 
 @pytest.mark.parametrize("record", [[], None, "x", 3])
-def test_what_is_no_record_at_all_is_named(toy_folder: Path, record: object) -> None:
+def test_invalid_record_is_named(toy_folder: Path, record: object) -> None:
     assert any("the whole" in fault for fault in faults(toy_folder, record))

@@ -23,7 +23,7 @@ def row(number: int) -> Row:
     return Row({name: values.get(kind, 1) for name, kind in column_kinds().items()} | text)
 
 
-def test_a_tally_counts_as_lists_would() -> None:
+def test_tally_agrees_with_lists() -> None:
     tally = SourceTally()
     for number in (4, 0, 1, 3):
         tally.add(row(number))

@@ -181,7 +181,7 @@ def test_a_forged_folder_is_found(folder: Path, name: str) -> None:
     assert verify_dataset(folder, 0, 0).faults
 
 
-def test_what_the_stages_made_gives_away_what_no_look_at_the_sample_could(toy_folder: Path, tmp_path: Path) -> None:
+def test_shards_of_stages_reveal_forgeries_that_samples_hide(toy_folder: Path, tmp_path: Path) -> None:
     folder = copy_dataset(toy_folder, tmp_path, with_work=True)
     assert not verify_dataset(folder, 0, 0).faults
     key = forge(folder, "the sketch of another sample", np.random.default_rng(1))
@@ -189,7 +189,7 @@ def test_what_the_stages_made_gives_away_what_no_look_at_the_sample_could(toy_fo
     assert any(fault.endswith(f"{key}: sketch0.png is not the one that stage sketches made for it") for fault in faults)
 
 
-def test_a_dataset_without_its_kits_says_what_it_could_not_look_at(
+def test_dataset_without_kits_names_what_was_not_checked(
     toy_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for name in ("toy", "toy-index"):
