@@ -52,7 +52,7 @@ def test_visibility_is_as_published(domain: str) -> None:
         raw = {known.name: known.values[rng.integers(len(known.values))] for known in schema.parameters}
         names = {name: value for name, value in raw.items() if name.isidentifier()}
         expected = {
-            row["name"] for row in table["params"] if row["visible_if"] is None or eval(row["visible_if"], {}, names)
+            row["name"] for row in table["params"] if not row["visible_if"] or eval(row["visible_if"], {}, names)
         }
         canonical, visible = schema.canonical(raw)
         assert visible == expected

@@ -71,7 +71,8 @@ class TestRepair:
         broken = {**BASE, "height": 0.4, "rail_height": 0.5}
         assert repair(PROGRAM, broken, {"height"}) == {**broken, "rail_height": 0.4}
         assert repair(PROGRAM, broken, {"rail_height"}) == {**broken, "height": 0.5}
-        assert repair(PROGRAM, broken, {"height", "rail_height"}) is None
+        unrepaired = repair(PROGRAM, broken, {"height", "rail_height"})
+        assert unrepaired is None
 
     def test_valid_values_are_unchanged(self) -> None:
         assert repair(PROGRAM, BASE) == BASE

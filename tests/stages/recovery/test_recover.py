@@ -112,7 +112,8 @@ def test_camera_of_a_drawing_is_found(azimuth: float, elevation: float) -> None:
     assert found.camera.azimuth == pytest.approx(azimuth, abs=12.0)
     assert found.camera.elevation == pytest.approx(elevation, abs=12.0)
     assert found.as_json()["camera"]["azimuth"] == found.camera.azimuth
-    assert recover(cloud_of(TALL, n=300), PROGRAM, up="y", budget=1).as_json()["camera"] is None
+    camera_of_cloud = recover(cloud_of(TALL, n=300), PROGRAM, up="y", budget=1).as_json()["camera"]
+    assert camera_of_cloud is None
 
 
 def test_recovery_is_deterministic() -> None:
