@@ -16,7 +16,7 @@ FINISHED_DATASET = Requirement("a finished dataset", _finished)
 
 
 def _kits(run: DatasetRun) -> str:
-    names = [name for name, producer in producers().items() if producer.asked(run.config)]
+    names = [name for name, producer in producers().items() if producer.is_requested(run.config)]
     if not any(language_of(name).graphs for name in names):
         return f"{run.config.name} is made by {', '.join(names) or 'nothing'}, whose samples are no shape graphs"
     if not any(run.paths.stage("exemplars").root.glob("*.json")):
@@ -68,7 +68,7 @@ PROGRAM_MODELS = trained(
 
 
 def _program(run: DatasetRun) -> str:
-    if producers()["programs"].asked(run.config):
+    if producers()["programs"].is_requested(run.config):
         return ""
     return f"{run.config.name} is not made by a curve program; use configs/chairs.yaml or another config of a program"
 
