@@ -162,7 +162,7 @@ class TestText:
         assert inspect(path, "--tries", "100") == 0
         assert {file.name for file in (tmp_path / "datasets" / "inspect").iterdir()} >= {"ring.png", "ring.yaml"}
 
-    def test_several_models_have_one_column_each(self, tmp_path: Path, capsys: Any) -> None:
+    def test_several_models_have_separate_columns(self, tmp_path: Path, capsys: Any) -> None:
         pair = f"{ring(tmp_path)} {ring(tmp_path, 'again.obj')}"  # as in MESH="ring.obj again.obj"
         assert inspect(pair, "--out", tmp_path / "out", "--tries", "100") == 0
         text = " ".join(capsys.readouterr().out.split())
@@ -211,7 +211,7 @@ def test_command_prints_one_json_object_and_nothing_else(tmp_path: Path) -> None
     assert (missing.returncode, missing.stdout) == (2, "")
 
 
-def test_table_has_a_row_for_each_readable_model(tmp_path: Path, capsys: Any) -> None:
+def test_table_has_a_row_for_every_readable_model(tmp_path: Path, capsys: Any) -> None:
     (tmp_path / "cut.glb").write_bytes(b"glTF\x02\0\0\0")
     assert inspect(ring(tmp_path), tmp_path / "cut.glb", "--table", "--tries", 100) == 0
     printed = capsys.readouterr()
