@@ -195,7 +195,7 @@ def test_dataset_without_kits_names_what_was_not_checked(
     for name in ("toy", "toy-index"):
         shutil.copytree(toy_folder.parent / name, tmp_path / name)
     assert verified(tmp_path / "toy") == 0
-    assert "not checked: 12 samples: kit blocks is not beside the dataset" in capsys.readouterr().out
+    assert "not checked: 12 samples: kit blocks is missing next to the dataset" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("moved", "same"), [(1e-7, True), (1e-4, False)])
