@@ -87,7 +87,7 @@ def check(config: Config) -> None:
         )
 
 
-def asked(config: Config) -> Sequence[int]:
+def requested_samples(config: Config) -> Sequence[int]:
     """Return the shapes of each shard, if every model finds enough."""
     section = config.section(StringSamplingConfig)
     return section.splits.shard_sizes(sum(source.samples for source in section.sources))
@@ -118,7 +118,7 @@ STAGE = Stage(
     estimate_bytes=estimate_bytes,
     report=report,
     check=check,
-    requested_samples=asked,
+    requested_samples=requested_samples,
     trial_config=trial,
     whole_section=False,
 )

@@ -66,22 +66,22 @@ class Instantiation:
 class Instantiator:
     """Instantiates graphs of one kit; contacts are cached from graph to graph, which changes no result."""
 
-    def __init__(self, answers: ContactOracle, upright: bool = True) -> None:
-        kit = answers.kit
-        self.kit, self.answers, self.upright = kit, answers, upright
+    def __init__(self, oracle: ContactOracle, upright: bool = True) -> None:
+        kit = oracle.kit
+        self.kit, self.oracle, self.upright = kit, oracle, upright
         self.placements = find_placements(kit, upright)
         self._tables = kit_tables(kit, upright)
         self._grammar = compile_grammar(kit.grammar, len(kit.labels), 0, partial=True)
         self._reach = new_reach(len(self.placements.orientation_types))
         slotted = kit.grammar.strictness in SLOT_LEVELS
-        self._slots = SlotGrammar(kit, answers.dockings, upright) if slotted else None
+        self._slots = SlotGrammar(kit, oracle.dockings, upright) if slotted else None
         self._make_room(MIN_NODES)
 
     def _make_room(self, nodes: int) -> None:
         """Make room for graphs with some number of nodes."""
         self._s = new_state(nodes, len(self.kit.labels), VALUES_PER_NODE * nodes)
-        self._asker = self.answers.c_callback(self._s.types, self._s.rotations, self._s.translations)
-        self._address = int(ctypes.cast(self._asker, ctypes.c_void_p).value or 0)
+        self._callback = self.oracle.c_callback(self._s.types, self._s.rotations, self._s.translations)
+        self._address = int(ctypes.cast(self._callback, ctypes.c_void_p).value or 0)
 
     def instantiate(
         self,
@@ -106,12 +106,12 @@ class Instantiator:
         within = self._s._replace(types=self._s.types[: VALUES_PER_NODE * max(len(labels), MIN_NODES)])
         graph, placements = graph_tables(labels, edges), 0
         for _ in range(MAX_SLOT_ARRANGEMENTS):
-            table = self.answers.table
+            table = self.oracle.table
             contacts = KnownContacts(table.keys, table.values, self._address)
             left = method._replace(budget=method.budget - placements)
             problem = Problem(self._tables, self.placements, self._grammar, contacts, graph, guide, left, self._reach)
             outcome = solve(rng, problem, within)
-            self.answers.raise_pending()
+            self.oracle.raise_pending()
             placements += int(self._s.counts[N_PLACEMENTS])
             if outcome != Outcome.SOLVED:
                 return Instantiation(None, REASONS[outcome], placements)
@@ -135,17 +135,17 @@ class Instantiator:
         poses = np.tile(np.eye(4), (count, 1, 1))
         poses[:, :3, :3], poses[:, :3, 3] = s.rotations[values], s.translations[values]
         types = s.types[values].astype(np.int16)
-        found = [np.empty((0, 2), dtype=np.int32)]
+        contacts = [np.empty((0, 2), dtype=np.int32)]
         for part in range(1, count):
             near = np.flatnonzero(
                 _boxes_meet(s.boxes[values[:part]], s.boxes[values[part]], 1.1 * self.kit.contact_tolerance)
             )
-            seen = self.answers.around(types[near].astype(np.int64), poses[near], int(types[part]), poses[part])
-            if (seen == FORBIDDEN_CONTACT).any():
+            kinds = self.oracle.around(types[near].astype(np.int64), poses[near], int(types[part]), poses[part])
+            if (kinds == FORBIDDEN_CONTACT).any():
                 return Assembly(types, poses, np.empty((0, 2), dtype=np.int32))
-            touched = near[seen != NO_CONTACT]
-            found.append(np.stack([touched, np.full_like(touched, part)], axis=1).astype(np.int32))
-        edges = np.concatenate(found)
+            touched = near[kinds != NO_CONTACT]
+            contacts.append(np.stack([touched, np.full_like(touched, part)], axis=1).astype(np.int32))
+        edges = np.concatenate(contacts)
         return Assembly(types, poses, edges[np.lexsort((edges[:, 1], edges[:, 0]))])
 
     def _mismatch(self, assembly: Assembly, labels: np.ndarray, edges: IntArray, method: SolverMethod) -> str:
