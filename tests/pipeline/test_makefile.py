@@ -27,6 +27,7 @@ VARIABLES = (
     "TABLE",
     "SAMPLES",
     "ROUNDS",
+    "VERSION",
 )
 SAY_ARGUMENTS = "import json, sys; print(json.dumps(sys.argv[1:]))"
 
@@ -104,7 +105,7 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     assert values == {
         "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "STALL_TIMEOUT": "-",
         "CLUSTER": "-", "MESH": "-", "PROGRAM": "-", "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-",
-        "SAMPLES": "100", "ROUNDS": "20",
+        "SAMPLES": "100", "ROUNDS": "20", "VERSION": "-",
     }  # fmt: skip
 
 

@@ -1,5 +1,7 @@
 """The assignment of samples to splits and shards."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from stages.shape.collection.assignment import SplitConfig, assign_shards, assign_splits

@@ -1,5 +1,7 @@
 """Triangles, components and clouds against closed forms."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from stages.shape.geometry.clouds import chamfer_l1, chamfer_squared
