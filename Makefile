@@ -62,7 +62,8 @@ unexport PYTHONDONTWRITEBYTECODE
 
 PYTHON    := .venv/bin/python
 SHAPEMILL := $(PYTHON) -m pipeline
-READY     := .venv/ready-$(firstword $(shell cat requirements.lock pipeline/setup.sh pipeline/libraries.txt | cksum))
+LOCKED    := $(firstword $(shell cat requirements.lock pyproject.toml pipeline/setup.sh pipeline/libraries.txt | cksum))
+READY     := .venv/ready-$(LOCKED)
 DATASET   := --config "$$CONFIG" --out "$$OUT"
 SEEDED    := $${SEED:+--seed "$$SEED"}
 OPTIONS   := $(DATASET) $(SEEDED) --workers "$$WORKERS"
@@ -109,9 +110,9 @@ package: validity abstraction strings points sketches  ## Write the dataset's fo
 	$(RUN)
 
 .PHONY: train recover
-train: setup  ## Train the models of CONFIG, after making the samples that they learn from
+train: setup-models  ## Train the models of CONFIG, after making the samples that they learn from
 	@$(SHAPEMILL) train $(OPTIONS) $(RUNNING) $${MODEL:+--only "$$MODEL"}
-recover: setup  ## Find the parameters of PROGRAM, or of the likeliest program, that give the shape of INPUT
+recover: setup-models  ## Find the parameters of PROGRAM, or of the likeliest program, that give the shape of INPUT
 	@[ -n "$$INPUT" ] || { echo 'make recover needs INPUT=scan.ply or INPUT=drawing.png' >&2; exit 2; }
 	@OMP_WAIT_POLICY=PASSIVE $(SHAPEMILL) recover --out "$$OUT" --program "$$PROGRAM" --up "$$UP" $(SEEDED) -- "$$INPUT"
 
@@ -128,9 +129,9 @@ inspect: setup  ## Show what can be made of MESH and write a config for it, or w
 	@[ -n "$$MESH$$PROGRAM" ] || { echo 'make inspect needs MESH=my.glb or PROGRAM=chair' >&2; exit 2; }
 	@[ -z "$$PROGRAM" ] || $(SHAPEMILL) programs inspect --out "$$OUT/inspect" -- "$$PROGRAM"
 	@[ -z "$$MESH" ] || $(SHAPEMILL) inspect --out "$$OUT/inspect" -- "$$MESH"
-eval: setup  ## Print TABLE about the finished dataset and keep it; all: every table, and a report; empty: list them
+eval: setup-models  ## Print TABLE about the finished dataset and keep it; all: every table, and a report; empty: list them
 	@$(SHAPEMILL) eval $(DATASET) --workers "$$WORKERS" -- "$$TABLE"
-cluster: setup  ## Start a cluster of WORKERS workers on this machine, and print the CLUSTER of its scheduler
+cluster: setup-cluster  ## Start a cluster of WORKERS workers on this machine, and print the CLUSTER of its scheduler
 	@$(SHAPEMILL) cluster --workers "$$WORKERS"
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails
 	@$(SHAPEMILL) doctor --out "$$OUT"
@@ -142,14 +143,14 @@ test: style  ## Check style and types and run the tests, on WORKERS cores
 	@$(PYTHON) -m mypy > types.tmp & types=$$!; code=0; \
 	$(PYTHON) -m pytest --numprocesses "$$WORKERS" --dist loadfile --no-loadscope-reorder || code=$$?; \
 	wait "$$types" || code=$$?; cat types.tmp; rm types.tmp; exit "$$code"
-chaos: setup  ## Kill runs and corrupt their files in ROUNDS rounds, and check how each ends
+chaos: setup-dev  ## Kill runs and corrupt their files in ROUNDS rounds, and check how each ends
 	$(PYTHON) -m tests.chaos --rounds "$$ROUNDS" $(SEEDED)
-style: setup  ## Check style
+style: setup-dev  ## Check style
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
 lint: style  ## Check style and types
 	$(PYTHON) -m mypy
-bench: setup  ## Measure every stage and every piece against a public peer, and mark what has changed
+bench: setup-dev  ## Measure every stage and every piece against a public peer, and mark what has changed
 	$(PYTHON) -m pip install -q -r tests/bench/peers.txt || echo 'some peers cannot be built here: measured without' >&2
 	$(PYTHON) -m tests.bench
 kits: setup  ## Write the shipped exemplars from their source
@@ -158,7 +159,7 @@ config-docs: setup  ## Write the tables of config keys in configs/sections from 
 	$(SHAPEMILL) config-docs
 release: setup  ## Join the fragments of changes/ into the changelog, set VERSION and tag it
 	$(PYTHON) changes/release.py "$$VERSION"
-lock: setup  ## Choose the newest versions of everything and pin them in requirements.lock
+lock: setup-dev  ## Choose the newest versions of everything and pin them in requirements.lock
 	$(PYTHON) -m venv --clear .venv/lock
 	$(PYTHON) -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
 	    print(*p["dependencies"], *p["optional-dependencies"]["cluster"], *p["optional-dependencies"]["dev"], sep="\n")' > .venv/lock/asked.txt
@@ -169,13 +170,23 @@ lock: setup  ## Choose the newest versions of everything and pin them in require
 
 # The machine --------------------------------------------------------------------------------------------------------
 
-.PHONY: setup clean help
-setup: $(READY)  ## Install what is missing: system libraries, .venv, the exact versions of requirements.lock
+.PHONY: setup setup-models setup-cluster setup-dev clean help
+setup: $(READY)/core  ## Install what datasets need: system libraries, .venv, pinned packages
+setup-models: $(READY)/models  ## Add what models need: torch
+setup-cluster: $(READY)/cluster  ## Add what a cluster needs: dask
+setup-dev: $(READY)/dev  ## Add what tests and benchmarks need, and the groups above
 
-$(READY):
+$(READY)/core:
 	pipeline/setup.sh
-	rm -f .venv/ready-*
+	rm -rf .venv/ready-*
+	mkdir $(READY)
 	touch $@
+$(READY)/models $(READY)/cluster: | $(READY)/core
+	pipeline/setup.sh $(@F)
+	touch $@
+$(READY)/dev: | $(READY)/core
+	pipeline/setup.sh models cluster dev
+	touch $@ $(READY)/models $(READY)/cluster
 
 clean: setup  ## Delete the work folder of CONFIG (records, shards); the finished dataset stays
 	@$(SHAPEMILL) clean $(DATASET)

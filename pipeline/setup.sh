@@ -1,19 +1,29 @@
 #!/bin/sh
-# Sets up .venv: system libraries (with apt where it may), Python 3.11, the exact versions of requirements.lock, and the
-# command shapemill.
-# Run by make from the root of the project; does nothing twice.
+# Sets up .venv: system libraries (with apt where possible), Python, and the pinned packages of some groups.
+# Usage, from the root of the project: pipeline/setup.sh [models|cluster|dev ...]. What is installed already stays.
+# The groups are those of pyproject.toml; their versions are pinned in requirements.lock.
 set -eu
+
+VERSIONS="3.11 3.12 3.13"
 
 fail() { printf '%s\n' "$@" >&2; exit 1; }
 
-# A Python 3.11 that really runs: a version manager's shim on the PATH may not.
+# Prints nothing and succeeds if a Python runs and has a supported version; a version manager's shim may not run.
+is_supported() {
+    "$1" -c "import ssl, sys, venv; sys.exit('%d.%d' % sys.version_info[:2] not in '$VERSIONS'.split())" 2>/dev/null
+}
+
+# The machine's own python3 where its version is supported, else any Python that is.
 find_python() {
-    IFS=:
-    for folder in $PATH /usr/local/bin /usr/bin "${HOME:-/root}/.local/bin"; do
-        if "$folder/python3.11" -c 'import ssl, venv' 2>/dev/null; then echo "$folder/python3.11"; return; fi
+    for name in python3 python3.13 python3.12 python3.11; do
+        IFS=:
+        for folder in $PATH /usr/local/bin /usr/bin "${HOME:-/root}/.local/bin"; do
+            if is_supported "$folder/$name"; then echo "$folder/$name"; return; fi
+        done
+        unset IFS
     done
-    for python in "${HOME:-/root}"/.pyenv/versions/3.11.*/bin/python3.11; do
-        if "$python" -c 'import ssl, venv' 2>/dev/null; then echo "$python"; return; fi
+    for python in "${HOME:-/root}"/.pyenv/versions/3.1[123].*/bin/python3; do
+        if is_supported "$python"; then echo "$python"; return; fi
     done
 }
 
@@ -24,9 +34,9 @@ has_library() {
 missing_packages() {
     python=$(find_python)
     if [ -z "$python" ]; then
-        echo python3.11 python3.11-venv
+        echo python3 python3-venv
     elif ! "$python" -c 'import ensurepip' 2>/dev/null; then
-        echo python3.11-venv
+        echo python3-venv
     fi
     grep -v '^#' pipeline/libraries.txt | while read -r library package _; do
         if ! has_library "$library"; then echo "$package"; fi
@@ -36,7 +46,7 @@ missing_packages() {
 install_packages() {
     command="apt-get install -y --no-install-recommends $*"
     if ! command -v apt-get >/dev/null; then
-        fail "Shapemill needs what Debian 12 calls: $*" "Install that, then run make again."
+        fail "Shapemill needs what Debian calls: $*" "Install that, then run make again."
     elif [ "$(id -u)" = 0 ]; then
         sudo=""
     elif command -v sudo >/dev/null && sudo -n true 2>/dev/null; then
@@ -58,11 +68,21 @@ packages=$(missing_packages | tr '\n' ' ')
 if [ -n "${packages% }" ]; then install_packages $packages; fi
 
 python=$(find_python)
-[ -n "$python" ] || fail "There is still no Python 3.11 that runs. Install one, then run make again."
-if ! .venv/bin/python -c 'import sys, pip; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; then
-    echo "making .venv with $python"
+[ -n "$python" ] || fail "There is no Python of $VERSIONS that runs. Install one, then run make again."
+if ! is_supported .venv/bin/python || ! .venv/bin/python -m pip --version >/dev/null 2>&1; then
+    echo "creating .venv with $("$python" --version) ($python)"
     "$python" -m venv --clear .venv
 fi
-echo "installing the versions of requirements.lock into .venv; the first time this takes some minutes"
-.venv/bin/python -m pip install -qq --disable-pip-version-check -r requirements.lock
-.venv/bin/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation --editable .
+requirements=.venv/requirements.txt
+.venv/bin/python - "$@" > "$requirements" <<'END'
+import sys, tomllib
+with open("pyproject.toml", "rb") as stream:
+    facts = tomllib.load(stream)
+project = facts["project"]
+groups = [project["optional-dependencies"][group] for group in sys.argv[1:]]
+print(*facts["build-system"]["requires"], *project["dependencies"], *(name for group in groups for name in group), sep="\n")
+END
+grep '^--' requirements.lock >> "$requirements"
+echo "installing $(grep -c '^[^-]' "$requirements") packages and what they need into .venv; the first time takes minutes"
+.venv/bin/python -m pip install -q --disable-pip-version-check --constraint requirements.lock --requirement "$requirements"
+.venv/bin/python -m pip install -q --disable-pip-version-check --no-deps --no-build-isolation --editable .

@@ -7,7 +7,9 @@ import os
 import shlex
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -35,9 +37,16 @@ SAY_ARGUMENTS = "import json, sys; print(json.dumps(sys.argv[1:]))"
 def make(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
     """Run make as a user would, whoever runs the tests; `variables` come from the environment.
 
-    The stamp is given, so that nothing is set up by asking what would be done.
+    The stamps of set-up are given, so that nothing is set up by asking what would be done.
     """
-    command = ["make", "--no-print-directory", "READY=Makefile", *arguments]
+    with TemporaryDirectory() as stamps:
+        for group in ("core", "models", "cluster", "dev"):
+            (Path(stamps) / group).touch()
+        command = ["make", "--no-print-directory", f"READY={stamps}", *arguments]
+        return _run(command, variables)
+
+
+def _run(command: Sequence[str], variables: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
     mine = {name: value for name, value in os.environ.items() if name not in VARIABLES and "MAKE" not in name}
     environment = {**mine, **variables}
     return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)

@@ -103,8 +103,7 @@ def _find_candidates(problem, state, part):
 
     Returns False where there is no room.
     """
-    # Taken out of the problem once: taking arrays out of a tuple counts references.
-    kit, patterns, contacts, field = problem.kit, problem.patterns, problem.contacts, problem.field
+    kit, patterns = problem.kit, problem.patterns
     placement = state.part_placements[part]
     part_type = state.placement_types[placement]
     rotation, translation = state.placement_rotations[placement], state.placement_translations[placement]
@@ -153,7 +152,7 @@ def _find_candidates(problem, state, part):
                 if squared_distance(point, relative) <= tolerance**2:
                     _turn(rotation, turn, patterns.rotations[member], turned)
                     fits = looks_same(kit, anchor_type, turned, state.placement_rotations[anchor]) >= 0
-            if fits and not _add_candidate(kit, patterns, contacts, field, state, part, pattern, turn, touching):
+            if fits and not _add_candidate(problem, state, part, pattern, turn, touching):
                 return False
     return True
 
@@ -177,10 +176,12 @@ def _turn(rotation, turn, other, out):
 
 
 @numba.njit(cache=True)
-def _add_candidate(kit, patterns, contacts, field, state, part, pattern, turn, touching):
+def _add_candidate(problem, state, part, pattern, turn, touching):
     """Add a turned pattern to a part's candidates where all its members may be; return False where there is no room."""
     if state.counts[N_CANDIDATES] + 1 >= len(state.member_starts):
         return False
+    kit, patterns, contacts = problem.kit, problem.patterns, problem.contacts
+    low, high = problem.field.low, problem.field.high
     placement = state.part_placements[part]
     rotation, translation = state.placement_rotations[placement], state.placement_translations[placement]
     there, turned, place_there = np.empty(3), np.empty((3, 3)), np.empty(3)
@@ -202,7 +203,7 @@ def _add_candidate(kit, patterns, contacts, field, state, part, pattern, turn, t
         _turn_point(rotation, there, place_there)
         place_there += translation
         _turn(rotation, turn, turns[member], turned)
-        if not _within(boxes, field.low, field.high, kind, turned, place_there):
+        if not _within(boxes, low, high, kind, turned, place_there):
             return True
         other = find_placement(
             symmetry_starts, symmetries, tolerance, tolerance / reach[kind], placement_types, placement_rotations,

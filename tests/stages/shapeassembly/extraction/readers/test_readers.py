@@ -13,7 +13,7 @@ from stages.shapeassembly.extraction.readers.grass import read_grass
 from stages.shapeassembly.extraction.readers.partnet import read_partnet
 from stages.shapeassembly.extraction.readers.structurenet import read_structurenet
 
-SHARED = Path(__file__).resolve().parents[4].parent / "shared"
+SHARED = Path(__file__).resolve().parents[6] / "shared"
 UPRIGHT = [0.0, 0.0, 0.0, 2.0, 1.0, 3.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
 
 
