@@ -227,7 +227,7 @@ def test_chains_without_required_hub_are_rejected(tmp_path: Path) -> None:
         "name": "toy",
         "seed": 5,
         "exemplars": {"kits": [stated(kit)]},
-        "variations": {"samples_per_kit": 50, "search": search, "require": {"hubs": 1}},
+        "variations": {"samples_per_kit": 50, "search": search, "require": {"min_hubs": 1}},
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     for stage in ("exemplars", "variations"):
@@ -244,7 +244,7 @@ def test_hubs_that_are_not_restored_cannot_be_required(tmp_path: Path) -> None:
     config = {
         "name": "toy",
         "exemplars": {"kits": [stated({"name": "chain", "shapes": [model]})]},
-        "variations": {"require": {"hubs": 1}},
+        "variations": {"require": {"min_hubs": 1}},
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     code, printed = shapemill("run", "exemplars", "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out")
