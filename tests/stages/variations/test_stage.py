@@ -166,7 +166,7 @@ def test_two_workers_make_the_same_bytes(made: tuple[Path, str]) -> None:
 
 
 def test_two_workers_make_the_same_bytes_by_replacement(tmp_path: Path) -> None:
-    search = {"method": "substructures", "tries": 300, "rounds": 2}
+    search = {"method": "substructures", "tries_per_round": 300, "max_rounds": 2}
     for out, workers in (("one", 1), ("two", 2)):
         make(tmp_path, out, workers, samples_per_kit=40, search=search)
     assert digests(tmp_path, "one") == digests(tmp_path, "two")
