@@ -32,7 +32,7 @@ def relative(path: Path) -> str:
 @cache
 def parsed(path: Path) -> ast.Module:
     """Parse a file, once for all rules."""
-    return ast.parse(path.read_text())
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def imports(tree: ast.AST) -> Iterator[str]:
@@ -168,7 +168,7 @@ def kernels(tree: ast.Module) -> list[ast.FunctionDef]:
 
 
 def test_untyped_definitions_are_allowed_only_in_files_with_kernels() -> None:
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mypy"]
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["mypy"]
     assert settings["strict"]
     exempt = [setting["module"] for setting in settings["overrides"] if setting.get("disallow_untyped_defs") is False]
     files = [path for path in CODE if kernels(parsed(path))]
@@ -198,7 +198,7 @@ def misnamed(path: Path) -> Iterator[str]:
     names = {path.stem, *path.relative_to(ROOT).parts} & BANNED_NAMES
     if names:
         yield f"is called {', '.join(names)}"
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     if text and path in CODE and not ast.get_docstring(parsed(path)):
         yield "has no docstring"
     if "import " in text and "from __future__ import annotations" not in text:

@@ -45,7 +45,7 @@ def test_half_written_files_under_a_final_name_are_found(tmp_path: Path) -> None
     (sandbox.work / "toy/first/b.tar").unlink()
     (sandbox.work / "toy/first/.b.tar.tmp").write_bytes(b"wh")
     (sandbox.work / "toy/first/records/a.json").write_bytes(b"{")
-    (sandbox.work / "toy/log.txt").write_text("a log")
+    (sandbox.work / "toy/log.txt").write_text("a log", encoding="utf-8")
     first = ".work/toy/first"
     assert sorted(sandbox.half_written(set())) == [f"{first}/a.tar", f"{first}/records/a.json"]
     assert sandbox.half_written({f"{first}/a.tar"}) == [f"{first}/records/a.json"]

@@ -46,7 +46,7 @@ def write_config(folder: Path) -> Path:
         "package": {"previewed": 4},
     }
     path = folder / "small.yaml"
-    path.write_text(yaml.safe_dump(config))
+    path.write_text(yaml.safe_dump(config), encoding="utf-8")
     return path
 
 
@@ -129,7 +129,7 @@ def test_every_table_about_kits_is_in_the_report(made: tuple[Path, Path], tmp_pa
     header, *rows = csv.reader((results / "compression.csv").open())
     assert [row[:2] for row in rows] == [[kit, edges] for kit in ("castle", "playground") for edges in ("all", "tree")]
     assert all(row[header.index("exact %")] == "100.0" for row in rows)
-    report = (results / "report.html").read_text()
+    report = (results / "report.html").read_text(encoding="utf-8")
     assert all(f'<section id="{name}">' in report for name in about_kits)
     assert "say something else now" not in report, "the config is the one that the dataset was made with"
 
@@ -163,9 +163,9 @@ def test_every_string_of_the_corpus_decodes_to_its_graph_and_obeys_the_grammar(m
         exemplars = work / "exemplars"
         kit = load_kit(exemplars / f"{kit_name}.json", exemplars / f"{kit_name}.tar")
         alphabet = make_alphabet(kit.type_names())
-        decoded = [check_string(line, alphabet, kit.grammar) for line in text.read_text().splitlines()]
+        decoded = [check_string(line, alphabet, kit.grammar) for line in text.read_text(encoding="utf-8").splitlines()]
         assert {graph_digest(item.types, item.edges) for item in decoded} == graphs[text.stem]
         seen += len(decoded)
-    statistics = json.loads((one / "small-corpus" / "statistics.json").read_text())
+    statistics = json.loads((one / "small-corpus" / "statistics.json").read_text(encoding="utf-8"))
     assert seen > 500
     assert statistics

@@ -50,7 +50,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """The folder that holds the dataset, and what was printed on the way."""
     folder = tmp_path_factory.mktemp("heaps")
     config = folder / "heaps.yaml"
-    config.write_text(yaml.safe_dump(CONFIG))
+    config.write_text(yaml.safe_dump(CONFIG), encoding="utf-8")
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "tests" / "example_project")}
     command = [sys.executable, "-c", WHOLE_WAY, str(config), str(folder / "out")]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
@@ -80,7 +80,7 @@ def test_samples_of_a_new_producer_have_what_all_stages_add(made: tuple[Path, st
 
 def test_declarations_of_extensions_are_in_card_croissant_index_and_manifest(made: tuple[Path, str]) -> None:
     folder = made[0] / "heaps"
-    card = (folder / "README.md").read_text()
+    card = (folder / "README.md").read_text(encoding="utf-8")
     for said in (
         "pebbles are thrown on a heap",
         "Every heap is thrown separately",
@@ -89,11 +89,13 @@ def test_declarations_of_extensions_are_in_card_croissant_index_and_manifest(mad
     ):
         assert said in card
     assert "| `<key>.mass.npy` | float32 (parts) | Mass of each part. |" in card
-    croissant = json.loads((folder / "croissant.json").read_text())
+    croissant = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
     assert "mass" in {item["name"] for item in croissant["recordSet"]}
     rows = pyarrow.parquet.read_table(made[0] / "heaps-index" / "heaps.parquet").to_pylist()
     assert all(row["total_mass"] > 0 for row in rows)
-    assert "mass.npy" in {load["name"] for load in json.loads((folder / "manifest.json").read_text())["members"]}
+    assert "mass.npy" in {
+        load["name"] for load in json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["members"]
+    }
 
 
 def test_table_of_an_extension_is_found_and_in_the_report(made: tuple[Path, str]) -> None:
@@ -114,8 +116,8 @@ def test_table_of_an_extension_is_found_and_in_the_report(made: tuple[Path, str]
     )
     assert done.returncode == 0, done.stdout + done.stderr
     results = made[0] / "heaps-eval"
-    assert "highest" in (results / "heights.csv").read_text()
-    report = (results / "report.html").read_text()
+    assert "highest" in (results / "heights.csv").read_text(encoding="utf-8")
+    report = (results / "report.html").read_text(encoding="utf-8")
     for said in ("How high are the shapes?", "duplicates %", "Stability under a push", "data:image/png;base64"):
         assert said in report
 

@@ -68,5 +68,5 @@ def test_rules_find_what_they_are_for(
     tmp_path: Path, source: str, rule: Callable[[Path], Iterator[str]], count: int
 ) -> None:
     path = tmp_path / "example.py"
-    path.write_text(source)
+    path.write_text(source, encoding="utf-8")
     assert len(list(rule(path))) == count

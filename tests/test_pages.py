@@ -31,7 +31,9 @@ def pages() -> list[Path]:
 
 def examples(page: str) -> dict[str, str]:
     """The Python blocks of a page, by the sentence before each."""
-    return dict(re.findall(r"\n([A-Z][^\n]*):\n\n```python\n(.*?)```", (ROOT / page).read_text(), re.DOTALL))
+    return dict(
+        re.findall(r"\n([A-Z][^\n]*):\n\n```python\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL)
+    )
 
 
 STAGES = examples("stages/README.md")
@@ -58,7 +60,7 @@ def shows_something(path: Path) -> bool:
 
 @pytest.mark.parametrize("page", pages(), ids=lambda page: str(page.relative_to(ROOT)))
 def test_local_links_of_a_page_lead_to_files(page: Path) -> None:
-    links = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text())
+    links = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
     local = [link for link in links if "://" not in link and not link.startswith("mailto:")]
     assert [link for link in local if not (page.parent / link).exists()] == []
 
@@ -73,9 +75,11 @@ def test_config_examples_of_a_page_are_valid(page: Path, tmp_path: Path, monkeyp
     (tmp_path / "datasets/exemplars").symlink_to(ROOT / "datasets/exemplars")
     for model in ("my.glb", "other.glb", "facade.glb"):
         (tmp_path / model).touch()
-    for number, example in enumerate(re.findall(r"```yaml\n(.*?)```", page.read_text(), re.DOTALL)):
+    for number, example in enumerate(re.findall(r"```yaml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)):
         config = tmp_path / f"{number}.yaml"
-        config.write_text(example if example.startswith("name:") else f"name: example\nseed: 1\n{example}")
+        config.write_text(
+            example if example.startswith("name:") else f"name: example\nseed: 1\n{example}", encoding="utf-8"
+        )
         load_config(config, {name: stage.config for name, stage in find_stages().items()})
 
 

@@ -26,7 +26,7 @@ def dataset_of(samples: int, folder: Path) -> tuple[Config, Mapping[str, Stage]]
     """Return the config of a dataset with that many chairs."""
     path, stages = folder / "big.yaml", find_stages()
     programs = {"program": "chair", "mode": "random", "random": {"samples": samples}}
-    path.write_text(yaml.safe_dump({"name": "big", "programs": programs}))
+    path.write_text(yaml.safe_dump({"name": "big", "programs": programs}), encoding="utf-8")
     return load_config(path, {name: stage.config for name, stage in stages.items()}), stages
 
 

@@ -47,7 +47,7 @@ def main() -> None:
         made.append(measure)
         print(row(measure, kept), flush=True)
     if arguments.json is not None:
-        arguments.json.write_text(json.dumps([asdict(measure) for measure in made], indent=1) + "\n")
+        arguments.json.write_text(json.dumps([asdict(measure) for measure in made], indent=1) + "\n", encoding="utf-8")
     if arguments.keep:
         keep(KEPT_REPORT, made)
 

@@ -47,7 +47,7 @@ def bench() -> Iterator[Measure]:
 def _run_shards(out: Path, shards: int) -> float:
     out.mkdir(exist_ok=True)
     config = out / "pipeline.yaml"
-    config.write_text(f"name: pipeline\nsalt:\n  bags: {shards}\n")
+    config.write_text(f"name: pipeline\nsalt:\n  bags: {shards}\n", encoding="utf-8")
     start = time.perf_counter()
     run_toy_stages(config, out, "salt")
     return time.perf_counter() - start

@@ -79,12 +79,12 @@ def bench() -> Iterator[Measure]:
 
 def _seconds(dataset: Dataset, changes: Mapping[str, Any], out: Path, stages: list[str]) -> dict[str, float]:
     """Return the CPU seconds of each stage of one run."""
-    config = yaml.safe_load((ROOT / "configs" / f"{dataset.config}.yaml").read_text())
+    config = yaml.safe_load((ROOT / "configs" / f"{dataset.config}.yaml").read_text(encoding="utf-8"))
     for section, keys in changes.items():
         config[section] = {**config.get(section, {}), **keys}
     out.mkdir(parents=True, exist_ok=True)
     path = out.with_suffix(".yaml")
-    path.write_text(yaml.safe_dump(config))
+    path.write_text(yaml.safe_dump(config), encoding="utf-8")
     spent = {}
     for stage in stages:
         before = _children()

@@ -21,7 +21,7 @@ def figures(path: Path) -> dict[str, float]:
     """Return our figures of a kept report by name; empty without a report."""
     if not path.is_file():
         return {}
-    return {entry["name"]: entry["ours"] for entry in json.loads(path.read_text())["measures"]}
+    return {entry["name"]: entry["ours"] for entry in json.loads(path.read_text(encoding="utf-8"))["measures"]}
 
 
 def change(measure: Measure, kept: dict[str, float]) -> str:
@@ -57,8 +57,10 @@ def keep(path: Path, made: Sequence[Measure]) -> None:
         f"memory, load {machine['load']} over five minutes. Bold: over {NOISE_SHARE:.0%} from the last kept report."
     )
     table = "\n".join([TABLE_HEADER, *(row(measure, kept) for measure in made)])
-    path.with_suffix(".md").write_text(f"# What Shapemill takes\n\n{said}\n\n{table}\n")
-    path.write_text(json.dumps({**machine, "measures": [asdict(measure) for measure in made]}, indent=1) + "\n")
+    path.with_suffix(".md").write_text(f"# What Shapemill takes\n\n{said}\n\n{table}\n", encoding="utf-8")
+    path.write_text(
+        json.dumps({**machine, "measures": [asdict(measure) for measure in made]}, indent=1) + "\n", encoding="utf-8"
+    )
 
 
 def _figure(value: float) -> str:

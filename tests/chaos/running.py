@@ -70,7 +70,7 @@ def alive(pid: int) -> bool:
 def seconds_of(pid: int) -> float:
     """Processor time that a process has had."""
     try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
     except OSError:
         return 0.0
@@ -87,7 +87,7 @@ def _descendants(pid: int) -> Iterator[int]:
     """All processes that `pid` has started, whichever of its threads did, and theirs."""
     for path in Path(f"/proc/{pid}/task").glob("*/children"):
         try:
-            children = path.read_text().split()
+            children = path.read_text(encoding="utf-8").split()
         except OSError:
             continue
         for child in map(int, children):

@@ -61,7 +61,7 @@ class Sandbox:
             changed = (edited or {}).get(dataset, {})
             sections = {key: {**own.get(key, {}), **changed.get(key, {})} for key in {**own, **changed}}
             facts = {"name": dataset, "seed": 3, "license": "MIT"}
-            self.config(dataset).write_text(yaml.safe_dump({**facts, **sections}))
+            self.config(dataset).write_text(yaml.safe_dump({**facts, **sections}), encoding="utf-8")
 
     def settle(self) -> None:
         """Make the datasets without faults, and keep the digests. Raises AssertionError where that fails."""

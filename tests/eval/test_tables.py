@@ -35,7 +35,7 @@ def test_every_module_is_a_table_with_question_and_requirements() -> None:
 def test_module_without_table_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "stray").mkdir()
     (tmp_path / "stray" / "__init__.py").touch()
-    (tmp_path / "stray" / "wrong.py").write_text("TABLE = 3\n")
+    (tmp_path / "stray" / "wrong.py").write_text("TABLE = 3\n", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.raises(TypeError, match=r"stray/wrong\.py must hold TABLE"):
         find_tables("stray")
@@ -47,7 +47,7 @@ def finished(out: Path, config: Path) -> DatasetRun:
     """Return the run of a dataset that has only a manifest."""
     run = load_dataset_run(config, out)
     run.folder.mkdir(parents=True)
-    (run.folder / "manifest.json").write_text(json.dumps({"samples": 1200}))
+    (run.folder / "manifest.json").write_text(json.dumps({"samples": 1200}), encoding="utf-8")
     return run
 
 
@@ -125,7 +125,7 @@ def test_failing_table_is_reported_and_others_are_made(tmp_path: Path) -> None:
         "def compute(run, options):\n    {}\n"
         "TABLE = Evaluation('Is it?', (Requirement('nothing', lambda _: ''),), lambda _: 1.0, compute)\n"
     )
-    (tables / "broken.py").write_text(text.format("raise ValueError('no such luck')"))
+    (tables / "broken.py").write_text(text.format("raise ValueError('no such luck')"), encoding="utf-8")
     (tables / "sound.py").write_text(
         text.format(
             "return TableResult([Table('T', ('a', 'b'), (('one', 2),))], figures=[Figure('drawn', 'D', b'png')])"
@@ -147,9 +147,9 @@ def test_failing_table_is_reported_and_others_are_made(tmp_path: Path) -> None:
     assert done.returncode == 1, done.stderr
     assert "ValueError: no such luck" in done.stderr
     results = tmp_path / "out" / "shapemill-default-eval"
-    assert (results / "sound.csv").read_text() == "a,b\none,2\n"
+    assert (results / "sound.csv").read_text(encoding="utf-8") == "a,b\none,2\n"
     assert (results / "sound_drawn.png").read_bytes() == b"png"
-    report = (results / "report.html").read_text()
+    report = (results / "report.html").read_text(encoding="utf-8")
     assert "it failed: ValueError: no such luck" in report
     assert 'id="sound"' in report
     assert all(f"<td>{name}</td>" in report for name in find_tables()), "what was not made is listed"
@@ -157,6 +157,6 @@ def test_failing_table_is_reported_and_others_are_made(tmp_path: Path) -> None:
         [*command[:4], "sound", *command[5:]], cwd=ROOT, env=environment, capture_output=True, text=True
     )
     assert alone.returncode == 0, alone.stderr
-    page = (results / "sound.html").read_text()
+    page = (results / "sound.html").read_text(encoding="utf-8")
     assert 'id="sound"' in page
     assert "not-made" not in page

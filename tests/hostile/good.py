@@ -17,11 +17,13 @@ def write_good(folder: Path) -> list[Path]:
     import trimesh
 
     (folder / "skin.png").write_bytes(png(np.arange(48).reshape(4, 4, 3) * 5))
-    (folder / "skin.mtl").write_text("newmtl red\nKd 1 0 0\nnewmtl skin\nKd 1 1 1\nmap_Kd -s 1 1 1 skin.png\n")
+    (folder / "skin.mtl").write_text(
+        "newmtl red\nKd 1 0 0\nnewmtl skin\nKd 1 1 1\nmap_Kd -s 1 1 1 skin.png\n", encoding="utf-8"
+    )
     glb = _glb()
     (folder / "all.bin").write_bytes(glb.chunk)
     header = {**glb.header, "buffers": [{"byteLength": len(glb.chunk), "uri": "all.bin"}]}
-    (folder / "apart.gltf").write_text(json.dumps(header))
+    (folder / "apart.gltf").write_text(json.dumps(header), encoding="utf-8")
     textured_glb("skin.png").write(folder / "skin.glb")
     glb.write(folder / "whole.glb")
     write_obj(folder / "boxes.obj", BOXES, "mtllib skin.mtl\nvt 0 0\nvt 1 0\nvt 0 1", {"roof": "usemtl red"})
@@ -29,12 +31,12 @@ def write_good(folder: Path) -> list[Path]:
         stream.write(
             "o card\nusemtl skin\nv 9 0 0\nv 9 1 0\nv 9 1 1\nv 9 0 1 0.5 0.5 0.5\nf 17/1 18/2 19/3\nf -1 -2 -3 -4\n"
         )
-    (folder / "tiles.dae").write_text(textured_dae("skin.png"))
+    (folder / "tiles.dae").write_text(textured_dae("skin.png"), encoding="utf-8")
     mesh = trimesh.util.concatenate([trimesh.Trimesh(item, BOX_FACES, process=False) for item in BOXES.values()])
     mesh.visual.face_colors = [255, 51, 0, 255]
     mesh.export(folder / "binary.ply")
     (folder / "text.ply").write_bytes(mesh.export(file_type="ply", encoding="ascii"))
-    (folder / "skin.ply").write_text(_TEXTURED_PLY)
+    (folder / "skin.ply").write_text(_TEXTURED_PLY, encoding="utf-8")
     mesh.export(folder / "binary.stl")
     (folder / "text.stl").write_text(
         "".join(

@@ -22,7 +22,7 @@ def write_config(tmp_path: Path) -> WriteConfig:
     def write(**sections: Any) -> Path:
         path = tmp_path / "toys.yaml"
         flour = {"marks": str(tmp_path / "marks"), **sections.pop("flour", {})}
-        path.write_text(yaml.safe_dump({"name": "toys", "seed": 3, **sections, "flour": flour}))
+        path.write_text(yaml.safe_dump({"name": "toys", "seed": 3, **sections, "flour": flour}), encoding="utf-8")
         return path
 
     return write

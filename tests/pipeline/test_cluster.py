@@ -74,7 +74,7 @@ def test_cluster_makes_the_same_bytes_despite_dying_workers(
         assert run.stderr is not None
         assert "failed: harvest1-0; mend the cause" in run.stderr.read()
     # Each killer is one that the test knows: a worker killed while it makes the poisoned shard would count for that.
-    tried = {shard: (tmp_path / "marks" / shard).read_text() for shard in trouble}
+    tried = {shard: (tmp_path / "marks" / shard).read_text(encoding="utf-8") for shard in trouble}
     assert tried["harvest1-0"] == "xxxx", "three times among others, once in isolation"
     assert tried["harvest0-0"] == tried["harvest2-1"] == "xx", "a death costs a shard one more try"
     run_toy_stages(write_config(), out, "flour")
@@ -137,6 +137,6 @@ def _command(pid: int) -> str:
 
 def _read(pid: int, file: str) -> str:
     try:
-        return Path(f"/proc/{pid}/{file}").read_text()
+        return Path(f"/proc/{pid}/{file}").read_text(encoding="utf-8")
     except (FileNotFoundError, ProcessLookupError):
         return ""

@@ -34,7 +34,7 @@ def run_shard(task: Task) -> Outcome:
     if task.config.section(StoneConfig).sharpens:
         from pathlib import Path
         import barn.stone.grit
-        Path(barn.stone.grit.__file__).write_text("GRIT = 8")
+        Path(barn.stone.grit.__file__).write_text("GRIT = 8",encoding="utf-8")
     with task.output(f"{task.shard.name}.txt") as stream:
         stream.write(b"dust" * GRIT)
     return Outcome(1)
@@ -57,7 +57,7 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
             if folder == tmp_path / "src":
                 break
             (folder / "__init__.py").touch()
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
 
     yield write
     for module in [module for module in sys.modules if module.partition(".")[0] in {"barn", "yard"}]:
@@ -83,7 +83,7 @@ def test_package_may_have_several_folders(write: Write, tmp_path: Path) -> None:
     write("barn/__init__.py", f"__path__.append({str(tmp_path / 'annex')!r})")
     write("barn/hall.py", "import barn.guests")
     (tmp_path / "annex").mkdir()
-    (tmp_path / "annex/guests.py").write_text("BEDS = 2")
+    (tmp_path / "annex/guests.py").write_text("BEDS = 2", encoding="utf-8")
     __import__("barn")
     assert names("barn.hall") == {"barn", "barn.hall", "barn.guests"}
 
@@ -161,7 +161,7 @@ def test_edit_rebuilds_what_imports_it_and_the_log_names_it(edit: Write, tmp_pat
     edit("barn/stone/grit.py", "GRIT = 4")
     assert grind(tmp_path).made == 2
     assert (tmp_path / ".work/toys/stone/coarse.txt").read_bytes() == b"dust" * 4
-    log = (tmp_path / ".work/toys/log.txt").read_text()
+    log = (tmp_path / ".work/toys/log.txt").read_text(encoding="utf-8")
     assert "1 shard is rebuilt: changed: code (barn.sieves.fine)" in log
     assert "2 shards are rebuilt: changed: code (barn.stone.grit)" in log
 
@@ -239,5 +239,5 @@ class TestNotes:
         for path in folder.iterdir():
             path.unlink()
         folder.rmdir()
-        folder.write_text("a file stands where the folder would be")
+        folder.write_text("a file stands where the folder would be", encoding="utf-8")
         assert digests("") == first

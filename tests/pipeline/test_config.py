@@ -47,7 +47,7 @@ class Bakery(StrictModel):
 
 def load(folder: Path, text: str, **overrides: int) -> Config:
     path = folder / "bread.yaml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     return load_config(path, {"oven": Oven, "bakery": Bakery}, overrides)
 
 
@@ -146,7 +146,7 @@ def test_all_mistakes_are_reported_together(tmp_path: Path) -> None:
 
 
 def test_missing_file_names_the_nearest_existing_one(tmp_path: Path) -> None:
-    (tmp_path / "sourdough.txt").write_text("wait")
+    (tmp_path / "sourdough.txt").write_text("wait", encoding="utf-8")
     reported = mistakes(tmp_path, f"name: bread\nbakery:\n  recipe: {tmp_path}/sourdoughs.txt\n")
     assert reported == [
         "bread.yaml:3: bakery.recipe: there is no file sourdoughs.txt; the nearest file there is sourdough.txt"

@@ -32,10 +32,10 @@ def test_keys_of_alternative_models_name_their_kind() -> None:
 
 def test_text_above_the_keys_is_kept(tmp_path: Path) -> None:
     stages = {"bakery": replace(next(iter(ABSENT_STAGES.values())), config=Bakery)}
-    (tmp_path / "bakery.md").write_text("# Section `bakery`\n\nBread.\n\n## Keys\n\nold\n")
+    (tmp_path / "bakery.md").write_text("# Section `bakery`\n\nBread.\n\n## Keys\n\nold\n", encoding="utf-8")
     assert outdated_pages(tmp_path, stages) == ["dataset", "bakery"]
     write_config_pages(tmp_path, stages)
-    text = (tmp_path / "bakery.md").read_text()
+    text = (tmp_path / "bakery.md").read_text(encoding="utf-8")
     assert text.startswith("# Section `bakery`\n\nBread.\n\n## Keys\n\n| key |")
     assert "old" not in text
     assert outdated_pages(tmp_path, stages) == []

@@ -58,7 +58,7 @@ def test_corruption_is_named_and_rebuilt_to_the_same_bytes(
     for shard in damaged:
         flip(next((out / WORK).glob(f"{shard}.*")), 3)
     run_toy_stages(config, out, workers=workers)
-    log = (out / WORK / "log.txt").read_text()
+    log = (out / WORK / "log.txt").read_text(encoding="utf-8")
     for shard in damaged:
         named = next((out / WORK).glob(f"{shard}.*")).relative_to(out / WORK)
         assert f"{named} is corrupted: its sha256 is not the one in its record; {named.stem} is rebuilt" in log
@@ -94,7 +94,7 @@ def test_input_rebuilt_with_other_bytes_is_read_again(tmp_path: Path, write_conf
     files = {"bag-0.txt": {"sha256": file_digest(out / WORK / "salt/bag-0.txt"), "bytes": 5}}
     path.write_bytes(replace(record, files=files).to_bytes())
     assert run_toy_stages(write_config(), out)["bread"].made == 6
-    assert "6 shards are rebuilt: an input has other bytes" in (out / WORK / "log.txt").read_text()
+    assert "6 shards are rebuilt: an input has other bytes" in (out / WORK / "log.txt").read_text(encoding="utf-8")
 
 
 def test_record_with_a_flipped_byte_has_its_shard_rebuilt(tmp_path: Path, write_config: WriteConfig) -> None:
@@ -144,7 +144,7 @@ def in_place_of(path: Path, what: str) -> None:
     path.unlink()
     if what == "a folder":
         (path / "with").mkdir(parents=True)
-        (path / "with/a file").write_text("in it")
+        (path / "with/a file").write_text("in it", encoding="utf-8")
     else:
         content = {
             "half": whole[:-40],
@@ -205,8 +205,8 @@ def test_folder_in_place_of_a_shard_counts_as_corruption(tmp_path: Path, write_c
 def test_listing_of_a_file_elsewhere_deletes_nothing_there(tmp_path: Path, write_config: WriteConfig) -> None:
     out, outside, small = tmp_path / "out", tmp_path / "precious.txt", {"fields": 1, "wanted": 1}
     run_toy_stages(write_config(grain=small), out)
-    outside.write_text("mine")
-    (out / WORK / "bread/engine/published.json").write_text('["../precious.txt"]')
+    outside.write_text("mine", encoding="utf-8")
+    (out / WORK / "bread/engine/published.json").write_text('["../precious.txt"]', encoding="utf-8")
     run_toy_stages(write_config(grain=small), out)
-    assert outside.read_text() == "mine"
+    assert outside.read_text(encoding="utf-8") == "mine"
     assert json.loads((out / WORK / "bread/engine/published.json").read_bytes()) == ["toys/loaves/0.bin"]

@@ -41,7 +41,7 @@ def descendants(pid: int) -> set[int]:
     children: set[int] = set()
     for path in Path(f"/proc/{pid}/task").glob("*/children"):
         with contextlib.suppress(OSError):
-            children |= {int(child) for child in path.read_text().split()}
+            children |= {int(child) for child in path.read_text(encoding="utf-8").split()}
     return children.union(*map(descendants, children))
 
 
@@ -75,7 +75,7 @@ def test_shard_whose_worker_dies_once_is_made_by_another(tmp_path: Path, write_c
     assert not results["flour"].failed
     shards = [made(tmp_path / out)[str(WORK / "flour/harvest1-0.tar")] for out in ("calm", "troubled")]
     assert shards[0] == shards[1]
-    assert (tmp_path / "marks/harvest1-0").read_text() == "xx"
+    assert (tmp_path / "marks/harvest1-0").read_text(encoding="utf-8") == "xx"
 
 
 def test_shard_that_keeps_killing_its_worker_is_quarantined_and_the_rest_is_made(
@@ -88,7 +88,9 @@ def test_shard_that_keeps_killing_its_worker_is_quarantined_and_the_rest_is_made
     )
     assert run.returncode == 1
     assert "flour: failed: harvest0-1" in run.stderr
-    assert (tmp_path / "marks/harvest0-1").read_text() == "xxxx", "three times among others, once in isolation"
+    assert (tmp_path / "marks/harvest0-1").read_text(encoding="utf-8") == "xxxx", (
+        "three times among others, once in isolation"
+    )
     flour = tmp_path / "out" / WORK / "flour"
     assert len(list(flour.glob("*.tar"))) == 5
     assert not list(flour.glob(".*.tmp"))
@@ -100,7 +102,7 @@ def test_shard_that_keeps_killing_its_worker_is_quarantined_and_the_rest_is_made
 def test_shard_that_fails_once_is_made_at_the_second_try(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config(flour={"trouble": {"harvest0-1": "fails once"}})
     assert not run_toy_stages(config, tmp_path / "out", "salt", "grain", "flour")["flour"].failed
-    assert (tmp_path / "marks/harvest0-1").read_text() == "xx"
+    assert (tmp_path / "marks/harvest0-1").read_text(encoding="utf-8") == "xx"
 
 
 def test_failing_shard_is_tried_three_times_then_quarantined_until_the_next_run(
@@ -110,11 +112,11 @@ def test_failing_shard_is_tried_three_times_then_quarantined_until_the_next_run(
     result = run_toy_stages(config, tmp_path / "out", "salt", "grain", "flour")["flour"]
     assert result.failed == {"harvest2-0": "the stones are blunt"}
     assert result.made == 5
-    assert (tmp_path / "marks/harvest2-0").read_text() == "xxx"
+    assert (tmp_path / "marks/harvest2-0").read_text(encoding="utf-8") == "xxx"
     failed = tmp_path / "out" / WORK / "flour/failed/harvest2-0.json"
     assert "ShardFailed: the stones are blunt" in json.loads(failed.read_bytes())["trace"]
     assert run_toy_stages(config, tmp_path / "out", "flour")["flour"].failed == result.failed
-    assert (tmp_path / "marks/harvest2-0").read_text() == "xxxxxx"
+    assert (tmp_path / "marks/harvest2-0").read_text(encoding="utf-8") == "xxxxxx"
     assert not run_toy_stages(write_config(), tmp_path / "out", "flour")["flour"].failed
     assert not failed.exists()
 
@@ -123,7 +125,7 @@ def test_shard_refused_as_a_whole_is_not_tried_again(tmp_path: Path, write_confi
     config = write_config(flour={"trouble": {"harvest2-0": "refuses"}})
     result = run_toy_stages(config, tmp_path / "out", "salt", "grain", "flour")["flour"]
     assert result.failed == {"harvest2-0": "stones in the grain"}
-    assert (tmp_path / "marks/harvest2-0").read_text() == "x"
+    assert (tmp_path / "marks/harvest2-0").read_text(encoding="utf-8") == "x"
 
 
 def test_no_space_stops_everything_and_leaves_whole_files(tmp_path: Path, write_config: WriteConfig) -> None:
@@ -184,7 +186,7 @@ def test_folder_that_cannot_be_written_stops_everything(tmp_path: Path, write_co
 
 
 def test_out_that_is_a_file_is_reported(tmp_path: Path, write_config: WriteConfig) -> None:
-    (tmp_path / "out").write_text("not a folder")
+    (tmp_path / "out").write_text("not a folder", encoding="utf-8")
     with pytest.raises(Fatal, match=r"cannot make folders under .*out"):
         run_toy_stages(write_config(), tmp_path / "out", "salt")
 

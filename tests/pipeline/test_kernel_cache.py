@@ -58,13 +58,13 @@ class Checkout:
         (folder / "shop").mkdir(parents=True)
         (folder / "shop/__init__.py").touch()
         for name, text in SOURCES.items():
-            (folder / "shop" / name).write_text(text)
+            (folder / "shop" / name).write_text(text, encoding="utf-8")
 
     def edit(self, name: str, old: str, new: str) -> None:
         path = self.folder / "shop" / name
-        text = path.read_text()
+        text = path.read_text(encoding="utf-8")
         assert old in text
-        path.write_text(text.replace(old, new))
+        path.write_text(text.replace(old, new), encoding="utf-8")
 
     def start(self) -> subprocess.Popen[str]:
         env = os.environ | {"PYTHONPATH": f"{self.folder}:{ROOT}", "XDG_CACHE_HOME": str(self.cache)}

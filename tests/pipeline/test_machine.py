@@ -17,7 +17,9 @@ def project_with_missing_library(folder: Path) -> Path:
     """A project that needs a library no machine has, and nothing else of the real one but its set-up."""
     (folder / "pipeline").mkdir(parents=True)
     shutil.copy(ROOT / "pipeline/setup.sh", folder / "pipeline")
-    (folder / "pipeline/libraries.txt").write_text("# library, package\nlibnowhere.so.9 libnowhere9 nobody\n")
+    (folder / "pipeline/libraries.txt").write_text(
+        "# library, package\nlibnowhere.so.9 libnowhere9 nobody\n", encoding="utf-8"
+    )
     return folder
 
 
@@ -50,7 +52,7 @@ def test_set_up_names_the_packages_without_apt(tmp_path: Path) -> None:
 def test_set_up_prints_the_exact_command_where_apt_may_not_or_cannot(tmp_path: Path) -> None:
     tools = tmp_path / "tools"
     tools.mkdir()
-    (tools / "apt-get").write_text("#!/bin/sh\nexit 100\n")
+    (tools / "apt-get").write_text("#!/bin/sh\nexit 100\n", encoding="utf-8")
     (tools / "apt-get").chmod(0o755)
     done = set_up(project_with_missing_library(tmp_path / "project"), tools)
     assert done.returncode == 1
@@ -60,8 +62,10 @@ def test_set_up_prints_the_exact_command_where_apt_may_not_or_cannot(tmp_path: P
 
 @pytest.mark.slow
 def test_doctor_finds_a_library_that_does_not_load_and_names_the_package(tmp_path: Path) -> None:
-    (tmp_path / "fcl.py").write_text("raise ImportError('libGL.so.1: cannot open shared object file')\n")
-    (tmp_path / "igraph.py").write_text("import os\nos.abort()\n")
+    (tmp_path / "fcl.py").write_text(
+        "raise ImportError('libGL.so.1: cannot open shared object file')\n", encoding="utf-8"
+    )
+    (tmp_path / "igraph.py").write_text("import os\nos.abort()\n", encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "-m", "pipeline", "doctor", "--out", str(tmp_path / "out")],
         cwd=ROOT,

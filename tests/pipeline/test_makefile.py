@@ -106,7 +106,9 @@ def test_without_a_seed_the_config_has_its_own() -> None:
 def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     text = make("help", "OUT=/data", "WORKERS=3").stdout
     rows = {line.split()[0]: line.split() for line in text.splitlines() if line.startswith("  ")}
-    phony = [line for line in (ROOT / "Makefile").read_text().splitlines() if line.startswith(".PHONY:")]
+    phony = [
+        line for line in (ROOT / "Makefile").read_text(encoding="utf-8").splitlines() if line.startswith(".PHONY:")
+    ]
     targets = {target for line in phony for target in line.split()[1:]}
     assert set(rows) == targets | set(VARIABLES)
     assert all(len(row) > 2 for row in rows.values()), "each is explained"

@@ -66,7 +66,7 @@ def test_pruned_files_are_rebuilt_on_demand_and_pruned_again(
     assert not between(out)
     again = {name.partition("/")[0] for name, at in record_times(out).items() if before[name] != at}
     assert {"salt", "bread", "flour", "grain"} <= again
-    assert "was pruned" in (out / WORK / "log.txt").read_text()
+    assert "was pruned" in (out / WORK / "log.txt").read_text(encoding="utf-8")
 
 
 def test_keep_all_rebuilds_pruned_files(tmp_path: Path, write_config: WriteConfig) -> None:

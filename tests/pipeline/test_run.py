@@ -67,7 +67,7 @@ def test_rejects_are_counted_by_reason_and_listed(tmp_path: Path, write_config: 
     record = json.loads((grain / "records/harvest0-1.json").read_bytes())
     assert record["rejects"] == {"hollow": 2}
     assert record["samples"] == 4
-    lines = [json.loads(line) for line in (grain / "rejects/harvest0-1.jsonl").read_text().splitlines()]
+    lines = [json.loads(line) for line in (grain / "rejects/harvest0-1.jsonl").read_text(encoding="utf-8").splitlines()]
     assert [line["item"] for line in lines] == ["harvest0-1-2", "harvest0-1-5"]
     assert lines[0] == {"item": "harvest0-1-2", "reason": "hollow", "detail": "grain 2", "count": 1}
     assert json.loads((grain / "engine/manifest.json").read_bytes())["rejects"] == {"hollow": 12}
@@ -137,7 +137,7 @@ def test_half_written_files_are_removed(tmp_path: Path, write_config: WriteConfi
     grain = tmp_path / "out" / WORK / "grain"
     (grain / ".harvest0-0.tar.tmp").write_bytes(b"half")
     (grain / "records/.harvest9-9.json.tmp").write_bytes(b"half")
-    (grain / "progress/harvest0-0").write_text("1 6")
+    (grain / "progress/harvest0-0").write_text("1 6", encoding="utf-8")
     run_toy_stages(config, tmp_path / "out", "grain")
     assert made(tmp_path / "out") == whole
 
@@ -209,7 +209,7 @@ def test_published_files_follow_the_config(tmp_path: Path, write_config: WriteCo
     loaves = tmp_path / "out/toys/loaves"
     assert sorted(path.name for path in loaves.iterdir()) == ["0.bin", "1.bin", "2.bin", "3.bin"]
     assert loaves.joinpath("1.bin").samefile(tmp_path / "out" / WORK / "bread/loaf-harvest0-1.bin")
-    (loaves / "mine.txt").write_text("a user's own")
+    (loaves / "mine.txt").write_text("a user's own", encoding="utf-8")
     run_toy_stages(write_config(bread={"loaves": 2}), tmp_path / "out")
     assert sorted(path.name for path in loaves.iterdir()) == ["0.bin", "1.bin", "mine.txt"]
 
@@ -253,7 +253,7 @@ class LoomsConfig(StrictModel):
 def test_shard_with_all_threads_runs_alone(tmp_path: Path) -> None:
     threads = {"a": 1, "b": 2, "c": 1, "d": 1, "e": 9}
     weave(tmp_path, stage_of([Shard(name, threads=count) for name, count in threads.items()]), workers=2)
-    spans = {name: json.loads((tmp_path / WORK / f"looms/{name}.json").read_text()) for name in threads}
+    spans = {name: json.loads((tmp_path / WORK / f"looms/{name}.json").read_text(encoding="utf-8")) for name in threads}
     for wide in ("b", "e"):
         began, ended = spans[wide]
         assert all(span[1] <= began or ended <= span[0] for name, span in spans.items() if name != wide)

@@ -46,7 +46,10 @@ def test_stalled_shard_is_killed_retried_and_quarantined_and_the_rest_is_made(
     message = "it made no progress for 7s, and its worker was killed"
     assert results["flour"].failed == {"harvest0-1": message}
     assert results["flour"].made == 1
-    assert [(tmp_path / "marks" / name).read_text() for name in ("harvest0-0", "harvest0-1")] == ["xx", "xx"]
+    assert [(tmp_path / "marks" / name).read_text(encoding="utf-8") for name in ("harvest0-0", "harvest0-1")] == [
+        "xx",
+        "xx",
+    ]
     flour = tmp_path / "out" / WORK / "flour"
     assert json.loads((flour / "failed/harvest0-1.json").read_bytes())["message"] == message
     assert sorted(path.name for path in flour.glob("*.*")) == ["harvest0-0.tar"]
@@ -58,13 +61,13 @@ def test_stalled_shard_is_killed_retried_and_quarantined_and_the_rest_is_made(
 def test_any_change_counts_as_progress(bag: Job) -> None:
     places = bag.paths.stage("salt")
     watch, start, growing = StallWatch(0.025, places), time.monotonic(), places.root / ".bag-0.txt.tmp"
-    (places.progress / "bag-0").write_text("1 4")
+    (places.progress / "bag-0").write_text("1 4", encoding="utf-8")
     while time.monotonic() - start < 4:
         growing.write_bytes(b"a" * int(10 * (time.monotonic() - start)))
         assert not watch.stalled([bag])
         time.sleep(0.1)
     while not watch.stalled([bag]):
-        (places.progress / "bag-0").write_text("1 4")
+        (places.progress / "bag-0").write_text("1 4", encoding="utf-8")
         assert time.monotonic() - start < 20, "the same words again are no progress"
         time.sleep(0.1)
     watch.restart("bag-0")
@@ -101,6 +104,6 @@ def test_stopped_idle_worker_does_not_delay_the_end(bag: Job, monkeypatch: pytes
 
 def _command(pid: int) -> str:
     try:
-        return Path(f"/proc/{pid}/cmdline").read_text()
+        return Path(f"/proc/{pid}/cmdline").read_text(encoding="utf-8")
     except FileNotFoundError:
         return ""

@@ -27,7 +27,7 @@ def make(tmp_path: Path) -> Callable[[Body], Report]:
     places = DatasetPaths(tmp_path, "toy")
     for name in ("earlier", "own"):
         places.stage(name).make()
-    (places.stage("earlier").root / "in.txt").write_text("flour")
+    (places.stage("earlier").root / "in.txt").write_text("flour", encoding="utf-8")
 
     def run(body: Body) -> Report:
         shard, config = Shard("shard", {}, ("earlier/in",)), Config("toy", "1.0.0", 5, {}, Path("t.yaml"))
@@ -50,7 +50,7 @@ def test_files_appear_together_with_their_record(make: Callable[[Body], Report],
 
     assert make(body) == Report("shard", "done")
     assert sorted(path.name for path in own(tmp_path).glob("*.*")) == ["shard.a", "shard.b.txt"]
-    assert (own(tmp_path) / "shard.b.txt").read_text() == "flour"
+    assert (own(tmp_path) / "shard.b.txt").read_text(encoding="utf-8") == "flour"
     assert (own(tmp_path) / "records/shard.json").is_file()
 
 
@@ -87,7 +87,7 @@ def test_corrupted_input_is_named_and_nothing_is_committed(make: Callable[[Body]
         return Outcome(0)
 
     source = tmp_path / ".work/toy/earlier/in.txt"
-    source.write_text("floor")
+    source.write_text("floor", encoding="utf-8")
     for body in (reads, goes_on):
         report = make(body)
         assert (report.status, report.corrupted) == ("corrupted", "earlier/in")
@@ -106,7 +106,7 @@ def test_file_of_another_name_is_refused(make: Callable[[Body], Report], tmp_pat
 
 
 def test_file_that_is_no_input_is_not_read(make: Callable[[Body], Report], tmp_path: Path) -> None:
-    (tmp_path / ".work/toy/earlier/other.txt").write_text("not listed")
+    (tmp_path / ".work/toy/earlier/other.txt").write_text("not listed", encoding="utf-8")
     report = make(lambda task: Outcome(len(task.input("earlier", "other.txt").read_bytes())))
     assert (report.status, report.message) == (
         "failed",

@@ -26,7 +26,11 @@ FOR_CARDS = ("cuda-", "nvidia-", "triton")
 
 
 def lock_lines() -> list[str]:
-    return [line for line in (ROOT / "requirements.lock").read_text().splitlines() if not line.startswith("#")]
+    return [
+        line
+        for line in (ROOT / "requirements.lock").read_text(encoding="utf-8").splitlines()
+        if not line.startswith("#")
+    ]
 
 
 def pinned() -> dict[str, str]:
@@ -72,7 +76,7 @@ def dynamic_names(path: Path) -> tuple[set[str], set[str]]:
 
 
 def test_pinned_packages_are_those_that_the_code_needs() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"].values()
     asked = [Requirement(item) for item in (*project["dependencies"], *(item for extra in extras for item in extra))]
     versions, reached = pinned(), set()
@@ -97,7 +101,7 @@ def test_pinned_packages_install_without_a_compiler() -> None:
 
 
 def test_every_shared_library_comes_with_a_wheel_or_is_installed_by_set_up() -> None:
-    table = (ROOT / "pipeline/libraries.txt").read_text().splitlines()
+    table = (ROOT / "pipeline/libraries.txt").read_text(encoding="utf-8").splitlines()
     installed = {line.split()[0] for line in table if not line.startswith("#")}
     versions, brought, needs = pinned(), set(), {}
     for found in distributions():

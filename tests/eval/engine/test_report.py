@@ -51,12 +51,14 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         FinishedTable("small", "How small?", TableResult([Table("S", ("a",), ())]), 0),
     ]
     path = tmp_path_factory.mktemp("report") / "report.html"
-    path.write_text(report_html(run, finished, {"strings": "no trained model; make train"}, datetime.now(UTC)))
+    path.write_text(
+        report_html(run, finished, {"strings": "no trained model; make train"}, datetime.now(UTC)), encoding="utf-8"
+    )
     return path
 
 
 def test_report_shows_tables_their_origin_and_what_is_missing(page: Path) -> None:
-    text = page.read_text()
+    text = page.read_text(encoding="utf-8")
     for shown in (
         "A wide table",
         "How wide?",
@@ -78,20 +80,20 @@ def test_report_names_config_sections_changed_since_the_dataset(tmp_path: Path) 
     for edges, is_changed in (("all", False), ("tree", True)):
         sections["strings"]["edges"] = edges
         manifest = {**facts, "software": {"shapemill": "0.1.0+abc"}, "config": sections}
-        (run.folder / "manifest.json").write_text(json.dumps(manifest))
+        (run.folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
         page = report_html(load_dataset_run(run.config.path, tmp_path), [], {}, datetime.now(UTC))
         assert ("Changed since then" in page and "sections of the config: strings" in page) == is_changed
         assert "3 shapes, 3 of castle" in page
 
 
 def test_report_escapes_all_texts(page: Path) -> None:
-    text = page.read_text()
+    text = page.read_text(encoding="utf-8")
     assert HOSTILE not in text
     assert text.count("&lt;script&gt;") >= 20
 
 
 def test_report_has_no_external_references(page: Path) -> None:
-    matches = re.findall(r'(?:src|href)="([^"]*)"|url\(([^)]*)\)', page.read_text())
+    matches = re.findall(r'(?:src|href)="([^"]*)"|url\(([^)]*)\)', page.read_text(encoding="utf-8"))
     assert {first or second for first, second in matches if not (first or second).startswith(("data:", "#"))} == set()
 
 
@@ -143,7 +145,9 @@ def test_page_in_browser_has_no_overflow_requests_or_errors(page: Path, tab: Bro
 
 def test_browser_reports_requests_messages_and_overflow(tmp_path: Path, tab: Browser) -> None:
     page = tmp_path / "page.html"
-    page.write_text('<img src="none.png"><div style="width:2000px">w</div><script>console.log("said")</script>')
+    page.write_text(
+        '<img src="none.png"><div style="width:2000px">w</div><script>console.log("said")</script>', encoding="utf-8"
+    )
     tab.show(page, 360, "light")
     assert tab.value("document.documentElement.scrollWidth") > 360
     assert len(tab.events_of("Network.requestWillBeSent")) == 2

@@ -51,7 +51,7 @@ def test_finished_sections_survive_a_kill(tmp_path: Path) -> None:
     tables, out = tmp_path / "extension" / "eval" / "tables", tmp_path / "out"
     tables.mkdir(parents=True)
     out.mkdir()
-    (tables / "slow.py").write_text(TABLE)
+    (tables / "slow.py").write_text(TABLE, encoding="utf-8")
 
     def run(*options: str) -> subprocess.CompletedProcess[str]:
         command = [
@@ -70,7 +70,7 @@ def test_finished_sections_survive_a_kill(tmp_path: Path) -> None:
         return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
 
     def made() -> str:
-        return (out / "made.txt").read_text()
+        return (out / "made.txt").read_text(encoding="utf-8")
 
     results = out / "shapemill-default-eval"
     assert run().returncode == -signal.SIGKILL
@@ -79,13 +79,13 @@ def test_finished_sections_survive_a_kill(tmp_path: Path) -> None:
     done = run()
     assert done.returncode == 0, done.stderr
     assert "a: cached" in done.stderr
-    assert (results / "slow.csv").read_text() == f"part,size\na,{1 / 3}\nb,{1 / 3}\n"
+    assert (results / "slow.csv").read_text(encoding="utf-8") == f"part,size\na,{1 / 3}\nb,{1 / 3}\n"
     assert made() == "abb"
     run()
     assert made() == "abb"
     run("--set", "slowness=2")
     assert made() == "abbab", "another option"
-    (tables / "slow.py").write_text(TABLE.replace("1 / 3", "1 / 4"))
+    (tables / "slow.py").write_text(TABLE.replace("1 / 3", "1 / 4"), encoding="utf-8")
     run("--set", "slowness=2")
     assert made() == "abbabab", "other code"
 

@@ -14,7 +14,7 @@ def test_sweep_has_a_row_per_radius_and_a_figure(tmp_path: Path) -> None:
     vertices, faces = mesh(wall(3)[..., [1, 2, 0]])  # y points up
     lines = [f"v {x:g} {y:g} {z:g}" for x, y, z in vertices.tolist()]
     lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
-    (tmp_path / "wall.obj").write_text("\n".join(lines) + "\n")
+    (tmp_path / "wall.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
     code, printed = shapemill(
         "eval", "radius_sweep", str(tmp_path / "wall.obj"), "--set", "radii=[0.06, 0.03]", "--out", str(tmp_path)
     )
@@ -42,7 +42,7 @@ def test_missing_file_is_reported(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("radius", ["0", "-0.01", "1.6"])
 def test_radius_outside_the_config_range_is_refused_before_any_work(radius: str, tmp_path: Path) -> None:
-    (tmp_path / "wall.obj").write_text("never read")
+    (tmp_path / "wall.obj").write_text("never read", encoding="utf-8")
     code, printed = shapemill("eval", "radius_sweep", str(tmp_path / "wall.obj"), "--set", f"radii=[0.03, {radius}]")
     assert code == 2
     assert "0.004 to 0.1" in printed
@@ -50,7 +50,7 @@ def test_radius_outside_the_config_range_is_refused_before_any_work(radius: str,
 
 @pytest.mark.parametrize("radius", ["nan", ".nan"])
 def test_radius_that_is_no_number_is_refused(radius: str, tmp_path: Path) -> None:
-    (tmp_path / "wall.obj").write_text("never read")
+    (tmp_path / "wall.obj").write_text("never read", encoding="utf-8")
     code, printed = shapemill("eval", "radius_sweep", str(tmp_path / "wall.obj"), "--set", f"radii=[0.03, {radius}]")
     assert code == 2
     assert "radii" in printed

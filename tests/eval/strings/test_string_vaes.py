@@ -98,13 +98,15 @@ def test_unreadable_weights_are_reported(tmp_path: Path) -> None:
 
 def test_training_curve_reads_the_log(tmp_path: Path) -> None:
     rows = [{"round": number, "step": 10 * number, "val_nats": 9.0 - number} for number in range(3)]
-    (tmp_path / "curves.csv").write_text(curves_csv(rows))
+    (tmp_path / "curves.csv").write_text(curves_csv(rows), encoding="utf-8")
     assert training_curve(tmp_path, "val_nats") == [(0.0, 9.0), (10.0, 8.0), (20.0, 7.0)]
 
 
 def test_unreadable_strings_are_left_out(tmp_path: Path) -> None:
     model = random_vae("masked")
-    (tmp_path / "toy-test.txt").write_text("".join(f"{line}\n" for line in [*toy_strings()[:3], "AZ", "B(B)"]))
+    (tmp_path / "toy-test.txt").write_text(
+        "".join(f"{line}\n" for line in [*toy_strings()[:3], "AZ", "B(B)"]), encoding="utf-8"
+    )
     assert corpus_strings(tmp_path, "toy", "test", model) == list(toy_strings()[:3])
     assert max(map(len, toy_strings())) <= MAX_TOKENS
 

@@ -44,7 +44,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> DatasetRun:
         "search": {"duplicates": "graph", "tries_per_round": 100, "max_rounds": 3},
     }
     config = {"name": "small", "seed": 3, "exemplars": {"kits": kits}, "variations": variations}
-    (folder / "small.yaml").write_text(yaml.safe_dump(config))
+    (folder / "small.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     for stage in ("autoconfig", "exemplars", "variations", "strings"):
         code, said = shapemill("run", stage, "--config", folder / "small.yaml", "--out", folder, "--workers", 1)
         assert code == 0, said
@@ -91,7 +91,7 @@ def test_generation_is_one_above_the_highest_parent(run: DatasetRun) -> None:
     parents = {
         f"{path.name.removesuffix('.lineage.jsonl')}-{number}": json.loads(line)["parents"]
         for path in folder.glob("castle-r*.lineage.jsonl")
-        for number, line in enumerate(path.read_text().splitlines())
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines())
     }
 
     @cache

@@ -18,7 +18,7 @@ def made(folder: Path, name: str, asked: dict[str, Any], stages: tuple[str, ...]
         "abstraction": asked,
     }
     config = folder / f"{name}.yaml"
-    config.write_text(yaml.safe_dump({"name": name, "seed": 5, "license": "MIT", **sections}))
+    config.write_text(yaml.safe_dump({"name": name, "seed": 5, "license": "MIT", **sections}), encoding="utf-8")
     for stage in stages:
         code, printed = shapemill("run", stage, "--config", config, "--out", folder, "--workers", 1)
         assert code == 0, printed

@@ -34,7 +34,7 @@ def run(folder: Path, stages: tuple[str, ...], out: str = "out") -> str:
 
 def record(folder: Path, stage: str, shard: str, out: str = "out") -> dict[str, Any]:
     path = folder / out / ".work" / "toy" / stage / "records" / f"{shard}.json"
-    content: dict[str, Any] = json.loads(path.read_text())
+    content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return content
 
 
@@ -46,7 +46,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     paths = [write_model(folder / f"ring{k}.glb", ROAD, shape) for k, shape in enumerate(shapes)]
     kits = [{"name": "open", "shapes": paths}, stated({"name": "stated", "shapes": paths})]
     config = {"name": "toy", "seed": 5, "autoconfig": {"max_tries": 200}, "exemplars": {"kits": kits}}
-    (folder / "toy.yaml").write_text(yaml.safe_dump(config))
+    (folder / "toy.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     return folder, run(folder, ("autoconfig", "exemplars"))
 
 
@@ -60,7 +60,7 @@ def test_kit_is_built_with_the_recorded_settings(made: tuple[Path, str]) -> None
     built = record(made[0], "exemplars", "open")["summary"]
     assert summary["resolved"]["up"] == "z"
     assert (built["resolved"], built["reasons"]) == (summary["resolved"], summary["reasons"])
-    kit = json.loads((made[0] / "out" / ".work" / "toy" / "exemplars" / "open.json").read_text())
+    kit = json.loads((made[0] / "out" / ".work" / "toy" / "exemplars" / "open.json").read_text(encoding="utf-8"))
     assert (kit["up"], kit["strictness"]) == ("z", summary["resolved"]["grammar"])
     assert record(made[0], "exemplars", "stated")["summary"]["resolved"] == {}
 
@@ -74,7 +74,7 @@ def test_near_copies_are_rejected_if_auto_finds_enough_other_variants(tmp_path: 
     kit = stated({"name": "open", "shapes": shapes, "disconnected": "auto"})
     variations = {"samples_per_kit": 24, "search": {"tries_per_round": 2000}, "splits": {"by": "graph", "shards": 1}}
     config = {"name": "toy", "exemplars": {"kits": [kit]}, "variations": variations}
-    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     run(tmp_path, ("autoconfig", "exemplars", "variations"))
     requirements = {"require.stable": False, "require.labels": []}
     summary = record(tmp_path, "autoconfig", "open")["summary"]["resolved"]
@@ -99,7 +99,7 @@ def test_exemplars_are_resized_if_there_are_too_few_layouts_as_inspect_predicts(
         "exemplars": {"kits": [{"name": "rings", "shapes": paths}]},
         "variations": {"samples_per_kit": 12, "splits": {"by": "graph", "val": 0.25, "shards": 1}},
     }
-    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     text = run(tmp_path, ("autoconfig", "exemplars", "variations", "proportions"))
     assert "rings: fallback: proportions: 100% of what is drawn holds together; of other layouts about 16" in text
     work = tmp_path / "out" / ".work" / "toy"
@@ -113,7 +113,7 @@ def test_exemplars_are_resized_if_there_are_too_few_layouts_as_inspect_predicts(
     assert result["autoconfig"]["resolved"] == record(tmp_path, "autoconfig", "rings")["summary"]["resolved"]
     assert result["autoconfig"]["resolved"]["proportions.require.stable"] is True
     config["variations"] |= {"fallback": "nothing"}
-    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     run(tmp_path, ("autoconfig",))
     assert "fallback" not in record(tmp_path, "autoconfig", "rings")["summary"]["resolved"]
 
@@ -123,11 +123,11 @@ def test_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path) -> 
     paths = [str(made[0] / f"ring{k}.glb") for k in (0, 1)]
     code, text = shapemill("inspect", *paths, "--tries", 200, "--out", tmp_path)
     assert code == 0, text
-    written = yaml.safe_load((tmp_path / "ring0.yaml").read_text())
+    written = yaml.safe_load((tmp_path / "ring0.yaml").read_text(encoding="utf-8"))
     written["name"] = "toy"
     assert written["variations"] == {"samples_per_kit": 0}
     written["proportions"] |= {"samples_per_kit": 8}
-    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(written))
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(written), encoding="utf-8")
     run(tmp_path, ("autoconfig", "exemplars", "proportions"))
     work = tmp_path / "out" / ".work" / "toy"
     assert not list((work / "autoconfig").glob("*.json"))
@@ -137,6 +137,6 @@ def test_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path) -> 
         "samples_per_kit": 8,
         "search": {"duplicates": "graph", "tries_per_round": 400, "patience": 800},
     }
-    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(written))
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(written), encoding="utf-8")
     run(tmp_path, ("autoconfig", "exemplars", "variations"))
     assert list((work / "variations").glob("toy-train-*.tar"))

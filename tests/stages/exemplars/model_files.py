@@ -118,7 +118,7 @@ def write_obj(path: Path, boxes: dict[str, np.ndarray], head: str = "", before: 
         lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in corners.tolist()]
         lines.append((before or {}).get(name, ""))
         lines += [f"f {a} {b} {c}" for a, b, c in (BOX_FACES + 1 + 8 * number).tolist()]
-    path.write_text("\n".join(lines) + "\n")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
 
 

@@ -111,7 +111,7 @@ def test_zip_in_place_of_a_model_is_not_unpacked(tmp_path: Path) -> None:
 def test_buffer_that_links_to_itself_is_refused(tmp_path: Path) -> None:
     glb = two_boxes()
     glb.header["buffers"] = [{"byteLength": len(glb.chunk), "uri": "loop.bin"}]
-    (tmp_path / "m.gltf").write_text(json.dumps(glb.header))
+    (tmp_path / "m.gltf").write_text(json.dumps(glb.header), encoding="utf-8")
     (tmp_path / "loop.bin").symlink_to("loop.bin")
     with pytest.raises(ConfigError, match=r"buffer 0 names 'loop.bin', a path outside the folder"):
         read_model(tmp_path / "m.gltf", "auto", LIMITS)
@@ -161,20 +161,26 @@ def test_element_without_properties_takes_no_time(tmp_path: Path) -> None:
 def test_odd_texture_coordinates_are_ignored(tmp_path: Path) -> None:
     for path in write_good(tmp_path):
         if path.name == "skin.ply":
-            text = path.read_text().replace("6 0 0 1 0 1 1 255", "5 0 0 1 0 1 255").replace("uchar red", "uchar rot")
-            path.write_text(text)
+            text = (
+                path.read_text(encoding="utf-8")
+                .replace("6 0 0 1 0 1 1 255", "5 0 0 1 0 1 255")
+                .replace("uchar red", "uchar rot")
+            )
+            path.write_text(text, encoding="utf-8")
             (warning,) = read_model(path, "objects", LIMITS).warnings
             assert warning.startswith("property texcoord of element face has no two numbers for each corner")
 
 
 def test_newlines_before_a_solid_take_no_time(tmp_path: Path) -> None:
     triangle = "outer loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n"
-    (tmp_path / "m.stl").write_text("\n" * 200_000 + f"solid a\nfacet normal 0 0 1\n{triangle}endfacet\nendsolid a\n")
+    (tmp_path / "m.stl").write_text(
+        "\n" * 200_000 + f"solid a\nfacet normal 0 0 1\n{triangle}endfacet\nendsolid a\n", encoding="utf-8"
+    )
     assert len(read_model(tmp_path / "m.stl", "objects", ReadLimits(cpu_seconds=5)).parts[0].faces) == 1
 
 
 def test_colour_of_two_numbers_is_a_warning(tmp_path: Path) -> None:
-    (tmp_path / "m.mtl").write_text("newmtl a\nKd 1 0\n")
+    (tmp_path / "m.mtl").write_text("newmtl a\nKd 1 0\n", encoding="utf-8")
     path = write_obj(tmp_path / "m.obj", {"a": box(), "b": box(at=(2, 0, 0))}, "mtllib m.mtl\nusemtl a")
     assert read_model(path, "auto", LIMITS).warnings == (
         "material colour 'Kd 1 0' is not red, green, blue; its faces are grey",

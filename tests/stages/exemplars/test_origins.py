@@ -18,7 +18,7 @@ from stages.shape.collection.origin import missing_licenses
 
 def config_of(folder: Path, *kits: dict[str, Any]) -> Config:
     path = folder / "kits.yaml"
-    path.write_text(yaml.safe_dump({"name": "kits", "exemplars": {"kits": list(kits)}}))
+    path.write_text(yaml.safe_dump({"name": "kits", "exemplars": {"kits": list(kits)}}), encoding="utf-8")
     return load_config(path, {"exemplars": ExemplarsConfig})
 
 

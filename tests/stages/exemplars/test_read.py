@@ -79,7 +79,7 @@ class TestFormats:
         glb = boxes_glb()
         (tmp_path / "all parts.bin").write_bytes(glb.chunk)
         glb.header["buffers"] = [{"byteLength": len(glb.chunk), "uri": "all%20parts.bin"}]
-        (tmp_path / "m.gltf").write_text(json.dumps(glb.header))
+        (tmp_path / "m.gltf").write_text(json.dumps(glb.header), encoding="utf-8")
         check_boxes(read_model(tmp_path / "m.gltf"))
 
     def test_glb_that_trimesh_wrote_gives_its_nodes(self, tmp_path: Path) -> None:
@@ -118,7 +118,7 @@ class TestFormats:
             trimesh.Trimesh(box, BOX_FACES, process=False).export(file_type="stl_ascii") for box in BOXES.values()
         ]
         named = [text.replace("solid", f"solid {name}", 1) for name, text in zip(BOXES, solids, strict=True)]
-        (tmp_path / "m.stl").write_text("\n".join(named))
+        (tmp_path / "m.stl").write_text("\n".join(named), encoding="utf-8")
         model = read_model(tmp_path / "m.stl")
         check_boxes(model)
         assert [part.name for part in model.parts] == list(BOXES)
@@ -340,7 +340,7 @@ end_header
         rows = [(3, 0, 1, 4, 0, 0, 255), (4, 0, 1, 2, 3, 0, 255, 0), (3, 1, 2, 4, 9, 9, 9)]
         points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1)]
         text = head.format("ascii") + "\n".join(" ".join(map(str, row)) for row in (*points, *rows)) + "\n"
-        (tmp_path / "text.ply").write_text(text)
+        (tmp_path / "text.ply").write_text(text, encoding="utf-8")
         body = np.array(points, dtype="<f4").tobytes()
         for size, *rest in rows:
             body += bytes([size]) + np.array(rest[:size], dtype="<i4").tobytes() + bytes(rest[size:])
@@ -374,7 +374,9 @@ end_header
         text = export_collada(mesh).decode()
         head, tail = text.split("<asset>", 1)
         units = f'<unit name="half" meter="0.5"/><up_axis>{said}</up_axis>'
-        (tmp_path / "m.dae").write_text(f"{head}<asset>{re.sub('<up_axis>.*</up_axis>', units, tail, count=1)}")
+        (tmp_path / "m.dae").write_text(
+            f"{head}<asset>{re.sub('<up_axis>.*</up_axis>', units, tail, count=1)}", encoding="utf-8"
+        )
         model = read_model(tmp_path / "m.dae")
         (part,) = model.parts
         world = part.vertices @ part.pose[:3, :3].T + part.pose[:3, 3]
@@ -412,7 +414,7 @@ usemtl unknown
 f 1 2 \\
  3
 """
-        (tmp_path / "m.obj").write_text(lines)
+        (tmp_path / "m.obj").write_text(lines, encoding="utf-8")
         model = read_model(tmp_path / "m.obj", "objects")
         assert model.parts[0].face_colors[:2].tolist() == [[255, 0, 0], [1, 2, 3]]
         assert len(model.parts[0].faces) == 3
@@ -421,12 +423,12 @@ f 1 2 \\
     @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
     def test_text_in_another_encoding_is_read(self, tmp_path: Path, encoding: str) -> None:
         path = write_obj(tmp_path / "m.obj", BOXES)
-        path.write_text(path.read_text(), encoding=encoding)
+        path.write_text(path.read_text(encoding="utf-8"), encoding=encoding)
         assert [part.name for part in read_model(path).parts] == list(BOXES)
 
     def test_two_libraries_on_one_line_are_both_read(self, tmp_path: Path) -> None:
-        (tmp_path / "a.mtl").write_text("newmtl a\nKd 1 0 0\n")
-        (tmp_path / "b.mtl").write_text("newmtl b\nKd 0 1 0\n")
+        (tmp_path / "a.mtl").write_text("newmtl a\nKd 1 0 0\n", encoding="utf-8")
+        (tmp_path / "b.mtl").write_text("newmtl b\nKd 0 1 0\n", encoding="utf-8")
         write_obj(tmp_path / "m.obj", BOXES, "mtllib a.mtl b.mtl", {"base": "usemtl b", "tower": "usemtl a"})
         colors = [part.face_colors[0].tolist() for part in read_model(tmp_path / "m.obj").parts]
         assert colors == [[0, 255, 0], [255, 0, 0], [255, 0, 0]]
@@ -438,12 +440,12 @@ f 1 2 \\
 
     def test_groups_are_the_objects_where_there_is_but_one_object(self, tmp_path: Path) -> None:
         path = write_obj(tmp_path / "m.obj", BOXES)
-        path.write_text("o everything\n" + path.read_text().replace("\no ", "\ng "))
+        path.write_text("o everything\n" + path.read_text(encoding="utf-8").replace("\no ", "\ng "), encoding="utf-8")
         assert [part.name for part in read_model(path).parts] == list(BOXES)
 
     def test_object_that_is_taken_up_again_is_one_part(self, tmp_path: Path) -> None:
         path = write_obj(tmp_path / "m.obj", BOXES)
-        path.write_text(path.read_text() + "o base\nf 1 2 3\n")
+        path.write_text(path.read_text(encoding="utf-8") + "o base\nf 1 2 3\n", encoding="utf-8")
         model = read_model(path)
         assert [part.name for part in model.parts] == list(BOXES)
         assert len(model.parts[0].faces) == 13
@@ -454,7 +456,7 @@ f 1 2 \\
         points = [(x, 7, y) for x, y in outline + dart]
         lines = [f"v {x} {y} {z}" for x, y, z in points]
         lines += ["f " + " ".join(str(k + 1) for k in range(12)), "f 13 14 15 16"]
-        (tmp_path / "m.obj").write_text("\n".join(lines))
+        (tmp_path / "m.obj").write_text("\n".join(lines), encoding="utf-8")
         part = read_model(tmp_path / "m.obj", "objects").parts[0]
         corners = part.vertices[part.faces]
         areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 1] / 2
@@ -465,8 +467,8 @@ f 1 2 \\
     @pytest.mark.parametrize("line", ["f 1 2 99", "f 1 2 0", "v 1 2", "v a b c", "f 1 2 x"])
     def test_broken_line_is_named(self, tmp_path: Path, line: str) -> None:
         path = write_obj(tmp_path / "m.obj", BOXES)
-        count = len(path.read_text().splitlines())
-        path.write_text(path.read_text() + line + "\n")
+        count = len(path.read_text(encoding="utf-8").splitlines())
+        path.write_text(path.read_text(encoding="utf-8") + line + "\n", encoding="utf-8")
         with pytest.raises(ConfigError, match=f"m.obj, line {count + 1}: '{line}'"):
             read_model(path)
 
@@ -490,7 +492,7 @@ class TestDae:
 </visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
 
     def test_instances_share_a_mesh_and_nodes_nest(self, tmp_path: Path) -> None:
-        (tmp_path / "m.dae").write_text(self.DOCUMENT.replace("IMAGE", "a.png"))
+        (tmp_path / "m.dae").write_text(self.DOCUMENT.replace("IMAGE", "a.png"), encoding="utf-8")
         model = read_model(tmp_path / "m.dae")
         assert [part.name for part in model.parts] == ["Tile.001", "Tile.002", "Tile.003"]
         assert [part.label for part in model.parts] == ["Tile"] * 3
@@ -500,7 +502,7 @@ class TestDae:
 
     def test_entities_are_refused(self, tmp_path: Path) -> None:
         text = self.DOCUMENT.replace("?>", '?><!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]>', 1)
-        (tmp_path / "m.dae").write_text(text.replace("IMAGE", "a.png"))
+        (tmp_path / "m.dae").write_text(text.replace("IMAGE", "a.png"), encoding="utf-8")
         with pytest.raises(ConfigError, match="entities"):
             read_model(tmp_path / "m.dae")
 
@@ -524,7 +526,7 @@ class TestBadFiles:
 
     def test_cut_off_ascii_stl_is_refused(self, tmp_path: Path) -> None:
         text = merged().export(file_type="stl_ascii")
-        (tmp_path / "m.stl").write_text(text[: len(text) // 2])
+        (tmp_path / "m.stl").write_text(text[: len(text) // 2], encoding="utf-8")
         with pytest.raises(ConfigError, match="does not end"):
             read_model(tmp_path / "m.stl")
 
@@ -546,7 +548,7 @@ class TestBadFiles:
         glb = boxes_glb()
         (tmp_path / "m.bin").write_bytes(glb.chunk[:-40])
         glb.header["buffers"] = [{"byteLength": len(glb.chunk), "uri": "m.bin"}]
-        (tmp_path / "m.gltf").write_text(json.dumps(glb.header))
+        (tmp_path / "m.gltf").write_text(json.dumps(glb.header), encoding="utf-8")
         with pytest.raises(ConfigError, match="cut off"):
             read_model(tmp_path / "m.gltf")
         (tmp_path / "m.bin").unlink()
@@ -557,8 +559,8 @@ class TestBadFiles:
         glb = Glb()
         glb.node(name="nothing", mesh=glb.mesh(glb.primitive(box(), np.empty((0, 3)))))
         glb.write(tmp_path / "m.glb")
-        (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\n")
-        (tmp_path / "m.off").write_text("OFF\n0 0 0\n")
+        (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\n", encoding="utf-8")
+        (tmp_path / "m.off").write_text("OFF\n0 0 0\n", encoding="utf-8")
         (tmp_path / "m.stl").write_bytes(b"\0" * 84)
         for suffix in ("glb", "obj", "off", "stl"):
             with pytest.raises(ConfigError, match=f"m.{suffix}: holds no triangles"):
@@ -630,7 +632,7 @@ class TestBadFiles:
         boxes_glb().write(tmp_path / "castle.glb")
         (tmp_path / "folder.glb").mkdir()
         (tmp_path / "empty.glb").touch()
-        (tmp_path / "text.glb").write_text("hello")
+        (tmp_path / "text.glb").write_text("hello", encoding="utf-8")
         for name, message in {
             "castel.glb": "no such file; did you mean castle.glb",
             "folder.glb": "is a folder",
@@ -727,7 +729,7 @@ def opened_files() -> Iterator[list[str]]:
 def gltf_buffer(folder: Path, name: str) -> Path:
     glb = boxes_glb()
     glb.header["buffers"] = [{"byteLength": len(glb.chunk), "uri": name}]
-    (folder / "m.gltf").write_text(json.dumps(glb.header))
+    (folder / "m.gltf").write_text(json.dumps(glb.header), encoding="utf-8")
     return folder / "m.gltf"
 
 
@@ -740,18 +742,20 @@ def obj_library(folder: Path, name: str) -> Path:
 
 
 def obj_texture(folder: Path, name: str) -> Path:
-    (folder / "m.mtl").write_text(f"newmtl a\nmap_Kd {name}\n")
+    (folder / "m.mtl").write_text(f"newmtl a\nmap_Kd {name}\n", encoding="utf-8")
     return write_obj(folder / "m.obj", BOXES, "mtllib m.mtl")
 
 
 def dae_image(folder: Path, name: str) -> Path:
-    (folder / "m.dae").write_text(textured_dae(name))
+    (folder / "m.dae").write_text(textured_dae(name), encoding="utf-8")
     return folder / "m.dae"
 
 
 def ply_texture(folder: Path, name: str) -> Path:
     text = merged().export(file_type="ply", encoding="ascii").decode()
-    (folder / "m.ply").write_text(text.replace("\nelement", f"\ncomment TextureFile {name}\nelement", 1))
+    (folder / "m.ply").write_text(
+        text.replace("\nelement", f"\ncomment TextureFile {name}\nelement", 1), encoding="utf-8"
+    )
     return folder / "m.ply"
 
 
@@ -818,7 +822,7 @@ def test_real_exemplars_have_the_parts_of_their_lists_in_order() -> None:
     folders = sorted(file.parent for file in EXEMPLARS.glob("*/exemplar.json"))
     assert len(folders) >= 29
     for folder in folders:
-        described = json.loads((folder / "exemplar.json").read_text())
+        described = json.loads((folder / "exemplar.json").read_text(encoding="utf-8"))
         model = read_model(folder / "model.glb", "nodes")
         if "part_list" in described:
             assert [part.name for part in model.parts] == [part["node"] for part in described["part_list"]], folder.name

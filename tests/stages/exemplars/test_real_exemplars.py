@@ -42,7 +42,7 @@ def build(folder: Path, mirrored: bool = False, kinds: tuple[ContactKind, ...] =
 
 def measured(folder: Path) -> dict[str, Any]:
     """Return the measurements of a model without its coincident parts."""
-    described: dict[str, Any] = json.loads((folder / "exemplar.json").read_text())
+    described: dict[str, Any] = json.loads((folder / "exemplar.json").read_text(encoding="utf-8"))
     doubled = DOUBLED.get(folder.name[:3], [])
     keep = [index for index, part in enumerate(described["part_list"]) if part["node"] not in doubled]
     place = {index: number for number, index in enumerate(keep)}

@@ -35,7 +35,7 @@ def loaded(path: Path, monkeypatch: pytest.MonkeyPatch) -> Config:
 
 @pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
 def test_every_config_that_comes_with_the_project_is_valid(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if "../shared" in path.read_text() and not EXEMPLARS.is_dir():
+    if "../shared" in path.read_text(encoding="utf-8") and not EXEMPLARS.is_dir():
         pytest.skip("its models are not next to the project")
     own = {"default": "shapemill-default", "shapeassembly": "furniture-programs"}
     assert loaded(path, monkeypatch).name == own.get(path.stem, path.stem)

@@ -115,7 +115,7 @@ class TestSources:
             f"v {x} {y} {z} {r / 255} {g} {b / 255}" for (x, y, z), (r, g, b) in zip(vertices, colors, strict=True)
         ]
         lines += [f"f {a} {b} {c}" for a, b, c in faces + 1]
-        (tmp_path / "m.obj").write_text("\n".join(lines))
+        (tmp_path / "m.obj").write_text("\n".join(lines), encoding="utf-8")
         model = read_model(tmp_path / "m.obj")
         assert model.segmentation == "colors"
         assert [part.name for part in model.parts] == ["#ff0000", "#0000ff"]

@@ -38,7 +38,9 @@ def write_config(folder: Path, kits: list[dict[str, Any]]) -> Config:
     import yaml
 
     path = folder / "toy.yaml"
-    path.write_text(yaml.safe_dump({"name": "toy", "exemplars": {"kits": [stated(kit) for kit in kits]}}))
+    path.write_text(
+        yaml.safe_dump({"name": "toy", "exemplars": {"kits": [stated(kit) for kit in kits]}}), encoding="utf-8"
+    )
     return load_config(path, {**{name: stage.config for name, stage in STAGES.items()}, "variations": VariationsConfig})
 
 
@@ -54,7 +56,7 @@ def files(folder: Path, out: str = "out") -> dict[str, bytes]:
 
 def record(folder: Path, shard: str) -> dict[str, Any]:
     content: dict[str, Any] = json.loads(
-        (folder / "out" / ".work" / "toy" / "exemplars" / "records" / f"{shard}.json").read_text()
+        (folder / "out" / ".work" / "toy" / "exemplars" / "records" / f"{shard}.json").read_text(encoding="utf-8")
     )
     return content
 
@@ -136,7 +138,7 @@ def test_impossible_kit_fails_with_the_mend_and_the_rest_is_built(tmp_path: Path
     assert "good.json" in files(tmp_path)
     assert "apart.json" not in files(tmp_path)
     failed = tmp_path / "out" / ".work" / "toy" / "exemplars" / "failed"
-    assert "falls into 3 pieces" in "".join(path.read_text() for path in failed.iterdir())
+    assert "falls into 3 pieces" in "".join(path.read_text(encoding="utf-8") for path in failed.iterdir())
 
 
 def test_config_with_a_missing_file_starts_nothing(tmp_path: Path) -> None:

@@ -31,12 +31,12 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_run_makes_other_walls_and_warns_that_there_are_no_more(model: Path, tmp_path: Path) -> None:
     config = tmp_path / "walls.yaml"
-    config.write_text(CONFIG.format(model=model, resized_grids=9))
+    config.write_text(CONFIG.format(model=model, resized_grids=9), encoding="utf-8")
     code, output = shapemill("run", "grammars", "--config", config, "--out", tmp_path / "out", "--workers", 1)
     assert code == 0, output
     assert "3 samples" in output
     assert "wall: 3 of 11 requested shapes" in output
     listings = sorted((tmp_path / "out" / ".work" / "walls" / "grammars").rglob("walls-drawing.*.jsonl"))
-    rows = [json.loads(line) for listing in listings for line in listing.read_text().splitlines()]
+    rows = [json.loads(line) for listing in listings for line in listing.read_text(encoding="utf-8").splitlines()]
     assert len({row["text"] for row in rows}) == 3
     assert {row["kit"] for row in rows} == {"wall"}

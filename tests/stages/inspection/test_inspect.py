@@ -77,7 +77,7 @@ class TestJson:
 
     def test_parts_come_from_the_stated_source(self, tmp_path: Path, capsys: Any) -> None:
         path = write_obj(tmp_path / "all.obj", {"a": box(), "b": box(at=(1, 0, 0))})
-        path.write_text(path.read_text().replace("o b", "# b"))
+        path.write_text(path.read_text(encoding="utf-8").replace("o b", "# b"), encoding="utf-8")
         result = inspected(capsys, path, "--parts", "components")
         assert [part["name"] for part in result["parts"]] == ["component-000", "component-001"]
         assert result["segmentation"]["parts"] == "components"
@@ -93,7 +93,7 @@ class TestJson:
         options = ("--types", "meaning", "--label", "post=cube.00[0-2]", "--label", "cap=*.003", "--out", tmp_path)
         result = inspected(capsys, ring(tmp_path), *options)
         assert [(kind["name"], kind["count"]) for kind in result["types"]] == [("post", 3), ("cap", 1)]
-        kit = yaml.safe_load(Path(result["files"]["config"]).read_text())["exemplars"]["kits"][0]
+        kit = yaml.safe_load(Path(result["files"]["config"]).read_text(encoding="utf-8"))["exemplars"]["kits"][0]
         assert kit["label_map"] == {"post": ["cube.00[0-2]"], "cap": ["*.003"]}
 
     def test_mirror_images_are_listed(self, tmp_path: Path, capsys: Any) -> None:

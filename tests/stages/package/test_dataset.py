@@ -100,7 +100,7 @@ def test_record_agrees_with_the_collection(toy_folder: Path) -> None:
 
 def test_classes_are_listed_with_their_counts_by_split(toy_folder: Path) -> None:
     """Recounted from the records; ids are indices of the list, and colours those of the kits' types."""
-    table = json.loads((toy_folder / "classes.json").read_text())
+    table = json.loads((toy_folder / "classes.json").read_text(encoding="utf-8"))
     assert [item["id"] for item in table] == list(range(4))
     assert [(item["name"], item["kit"]) for item in table] == [
         (name, kit) for kit in ("blocks", "planks") for name in ("tower", "long.wall")
@@ -118,7 +118,7 @@ def test_classes_are_listed_with_their_counts_by_split(toy_folder: Path) -> None
     for item in table:
         assert item["shapes"] == {split: shapes[item["id"], split] for split in SPLITS}
         assert item["parts"] == {split: parts[item["id"], split] for split in SPLITS}
-    named = json.loads((toy_folder / "manifest.json").read_text())["classes"]
+    named = json.loads((toy_folder / "manifest.json").read_text(encoding="utf-8"))["classes"]
     assert named == {"path": "classes.json", "count": 4, "sha256": file_digest(toy_folder / "classes.json")}
 
 
@@ -180,7 +180,7 @@ def test_a_row_of_the_index_leads_to_its_sample(toy_folder: Path) -> None:
 
 
 def test_card_has_the_metadata_of_hugging_face(toy_folder: Path) -> None:
-    _, front, text = (toy_folder / "README.md").read_text().split("---\n", 2)
+    _, front, text = (toy_folder / "README.md").read_text(encoding="utf-8").split("---\n", 2)
     header = yaml.safe_load(front)
     assert header["license"] == "mit"
     assert header["pretty_name"] == "Toy boxes"
@@ -196,11 +196,13 @@ def test_card_has_the_metadata_of_hugging_face(toy_folder: Path) -> None:
 
 
 def test_checksums_cover_every_file_and_the_manifest_the_index(toy_folder: Path) -> None:
-    listed = dict(line.split("  ")[::-1] for line in (toy_folder / "checksums.txt").read_text().splitlines())
+    listed = dict(
+        line.split("  ")[::-1] for line in (toy_folder / "checksums.txt").read_text(encoding="utf-8").splitlines()
+    )
     there = digests(toy_folder)
     del there["checksums.txt"]
     assert listed == there
-    index = json.loads((toy_folder / "manifest.json").read_text())["index"]
+    index = json.loads((toy_folder / "manifest.json").read_text(encoding="utf-8"))["index"]
     assert hashlib.sha256((toy_folder / index["path"]).read_bytes()).hexdigest() == index["sha256"]
 
 
@@ -213,20 +215,24 @@ def test_folder_does_not_depend_on_location_or_number_of_workers(toy_folder: Pat
 
 def test_smaller_config_removes_its_old_shards_and_nothing_else(toy_folder: Path, tmp_path: Path) -> None:
     shutil.copytree(toy_folder.parent, tmp_path / "out")
-    (tmp_path / "out/toy/notes.txt").write_text("mine")
+    (tmp_path / "out/toy/notes.txt").write_text("mine", encoding="utf-8")
     folder = make_toy(tmp_path / "out", toy_config(shards=1))
     assert [path.name for path in sorted(folder.rglob("*.tar"))] == [
         f"toy-1_2_0-{split}-000000.tar" for split in sorted(SPLITS)
     ]
-    assert (folder / "notes.txt").read_text() == "mine"
+    assert (folder / "notes.txt").read_text(encoding="utf-8") == "mine"
 
 
 def test_sample_refused_by_a_stage_is_left_out_and_counted(toy_folder: Path) -> None:
     assert REFUSED not in all_samples(toy_folder)
-    manifest = json.loads((toy_folder / "manifest.json").read_text())
+    manifest = json.loads((toy_folder / "manifest.json").read_text(encoding="utf-8"))
     assert manifest["samples"] == 23
     assert manifest["splits"] == {"train": 7, "val": 8, "test": 8}
-    (line,) = (toy_folder.parent / ".work/toy/package/rejects/toy-train-000001.jsonl").read_text().splitlines()
+    (line,) = (
+        (toy_folder.parent / ".work/toy/package/rejects/toy-train-000001.jsonl")
+        .read_text(encoding="utf-8")
+        .splitlines()
+    )
     assert json.loads(line) == {"item": REFUSED, "reason": "refused by sketches", "detail": "", "count": 1}
 
 

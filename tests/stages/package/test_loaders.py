@@ -150,7 +150,7 @@ def test_mlcroissant_validates_without_error_or_warning_and_yields_every_member(
 ) -> None:
     assert croissant["issues"] == []
     assert croissant["version"].endswith("V_1_1")
-    listed = json.loads((toy_folder / "classes.json").read_text())
+    listed = json.loads((toy_folder / "classes.json").read_text(encoding="utf-8"))
     known = [{name: item[name] for name in ("id", "name", "kit", "color")} for item in listed]
     assert croissant["records"]["classes"] == known
     stored = {key: members for path in toy_folder.rglob("*.tar") for key, members in read_shard(path)}

@@ -21,7 +21,7 @@ def records(toy_folder: Path) -> list[Record]:
 
 
 def faults(folder: Path, record: object) -> list[str]:
-    return list(schema_faults(validator_of((folder / "schema.json").read_text()), record))
+    return list(schema_faults(validator_of((folder / "schema.json").read_text(encoding="utf-8")), record))
 
 
 def test_every_record_keeps_the_schema_of_its_dataset(toy_folder: Path, records: list[Record]) -> None:
@@ -30,7 +30,7 @@ def test_every_record_keeps_the_schema_of_its_dataset(toy_folder: Path, records:
 
 
 def test_every_field_is_described(toy_folder: Path) -> None:
-    schema = json.loads((toy_folder / "schema.json").read_text())
+    schema = json.loads((toy_folder / "schema.json").read_text(encoding="utf-8"))
     assert schema["$schema"].endswith("2020-12/schema")
     assert [name for name, field in schema["properties"].items() if not field.get("description")] == []
 

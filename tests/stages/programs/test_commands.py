@@ -33,7 +33,9 @@ def test_mix_writes_the_mixed_shape_its_sources_and_a_sheet(tmp_path: Path) -> N
     assert {path.name for path in tmp_path.iterdir()} == {
         f"{name}.{kind}" for name in names for kind in ("glb", "json")
     } | {"sheet.png"}
-    target, source, mixed = (PROGRAM.schema.from_text((tmp_path / f"{name}.json").read_text()) for name in names)
+    target, source, mixed = (
+        PROGRAM.schema.from_text((tmp_path / f"{name}.json").read_text(encoding="utf-8")) for name in names
+    )
     assert source == PROGRAM.schema.base
     assert mixed["rail_height"] == source["rail_height"]
     assert mixed["scale x"] == target["scale x"]
@@ -55,10 +57,12 @@ def test_glb_has_named_parts_at_their_poses(tmp_path: Path) -> None:
 def test_interpolation_writes_even_steps(tmp_path: Path) -> None:
     ends = [tmp_path / "a.json", tmp_path / "b.json"]
     for path, height in zip(ends, (0.4, 0.8), strict=True):
-        path.write_text(PROGRAM.schema.to_text({**PROGRAM.schema.base, "height": height}))
+        path.write_text(PROGRAM.schema.to_text({**PROGRAM.schema.base, "height": height}), encoding="utf-8")
     out = tmp_path / "steps"
     programs("interpolate", STOOL, *ends, "--steps", "3", "--out", out)
-    heights = [json.loads((out / f"step-{number:02d}.json").read_text())["height"] for number in range(3)]
+    heights = [
+        json.loads((out / f"step-{number:02d}.json").read_text(encoding="utf-8"))["height"] for number in range(3)
+    ]
     assert heights == pytest.approx([0.4, 0.6, 0.8])
 
 
@@ -66,12 +70,14 @@ def test_files_of_recovery_can_be_edited(tmp_path: Path) -> None:
     low, high = ({**PROGRAM.schema.base, "height": height} for height in (0.4, 0.8))
     for name, values in (("low", low), ("high", high)):
         result = RecoveryResult(PROGRAM, values, 0.001, 0.1, 0.0, None, None, None, "y", 1, ())
-        (tmp_path / f"{name}.json").write_text(json.dumps({"input": name, **result.as_json()}))
+        (tmp_path / f"{name}.json").write_text(json.dumps({"input": name, **result.as_json()}), encoding="utf-8")
     ends = [str(tmp_path / f"{name}.json") for name in ("low", "high")]
     programs("interpolate", STOOL, *ends, "--steps", "3", "--group", "seat", "--out", tmp_path / "steps")
-    assert PROGRAM.schema.from_text((tmp_path / "steps/step-01.json").read_text())["height"] == pytest.approx(0.6)
+    assert PROGRAM.schema.from_text((tmp_path / "steps/step-01.json").read_text(encoding="utf-8"))[
+        "height"
+    ] == pytest.approx(0.6)
     programs("mix", STOOL, *ends, "--group", "seat", "--out", tmp_path / "mix")
-    assert PROGRAM.schema.from_text((tmp_path / "mix/mixed.json").read_text())["height"] == 0.8
+    assert PROGRAM.schema.from_text((tmp_path / "mix/mixed.json").read_text(encoding="utf-8"))["height"] == 0.8
     code, printed = shapemill("programs", "make", "chair", ends[0], "--out", tmp_path)
     assert code == 2
     assert "low.json: these are parameters of 'stool', not of chair" in printed
@@ -105,9 +111,9 @@ def test_sheets_of_one_seed_are_equal(tmp_path: Path) -> None:
     ],
 )
 def test_mistakes_are_reported_with_a_remedy(arguments: list[str], message: str, tmp_path: Path) -> None:
-    (tmp_path / "high.json").write_text('{"height": 9}')
+    (tmp_path / "high.json").write_text('{"height": 9}', encoding="utf-8")
     hung = '{"height": 0.3, "scale x": 0.5, "has_rail": true, "rail_height": 0.6}'
-    (tmp_path / "hung.json").write_text(hung)
+    (tmp_path / "hung.json").write_text(hung, encoding="utf-8")
     given = [argument.replace("{folder}", str(tmp_path)) for argument in arguments]
     code, printed = shapemill("programs", *given, "--out", tmp_path / "out")
     assert code == 2

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(not SHARED.is_dir(), reason="the published table
 
 
 def published(domain: str) -> dict[str, Any]:
-    table: dict[str, Any] = json.loads((SHARED / f"params_{domain}.json").read_text())
+    table: dict[str, Any] = json.loads((SHARED / f"params_{domain}.json").read_text(encoding="utf-8"))
     return table
 
 

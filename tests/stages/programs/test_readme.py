@@ -16,7 +16,7 @@ from stages.programs.program import Program
 from stages.programs.sampling import Sampler, all_value_indices
 from tests.stages.programs.test_every_program import check
 
-README = Path(stages.programs.__file__).with_name("README.md").read_text()
+README = Path(stages.programs.__file__).with_name("README.md").read_text(encoding="utf-8")
 (LAMP,) = re.findall(r"The whole program:\n\n```python\n(.*?)```", README, re.DOTALL)
 
 

@@ -59,11 +59,11 @@ def name_of(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Name:
     """Puts a program into a module of its own, as a user does, and returns its unique name."""
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "__init__.py").write_text("")
+    (tmp_path / "mine" / "__init__.py").write_text("", encoding="utf-8")
 
     def name(program: Program) -> str:
         number = next(NUMBERS)
-        (tmp_path / "mine" / f"program{number}.py").write_text(f"NUMBER = {number}\n")
+        (tmp_path / "mine" / f"program{number}.py").write_text(f"NUMBER = {number}\n", encoding="utf-8")
         module = ModuleType(f"mine.program{number}")
         vars(module).update(PROGRAM=program)
         monkeypatch.setitem(sys.modules, module.__name__, module)
@@ -78,7 +78,7 @@ def make(folder: Path, program: str, samples: int, *stages: str) -> tuple[list[R
     small = {"points": {"uniform": 64}, "package": {"previewed": 2}}
     small["sketches"] = {"size": 48, "renderer": "raster", "views": [{"name": "front"}]}
     path = folder / "toy.yaml"
-    path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "programs": section, **small}))
+    path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "programs": section, **small}), encoding="utf-8")
     known = find_stages()
     config = load_config(path, {name: stage.config for name, stage in known.items()})
     paths, reports = DatasetPaths(folder / "out", "toy"), []
@@ -165,7 +165,7 @@ def test_dataset_finishes_with_empty_shards(tmp_path: Path, name_of: Name) -> No
     assert not any(json.loads(sample.text)["has_lid"] for sample in samples)
     assert "100 shapes were requested, but the program has only 8" in notes
     assert any(line.startswith("split train has ") for line in notes)
-    card = (tmp_path / "out/.work/toy/package/dataset.README.md").read_text()
+    card = (tmp_path / "out/.work/toy/package/dataset.README.md").read_text(encoding="utf-8")
     assert "| all | 4 |" in card
 
 

@@ -30,7 +30,7 @@ RANDOM = {
 def make(folder: Path, section: dict[str, object], workers: int = 1) -> tuple[int, str, Path]:
     """Run the stage; its exit code, what it printed and its folder."""
     path = folder / "toy.yaml"
-    path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "programs": section}))
+    path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "programs": section}), encoding="utf-8")
     out = folder / f"out-{workers}"
     code, printed = shapemill("run", "programs", "--config", path, "--out", out, "--workers", workers)
     return code, printed, out / ".work" / "toy" / "programs"
@@ -112,7 +112,7 @@ def test_refused_draws_are_counted_by_reason_and_reported(stools: tuple[Path, st
     assert "96 shapes of" in stools[1]
     assert "% hidden" in stools[1]
     assert "% seat intersects rail" in stools[1]
-    written = [path.read_text() for path in sorted((stools[2] / "rejects").glob("*.jsonl"))]
+    written = [path.read_text(encoding="utf-8") for path in sorted((stools[2] / "rejects").glob("*.jsonl"))]
     rejects = [json.loads(line) for line in "".join(written).splitlines()]
     assert rejects
     assert {reject["item"] for reject in rejects} <= set(STOOL_PROGRAM.schema.by_name)

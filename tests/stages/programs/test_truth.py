@@ -15,7 +15,7 @@ RELATIVE_TOLERANCE = 1e-6
 
 
 def truth(name: str) -> dict[str, Any]:
-    described: dict[str, Any] = json.loads((FOLDER / f"{name}.json").read_text())
+    described: dict[str, Any] = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
     return described
 
 

@@ -98,4 +98,6 @@ def lines(value: Any, depth: int = 4) -> str:
 if __name__ == "__main__":
     FOLDER.mkdir(parents=True, exist_ok=True)
     for program_name in program_names():
-        (FOLDER / f"{program_name}.json").write_text(lines(described(find_program(program_name))) + "\n")
+        (FOLDER / f"{program_name}.json").write_text(
+            lines(described(find_program(program_name))) + "\n", encoding="utf-8"
+        )

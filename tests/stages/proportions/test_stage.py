@@ -30,7 +30,7 @@ def write_config(folder: Path, **section: object) -> Path:
         "points": {"uniform": 64},
         "sketches": {"size": 32, "views": [{"name": "front", "azimuth": 0.0, "elevation": 10.0}]},
     }
-    path.write_text(yaml.safe_dump(config))
+    path.write_text(yaml.safe_dump(config), encoding="utf-8")
     return path
 
 
@@ -80,7 +80,9 @@ def test_a_run_that_finds_too_few_says_what_would_help(tmp_path: Path) -> None:
 
 def test_no_proportions_without_exemplars(tmp_path: Path) -> None:
     path = tmp_path / "stools.yaml"
-    path.write_text(yaml.safe_dump({"name": "stools", "seed": 1, "proportions": {"samples_per_kit": 3}}))
+    path.write_text(
+        yaml.safe_dump({"name": "stools", "seed": 1, "proportions": {"samples_per_kit": 3}}), encoding="utf-8"
+    )
     code, said = shapemill("plan", "--config", path, "--out", tmp_path / "out")
     assert code == 2
     assert "exemplars.kits" in said

@@ -125,7 +125,7 @@ def test_folder_is_read_in_order_despite_a_bad_file(tmp_path: Path) -> None:
     np.save(tmp_path / "b.npy", CLOUD)
     np.save(tmp_path / "a.npy", CLOUD[:3])
     Image.fromarray(drawing()).save(tmp_path / "c.png")
-    (tmp_path / "notes.md").write_text("not an input")
+    (tmp_path / "notes.md").write_text("not an input", encoding="utf-8")
     first, second, third = read_inputs(tmp_path)
     assert isinstance(first, InputError)
     assert isinstance(second, RecoveryInput)
@@ -168,7 +168,7 @@ def test_other_files_are_reported(name: str, tmp_path: Path) -> None:
     if name == "empty":
         (tmp_path / name).mkdir()
     elif not name.startswith("nothing"):
-        (tmp_path / name).write_text("some text")
+        (tmp_path / name).write_text("some text", encoding="utf-8")
     try:
         found = only(tmp_path / name)
     except InputError as error:
@@ -187,5 +187,5 @@ def test_truncated_file_has_a_plain_message(tmp_path: Path) -> None:
     content = (tmp_path / "cloud.npy").read_bytes()
     (tmp_path / "cloud.npy").write_bytes(content[: len(content) // 2])
     assert str(only(tmp_path / "cloud.npy")).endswith("is no whole NumPy array of numbers; save it again")
-    (tmp_path / "cloud.csv").write_text("1,2,3\n4,x,6\n")
+    (tmp_path / "cloud.csv").write_text("1,2,3\n4,x,6\n", encoding="utf-8")
     assert str(only(tmp_path / "cloud.csv")).endswith("it is no whole table of numbers; export it again")

@@ -15,7 +15,7 @@ from stages.recovery.recover import recover
 from stages.recovery.result import RecoveryResult
 from stages.training.recovery.surface import sample_points
 
-README = Path(stages.recovery.__file__).with_name("README.md").read_text()
+README = Path(stages.recovery.__file__).with_name("README.md").read_text(encoding="utf-8")
 CHAIR = find_program("chair")
 
 

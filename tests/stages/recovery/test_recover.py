@@ -160,7 +160,7 @@ def test_command_uses_the_trained_model(kind: str, tmp_path: Path) -> None:
         Image.fromarray(np.where(ink, 0, 255).astype(np.uint8)).save(given)
     code, printed = shapemill("recover", given, "--program", PROGRAM, "--out", tmp_path, "--budget", 40)
     assert code == 0, printed
-    described = json.loads((tmp_path / "recovered/mine.json").read_text())
+    described = json.loads((tmp_path / "recovered/mine.json").read_text(encoding="utf-8"))
     assert set(described["confidence"]) == set(described["parameters"])
     assert all(0.0 <= probability <= 1.0 for probability in described["confidence"].values())
     assert off_by(STOOL.schema.from_text(json.dumps(described["parameters"])), STOOL.schema.base) > 0.0
@@ -292,7 +292,7 @@ def test_command_reports_mistakes_and_refused_inputs(tmp_path: Path) -> None:
 
 
 def test_unreadable_files_do_not_stop_others(tmp_path: Path) -> None:
-    (tmp_path / "list.gltf").write_text("[]")
+    (tmp_path / "list.gltf").write_text("[]", encoding="utf-8")
     (tmp_path / "garbled.npy").write_bytes(b"\x93NUMPY\x01\x00\x08\x00{'descr'")
     (tmp_path / "gone.ply").symlink_to(tmp_path / "nowhere.ply")
     (tmp_path / "folder.obj").mkdir()

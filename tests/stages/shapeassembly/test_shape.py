@@ -20,7 +20,7 @@ EXAMPLES = sorted(Path("datasets/exemplars/programs").glob("*.txt"))
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_a_shipped_program_keeps_every_rule_and_its_meshes_are_its_cuboids(path: Path) -> None:
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     program = parse(text)
     assert violations(program) == []
     done, shape = execute(program), shape_of_text(text)
@@ -36,7 +36,7 @@ def test_a_shipped_program_keeps_every_rule_and_its_meshes_are_its_cuboids(path:
 
 
 def test_nodes_of_the_mesh_file_are_named_by_path() -> None:
-    shape = shape_of_text(next(path for path in EXAMPLES if path.stem == "wardrobe").read_text())
+    shape = shape_of_text(next(path for path in EXAMPLES if path.stem == "wardrobe").read_text(encoding="utf-8"))
     stored = glb_bytes(shape)
     header = json.loads(stored[20 : 20 + struct.unpack("<I", stored[12:16])[0]])
     names = [node["name"] for node in header["nodes"]]
@@ -46,7 +46,7 @@ def test_nodes_of_the_mesh_file_are_named_by_path() -> None:
 
 def labelled(stem: str) -> dict[str, str]:
     """The label of each part of a shipped program, by the part's name."""
-    shape = shape_of_text(next(path for path in EXAMPLES if path.stem == stem).read_text())
+    shape = shape_of_text(next(path for path in EXAMPLES if path.stem == stem).read_text(encoding="utf-8"))
     assert len(set(shape.part_names)) == len(shape)
     return dict(zip(shape.part_names, (shape.labels[label] for label in shape.part_labels), strict=True))
 
@@ -83,7 +83,7 @@ def test_a_copy_of_a_copy_is_labelled_like_the_first() -> None:
 
 
 def test_a_shape_has_the_labels_of_its_category_where_they_are_given() -> None:
-    text = next(path for path in EXAMPLES if path.stem == "stool-tripod").read_text()
+    text = next(path for path in EXAMPLES if path.stem == "stool-tripod").read_text(encoding="utf-8")
     own, given = shape_of_text(text), shape_of_text(text, ("Bed/leg", "Stool/back_leg", "Stool/leg", "Stool/seat"))
     assert own.labels == ("Stool/back_leg", "Stool/leg", "Stool/seat")
     assert (given.part_labels == own.part_labels + 1).all()

@@ -24,7 +24,7 @@ from stages.shapeassembly.splits import splits_of
 from tests.command import shapemill
 
 EXAMPLES = sorted(Path("datasets/exemplars/programs").glob("*.txt"))
-CHAIR = next(path.read_text() for path in EXAMPLES if path.stem == "chair-slats")
+CHAIR = next(path.read_text(encoding="utf-8") for path in EXAMPLES if path.stem == "chair-slats")
 BAD = {
     "binary.txt": b"\xff\xfe\x00",
     "circle.txt": b"Assembly P { bbox = Cuboid(1.0, 1.0, 1.0, True) P = Cuboid(0.5, 0.5, 0.5, True) }",
@@ -44,7 +44,7 @@ REASONS = {
 def make(folder: Path, section: dict[str, object], workers: int = 1) -> tuple[int, str, Path]:
     """Run the stage; its exit code, what it printed and its folder."""
     path = folder / "toy.yaml"
-    path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "shapeassembly": section}))
+    path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "shapeassembly": section}), encoding="utf-8")
     out = folder / f"out-{workers}"
     code, printed = shapemill("run", "shapeassembly", "--config", path, "--out", out, "--workers", workers)
     return code, printed, out / ".work" / "toy" / "shapeassembly"
@@ -57,8 +57,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "good").mkdir()
     for path in EXAMPLES:
         for number in range(3):
-            text = path.read_text().replace("0.5, 0.0, 0.5, 0.5, 1.0, 0.5", f"0.5, 0.0, 0.5, 0.5, 1.0, 0.5{number}")
-            (folder / "good" / f"{path.stem}-{number}.txt").write_text(text if number else path.read_text())
+            text = path.read_text(encoding="utf-8").replace(
+                "0.5, 0.0, 0.5, 0.5, 1.0, 0.5", f"0.5, 0.0, 0.5, 0.5, 1.0, 0.5{number}"
+            )
+            (folder / "good" / f"{path.stem}-{number}.txt").write_text(
+                text if number else path.read_text(encoding="utf-8"), encoding="utf-8"
+            )
     (folder / "bad").mkdir()
     for name, content in BAD.items():
         (folder / "bad" / name).write_bytes(content)
@@ -94,14 +98,18 @@ def test_samples_are_canonical_programs_split_by_structure(made: tuple[str, Path
 
 
 def test_the_labels_of_a_category_are_those_of_all_its_programs_in_order(made: tuple[str, Path]) -> None:
-    listed = json.loads((made[1] / "toy-assignment.labels.json").read_text())
-    labels = {label for path in EXAMPLES for label in execute(parse(path.read_text())).labels}
+    listed = json.loads((made[1] / "toy-assignment.labels.json").read_text(encoding="utf-8"))
+    labels = {label for path in EXAMPLES for label in execute(parse(path.read_text(encoding="utf-8"))).labels}
     assert listed == {"good": sorted(labels)}
     assert {"Armchair/arm", "Desk/Drawers/Front/panel"} <= labels
 
 
 def test_invalid_program_is_rejected_with_its_reason(made: tuple[str, Path]) -> None:
-    lines = [json.loads(line) for path in (made[1] / "rejects").iterdir() for line in path.read_text().splitlines()]
+    lines = [
+        json.loads(line)
+        for path in (made[1] / "rejects").iterdir()
+        for line in path.read_text(encoding="utf-8").splitlines()
+    ]
     found = {line["item"]: line["reason"] for line in lines if line["item"].startswith("bad/")}
     assert found == {f"bad/{name}": reason for name, reason in REASONS.items()}
 
@@ -139,7 +147,7 @@ def test_edits_share_the_split_of_their_program(folder: Path, tmp_path: Path) ->
     found = [sample for shard in samples(out).values() for sample in shard]
     own = {sample.lineage["parents"][0]: sample for sample in found if sample.lineage["method"] == "executed"}
     edits = [sample for sample in found if sample.lineage["method"] == "edited"]
-    refused = sum(1 for path in (out / "rejects").iterdir() for _ in path.read_text().splitlines())
+    refused = sum(1 for path in (out / "rejects").iterdir() for _ in path.read_text(encoding="utf-8").splitlines())
     assert len(own) == len(EXAMPLES)
     assert len(edits) + refused == 3 * len(EXAMPLES)
     assert len(edits) > 2 * len(EXAMPLES)
@@ -153,7 +161,7 @@ def test_missing_source_is_reported_before_the_run(tmp_path: Path) -> None:
     code, printed, _ = make(tmp_path, {"programs": [{"name": "a", "path": str(tmp_path / "nothing")}]})
     assert code == 2
     assert "there is no folder and no file" in printed
-    (tmp_path / "a.txt").write_text(CHAIR)
+    (tmp_path / "a.txt").write_text(CHAIR, encoding="utf-8")
     code, printed, _ = make(tmp_path, {"programs": [{"name": "a", "path": str(tmp_path / "a.txt")}]})
     assert code == 2
     assert "neither a folder nor a tar archive" in printed
@@ -164,9 +172,9 @@ def test_published_lists_make_the_splits(folder: Path, tmp_path: Path) -> None:
     source = tmp_path / "listed"
     shutil.copytree(folder / "good", source / "data")
     names = sorted(path.stem for path in (source / "data").glob("*.txt"))
-    (source / "val.txt").write_text("".join(f"{name}\n" for name in names[::3]))
-    (source / "test.txt").write_text(f"{names[1]}.txt\nnot-there\n")
-    (source / "none.txt").write_text("nobody\n")
+    (source / "val.txt").write_text("".join(f"{name}\n" for name in names[::3]), encoding="utf-8")
+    (source / "test.txt").write_text(f"{names[1]}.txt\nnot-there\n", encoding="utf-8")
+    (source / "none.txt").write_text("nobody\n", encoding="utf-8")
     entry = {"name": "good", "path": str(source), "lists": {"val": "val.txt", "test": "test.txt"}}
     code, printed, out = make(tmp_path, {"programs": [entry]})
     assert code == 0, printed
@@ -188,9 +196,9 @@ def test_published_lists_make_the_splits(folder: Path, tmp_path: Path) -> None:
     ],
 )
 def test_invalid_lists_are_reported(tmp_path: Path, lists: dict[Literal["val", "test"], str], said: str) -> None:
-    (tmp_path / "val.txt").write_text("one\n")
-    (tmp_path / "none.txt").write_text("nobody\n")
-    (tmp_path / "one.txt").write_text(CHAIR)
+    (tmp_path / "val.txt").write_text("one\n", encoding="utf-8")
+    (tmp_path / "none.txt").write_text("nobody\n", encoding="utf-8")
+    (tmp_path / "one.txt").write_text(CHAIR, encoding="utf-8")
     config = ShapeAssemblyConfig(programs=(ProgramFiles(name="good", path=tmp_path, lists=lists),))
     rows = [{"kit": "good", "file": "one.txt", "graph": "a"}]
     with pytest.raises(ShardFailed, match=said):

@@ -127,7 +127,9 @@ def test_the_same_config_gives_the_same_bytes(tmp_path):
 
 
 def test_run_does_not_start_if_the_renderer_cannot_draw(tmp_path, monkeypatch):
-    (tmp_path / "pyrender.py").write_text("raise ImportError('libXrender.so.1: cannot open shared object file')\n")
+    (tmp_path / "pyrender.py").write_text(
+        "raise ImportError('libXrender.so.1: cannot open shared object file')\n", encoding="utf-8"
+    )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     check_in_subprocess.cache_clear()
     try:

@@ -51,7 +51,7 @@ def write_config(folder: Path, samples_per_kit: int = 0, **string_sampling: Any)
         "package": {"previewed": 4},
     }
     path = folder / "sampled.yaml"
-    path.write_text(yaml.safe_dump(config))
+    path.write_text(yaml.safe_dump(config), encoding="utf-8")
     return path
 
 
@@ -154,7 +154,7 @@ def test_generated_shapes_become_a_verified_dataset(sampled: tuple[Path, str], b
     assert code == 0, said
     code, said = shapemill("verify", "--config", config, "--out", folder, "--samples", "all")
     assert code == 0, said
-    card = (folder / "sampled/README.md").read_text()
+    card = (folder / "sampled/README.md").read_text(encoding="utf-8")
     assert "models trained on the strings of other shapes generate new strings" in card
     assert "parent/tiny-chain-0 prior" in card
 

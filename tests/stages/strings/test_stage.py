@@ -144,7 +144,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def lines(out: Path, file: str) -> list[str]:
-    return (out / "toys-corpus" / file).read_text().splitlines()
+    return (out / "toys-corpus" / file).read_text(encoding="utf-8").splitlines()
 
 
 def test_samples_have_a_canonical_string_and_distinct_random_strings(made: Path) -> None:
@@ -196,7 +196,7 @@ def test_corpora_have_unique_strings_by_kit_and_split(made: Path) -> None:
 
 
 def test_the_vocabulary_names_the_types_and_lists_every_token(made: Path) -> None:
-    vocabulary = json.loads((made / "toys-corpus" / "vocabulary.json").read_text())
+    vocabulary = json.loads((made / "toys-corpus" / "vocabulary.json").read_text(encoding="utf-8"))
     assert vocabulary["castle"]["types"] == {"A": "tower", "B": "gate", "C": "wall"}
     assert vocabulary["castle"]["tokens"][:7] == ["A", "B", "C", "(", ")", "0", "1"]
     assert vocabulary["chain"]["types"]["[link_52]"] == "link 52"
@@ -204,7 +204,7 @@ def test_the_vocabulary_names_the_types_and_lists_every_token(made: Path) -> Non
 
 
 def test_the_statistics_agree_with_the_files(made: Path) -> None:
-    statistics = json.loads((made / "toys-corpus" / "statistics.json").read_text())
+    statistics = json.loads((made / "toys-corpus" / "statistics.json").read_text(encoding="utf-8"))
     for kit, of_splits in statistics.items():
         for split, described in of_splits.items():
             strings = lines(made, f"{kit}-{split}.txt")
@@ -269,7 +269,7 @@ def test_shapes_that_are_not_connected_are_rejected_and_counted(tmp_path: Path) 
 
 def corpus_file(out: Path, name: str) -> str:
     """A file of the corpus that is not published yet."""
-    return (DatasetPaths(out, "toys").work / "strings" / f"corpus.{name}").read_text()
+    return (DatasetPaths(out, "toys").work / "strings" / f"corpus.{name}").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")

@@ -25,8 +25,10 @@ def test_models_of_programs_are_trained_loaded_and_sampled(tmp_path: Path) -> No
     (tmp_path / "programs").mkdir()
     for path in EXAMPLES:
         for number in range(2):
-            text = path.read_text().replace("0.5, 0.0, 0.5, 0.5, 1.0, 0.5", f"0.5, 0.0, 0.5, 0.5, 1.0, 0.5{number}")
-            (tmp_path / "programs" / f"{path.stem}-{number}.txt").write_text(text)
+            text = path.read_text(encoding="utf-8").replace(
+                "0.5, 0.0, 0.5, 0.5, 1.0, 0.5", f"0.5, 0.0, 0.5, 0.5, 1.0, 0.5{number}"
+            )
+            (tmp_path / "programs" / f"{path.stem}-{number}.txt").write_text(text, encoding="utf-8")
     model = {
         "name": "tiny",
         "kind": "program_vae",
@@ -64,18 +66,20 @@ def test_models_of_programs_are_trained_loaded_and_sampled(tmp_path: Path) -> No
         "training": {"max_length": 1000, "models": [model, flat, cuboids, parts, words]},
     }
     config = tmp_path / "toy.yaml"
-    config.write_text(yaml.safe_dump({"name": "toy", "seed": 5, **sections}))
+    config.write_text(yaml.safe_dump({"name": "toy", "seed": 5, **sections}), encoding="utf-8")
     out = tmp_path / "out"
     for stage in ("shapeassembly", "training"):
         code, printed = shapemill("run", stage, "--config", config, "--out", out, "--workers", 1)
         assert code == 0, printed
-    counts = json.loads((out / ".work/toy/training/furniture-program_vae.json").read_text())["counts"]
+    counts = json.loads((out / ".work/toy/training/furniture-program_vae.json").read_text(encoding="utf-8"))["counts"]
     assert counts["train"]["programs"] >= 5
-    flattened = json.loads((out / ".work/toy/training/furniture-program_vae-hierarchy.json").read_text())["counts"]
+    flattened = json.loads(
+        (out / ".work/toy/training/furniture-program_vae-hierarchy.json").read_text(encoding="utf-8")
+    )["counts"]
     assert flattened["train"]["assemblies"] == flattened["train"]["programs"]
     assert counts["train"]["assemblies"] > counts["train"]["programs"]
     trained = load_program_vae(out / "toy-models/tiny-furniture-0/weights.safetensors", {"kit": "furniture"})
-    points = trained.encode([parse(path.read_text()) for path in EXAMPLES[:3]])
+    points = trained.encode([parse(path.read_text(encoding="utf-8")) for path in EXAMPLES[:3]])
     assert points.shape == (3, 8)
     train = [
         parse(sample.text) for sample in read_samples(next((out / ".work/toy/shapeassembly").glob("toy-train-*.tar")))
@@ -95,7 +99,7 @@ def test_models_of_programs_are_trained_loaded_and_sampled(tmp_path: Path) -> No
     settings = [f"--set={option}" for option in ("samples=2", "sequences=1", "steps=4")]
     code, printed = shapemill("eval", "shapeassembly", "--config", config, "--out", out, *settings)
     assert code == 0, printed
-    table = (out / "toy-eval/shapeassembly.md").read_text()
+    table = (out / "toy-eval/shapeassembly.md").read_text(encoding="utf-8")
     assert all(
         row in table
         for row in (
@@ -123,7 +127,7 @@ def check_sampled_dataset(folder: Path, out: Path, model: str, asked: tuple[int,
         "program_sampling": {"programs_per_shard": 5},
     }
     config = folder / "sampled.yaml"
-    config.write_text(yaml.safe_dump({"name": "sampled", "seed": 5, **sections}))
+    config.write_text(yaml.safe_dump({"name": "sampled", "seed": 5, **sections}), encoding="utf-8")
     found = []
     for workers in asked:
         made = folder / f"out{workers}"

@@ -22,7 +22,7 @@ def test_explicit_precision_is_kept(asked: str) -> None:
 
 
 def test_auto_precision_is_bfloat16_only_with_hardware_support() -> None:
-    words = set(Path("/proc/cpuinfo").read_text().split())
+    words = set(Path("/proc/cpuinfo").read_text(encoding="utf-8").split())
     knows = bool(words & {"avx512_bf16", "amx_bf16", "bf16"})
     assert resolve_precision("auto", torch.device("cpu")) == ("bfloat16" if knows else "float32")
 

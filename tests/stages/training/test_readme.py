@@ -23,7 +23,7 @@ from tests.stages.training.program_lm.test_sampling import ENTRY, MAX_WORDS, VAL
 from tests.stages.training.program_vae.test_decoding import PROGRAMS as PROGRAM_CORPUS
 from tests.stages.training.string_vae.models import random_vae, toy_strings
 
-README = Path(stages.training.__file__).with_name("README.md").read_text()
+README = Path(stages.training.__file__).with_name("README.md").read_text(encoding="utf-8")
 VAE = ProgramVaeConfig(
     name="vae", kind="program_vae", latent=8, hidden=48, kl_weight=0.0, batch_size=2, steps=250, max_rounds=1,
     learning_rate=3e-3,
@@ -51,7 +51,7 @@ def test_examples_sample_strings_and_vote_on_placements(tmp_path: Path, monkeypa
     write_model("shapemill-default-models/walker-castle-0", placer.module, dict(placer.header))
     corpus = tmp_path / "datasets/shapemill-default-corpus/castle-train.txt"
     corpus.parent.mkdir()
-    corpus.write_text("\n".join(toy_strings()))
+    corpus.write_text("\n".join(toy_strings()), encoding="utf-8")
     defined = run(SAMPLING)
     assert defined["strings"]
     voted = run(VOTING, **{**defined, "kit": kit(), "strings": ["A0B(C)BA0"]})

@@ -45,9 +45,9 @@ def weights(out: Path) -> dict[str, bytes]:
 def test_model_is_published_with_curves_and_card(out: Path) -> None:
     folder = out / "toys-models/tiny-toy-0"
     assert {path.name for path in folder.iterdir()} == MODEL_FILES
-    rows = list(csv.DictReader((folder / "curves.csv").read_text().splitlines()))
+    rows = list(csv.DictReader((folder / "curves.csv").read_text(encoding="utf-8").splitlines()))
     assert [int(row["step"]) for row in rows] == [4, 8, 12, 16]
-    card = (folder / "README.md").read_text()
+    card = (folder / "README.md").read_text(encoding="utf-8")
     assert "license: cc0-1.0" in card
     assert "dataset toys 1.0.0" in card
     best = min(rows, key=lambda row: float(row["val_loss"]))
@@ -56,7 +56,7 @@ def test_model_is_published_with_curves_and_card(out: Path) -> None:
 
 
 def test_published_weights_are_those_of_the_best_round(out: Path) -> None:
-    rows = list(csv.DictReader((out / "toys-models/tiny-toy-0/curves.csv").read_text().splitlines()))
+    rows = list(csv.DictReader((out / "toys-models/tiny-toy-0/curves.csv").read_text(encoding="utf-8").splitlines()))
     best = min(range(len(rows)), key=lambda number: float(rows[number]["val_loss"]))
     with (
         safe_open(out / "toys-models/tiny-toy-0/weights.safetensors", "np") as published,
@@ -68,7 +68,7 @@ def test_published_weights_are_those_of_the_best_round(out: Path) -> None:
 
 
 def test_validation_loss_falls(out: Path) -> None:
-    rows = list(csv.DictReader((out / "toys-models/tiny-toy-0/curves.csv").read_text().splitlines()))
+    rows = list(csv.DictReader((out / "toys-models/tiny-toy-0/curves.csv").read_text(encoding="utf-8").splitlines()))
     assert float(rows[-1]["val_nats"]) < float(rows[0]["val_nats"])
 
 

@@ -84,7 +84,7 @@ def judged(out: Path, *samples: Sample) -> tuple[dict[str, dict[str, Any]], dict
     for name in stages:
         assert not run_stage(name, stages, config, DatasetPaths(out, "toys"), workers=1).failed
     found = read_shard(next(out.rglob("validity/**/toys-train-000000.tar")))
-    record = json.loads(next(out.rglob("validity/**/records/toys-train-000000.json")).read_text())
+    record = json.loads(next(out.rglob("validity/**/records/toys-train-000000.json")).read_text(encoding="utf-8"))
     return {
         key: {**json.loads(members["json"]), **{name: pairs_of(members[name]).tolist() for name in (CONTACTS, JOINTS)}}
         for key, members in found

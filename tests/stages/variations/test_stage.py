@@ -32,7 +32,7 @@ def make(folder: Path, out: str, workers: int, **variations: object) -> str:
         paths = [write_model(folder / f"{name}{k}.glb", meshes, shape) for k, shape in enumerate(shapes)]
         kits.append(stated({"name": name, "shapes": paths, "contact": {"kinds": ["face"]}, "parts": "nodes"}))
     config = {"name": "toy", "seed": 5, "exemplars": {"kits": kits}, "variations": variations}
-    (folder / "toy.yaml").write_text(yaml.safe_dump(config))
+    (folder / "toy.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     printed = ""
     for stage in ("exemplars", "variations"):
         code, said = shapemill(
@@ -118,7 +118,7 @@ def test_split_by_graph_assigns_everything_found(tmp_path: Path) -> None:
     search = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 1.0}
     make(tmp_path, "one", 1, samples_per_kit=2000, search=search, splits={"by": "graph", "val": 0.2, "test": 0.3})
     root = tmp_path / "one" / ".work" / "toy" / "variations"
-    kits = json.loads((root / "records" / "toy-assignment.json").read_text())["summary"]["kits"]
+    kits = json.loads((root / "records" / "toy-assignment.json").read_text(encoding="utf-8"))["summary"]["kits"]
     by_key = {sample.key: sample for shard in collection(tmp_path, "one") for sample in read_samples(shard)}
     groups: dict[tuple[str, str], list[int]] = {}
     keys = [f"{kit}-{place:06d}" for kit in ("chain", "road") for place in range(kits[kit]["pool"])]
@@ -140,7 +140,10 @@ def test_variants_beyond_max_copied_share_are_rejected_and_counted(tmp_path: Pat
     assert max(sample.lineage["copied"]["share"] for sample in samples) <= 0.6
     records = (tmp_path / "one" / ".work" / "toy" / "variations" / "records").glob("*-lane*.json")
     assert (
-        sum(json.loads(record.read_text())["rejects"].get("largest verbatim piece too large", 0) for record in records)
+        sum(
+            json.loads(record.read_text(encoding="utf-8"))["rejects"].get("largest verbatim piece too large", 0)
+            for record in records
+        )
         > 0
     )
 
@@ -198,7 +201,7 @@ def test_only_stable_towers_with_required_label_are_kept(tmp_path: Path) -> None
             "require": {"stable": True, "physics": {"push": 0.135}, "labels": ["storey"]},
         },
     }
-    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     for stage in ("exemplars", "variations"):
         code, printed = shapemill(
             "run", stage, "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out", "--workers", 1
@@ -209,7 +212,9 @@ def test_only_stable_towers_with_required_label_are_kept(tmp_path: Path) -> None
     kit = load_kit(*(tmp_path / "out" / ".work" / "toy" / "exemplars" / f"tower{end}" for end in (".json", ".tar")))
     (storey,) = (number for number, part_type in enumerate(kit.types) if part_type.name == "storey")
     assert all(storey in sample.assembly.types for sample in samples)
-    records = "".join(path.read_text() for path in (tmp_path / "out").rglob("variations/records/*lane*.json"))
+    records = "".join(
+        path.read_text(encoding="utf-8") for path in (tmp_path / "out").rglob("variations/records/*lane*.json")
+    )
     assert "not stable" in records
     assert "required labels missing" in records
 
@@ -229,13 +234,15 @@ def test_chains_without_required_hub_are_rejected(tmp_path: Path) -> None:
         "exemplars": {"kits": [stated(kit)]},
         "variations": {"samples_per_kit": 50, "search": search, "require": {"min_hubs": 1}},
     }
-    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     for stage in ("exemplars", "variations"):
         _, printed = shapemill(
             "run", stage, "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out", "--workers", 1
         )
     assert "the search found no variant of any kit" in printed
-    records = "".join(path.read_text() for path in (tmp_path / "out").rglob("variations/records/*lane*.json"))
+    records = "".join(
+        path.read_text(encoding="utf-8") for path in (tmp_path / "out").rglob("variations/records/*lane*.json")
+    )
     assert "hubs not restored" in records
 
 
@@ -246,7 +253,7 @@ def test_hubs_that_are_not_restored_cannot_be_required(tmp_path: Path) -> None:
         "exemplars": {"kits": [stated({"name": "chain", "shapes": [model]})]},
         "variations": {"require": {"min_hubs": 1}},
     }
-    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     code, printed = shapemill("run", "exemplars", "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out")
     assert code == 2
     assert "kit chain restores none" in printed

@@ -316,7 +316,7 @@ def of_folder(change: Callable[[Path], None]) -> Callable[[Path], None]:
 @of_folder
 def an_edited_card(folder: Path) -> None:
     card = folder / "README.md"
-    card.write_text(card.read_text().replace("rooted", "well rooted"))
+    card.write_text(card.read_text(encoding="utf-8").replace("rooted", "well rooted"), encoding="utf-8")
 
 
 @of_folder
@@ -331,7 +331,7 @@ def an_empty_folder(folder: Path) -> None:
 
 @of_folder
 def a_foreign_file(folder: Path) -> None:
-    (folder / "notes.txt").write_text("mine")
+    (folder / "notes.txt").write_text("mine", encoding="utf-8")
 
 
 @of_folder
@@ -357,19 +357,19 @@ def shards_of_two_splits_exchanged(folder: Path) -> None:
 
 @of_folder
 def a_manifest_that_ends_early(folder: Path) -> None:
-    (folder / "manifest.json").write_text("{")
+    (folder / "manifest.json").write_text("{", encoding="utf-8")
 
 
 @of_folder
 def a_manifest_that_is_a_list(folder: Path) -> None:
-    (folder / "manifest.json").write_text("[]")
+    (folder / "manifest.json").write_text("[]", encoding="utf-8")
 
 
 def reseal(folder: Path) -> None:
     """Make index, manifest, Croissant and checksums agree with what stands in `folder` now, as far as they can be
     read."""
     try:
-        manifest = json.loads((folder / "manifest.json").read_text())
+        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
         rows = []
         for shard in manifest["shards"]:
             path = folder / shard["path"]
@@ -381,15 +381,19 @@ def reseal(folder: Path) -> None:
         write_index(rows, stream)
         index.write_bytes(stream.getvalue())
         manifest["index"] |= {"sha256": file_digest(index), "bytes": index.stat().st_size}
-        croissant = json.loads((folder / "croissant.json").read_text())
+        croissant = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
         digests = {shard["path"]: shard["sha256"] for shard in manifest["shards"]}
         digests[INDEX] = manifest["index"]["sha256"]
         for item in croissant["distribution"]:
             if item["@id"] in digests:
                 item["sha256"] = digests[item["@id"]]
-        (folder / "croissant.json").write_text(json.dumps(croissant, indent=1, ensure_ascii=False) + "\n")
+        (folder / "croissant.json").write_text(
+            json.dumps(croissant, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+        )
         manifest["files"]["croissant.json"] = file_digest(folder / "croissant.json")
-        (folder / "manifest.json").write_text(json.dumps(manifest, indent=1, ensure_ascii=False) + "\n")
+        (folder / "manifest.json").write_text(
+            json.dumps(manifest, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+        )
     except (ValueError, TypeError, KeyError):
         pass  # a manifest of rubbish: only the checksums are updated
     listed = (path for path in sorted(folder.rglob("*")) if path.is_file() and not path.is_symlink())
@@ -397,7 +401,7 @@ def reseal(folder: Path) -> None:
     digests.pop("checksums.txt", None)
     if "notes.txt" in digests:
         del digests["notes.txt"]
-    (folder / "checksums.txt").write_text(checksums(digests))
+    (folder / "checksums.txt").write_text(checksums(digests), encoding="utf-8")
 
 
 def forge(folder: Path, name: str, rng: np.random.Generator) -> str:

@@ -40,9 +40,11 @@ def rewrite(folder: Path, file: str, change: Callable[[str], str]) -> None:
     from pipeline.paths import file_digest
 
     before = file_digest(folder / file)
-    (folder / file).write_text(change((folder / file).read_text()))
+    (folder / file).write_text(change((folder / file).read_text(encoding="utf-8")), encoding="utf-8")
     listing = folder / "checksums.txt"
-    listing.write_text(listing.read_text().replace(before, file_digest(folder / file)))
+    listing.write_text(
+        listing.read_text(encoding="utf-8").replace(before, file_digest(folder / file)), encoding="utf-8"
+    )
 
 
 def test_a_finished_dataset_is_good(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -82,7 +84,10 @@ def test_a_missing_index_is_found_and_named(folder: Path) -> None:
 
 def test_a_truncated_checksums_file_makes_the_files_it_leaves_out_foreign(folder: Path) -> None:
     listing = folder / "checksums.txt"
-    listing.write_text("".join(line for line in listing.read_text().splitlines(True) if SHARD not in line))
+    listing.write_text(
+        "".join(line for line in listing.read_text(encoding="utf-8").splitlines(True) if SHARD not in line),
+        encoding="utf-8",
+    )
     faults = verify_dataset(folder, 0, 0).faults
     assert faults["foreign files"] == [f"{SHARD}: does not belong to the dataset"]
     assert any(SHARD in fault for fault in faults["manifest"])
@@ -156,7 +161,7 @@ def test_the_dataset_can_be_named_by_its_config(
     toy_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = tmp_path / "toy.yaml"
-    config.write_text("name: toy\nprograms: {program: chair}\n")
+    config.write_text("name: toy\nprograms: {program: chair}\n", encoding="utf-8")
     verified("--config", config, "--out", toy_folder.parent, "--samples", "0")
     printed = capsys.readouterr().out
     assert "checked   good" in printed

@@ -72,7 +72,7 @@ def check_sound(values: dict[str, Value]) -> None:
 
 @pytest.mark.skipif(not PUBLISHED.is_file(), reason="the published tables are missing")
 def test_table_is_the_published_one() -> None:
-    table = json.loads(PUBLISHED.read_text())
+    table = json.loads(PUBLISHED.read_text(encoding="utf-8"))
     assert [parameter.name for parameter in PROGRAM.parameters] == [row["name"] for row in table["params"]]
     for parameter, row in zip(PROGRAM.parameters, table["params"], strict=True):
         kind = {"Boolean": "binary", "Integer": "discrete"}.get(row["type"], "continuous")

@@ -52,7 +52,7 @@ pytestmark = pytest.mark.slow
 
 def config_of(folder: Path, sections: dict[str, object]) -> tuple[str, ...]:
     path = folder / "toy.yaml"
-    path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "license": "MIT", **sections}))
+    path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "license": "MIT", **sections}), encoding="utf-8")
     return "--config", str(path), "--out", str(folder / "out")
 
 
@@ -73,7 +73,7 @@ def samples_of(out: Path) -> dict[str, dict[str, bytes]]:
 
 def test_samples_of_a_program_have_the_members_and_fields_of_all_samples(made: tuple[Path, tuple[str, ...]]) -> None:
     samples = samples_of(made[0])
-    manifest = json.loads((made[0] / "toy" / "manifest.json").read_text())
+    manifest = json.loads((made[0] / "toy" / "manifest.json").read_text(encoding="utf-8"))
     assert len(samples) == manifest["samples"] == 3 * (8 + 8 + 2 + 6)
     for key, members in samples.items():
         record = json.loads(members["json"])
@@ -103,14 +103,14 @@ def test_a_dataset_of_a_program_is_verified_and_has_no_corpus(made: tuple[Path, 
 
 
 def test_the_card_explains_every_parameter(made: tuple[Path, tuple[str, ...]]) -> None:
-    card = (made[0] / "toy" / "README.md").read_text()
+    card = (made[0] / "toy" / "README.md").read_text(encoding="utf-8")
     assert "Height of the seat." in card
     assert "A rail above the seat would hang in the air." in card
 
 
 def test_verify_sees_a_surface_that_the_text_does_not_make(made: tuple[Path, tuple[str, ...]]) -> None:
     samples, rebuild = samples_of(made[0]), {"program": LANGUAGE.rebuild(DatasetPaths(made[0], "toy"))}
-    manifest = json.loads((made[0] / "toy" / "manifest.json").read_text())
+    manifest = json.loads((made[0] / "toy" / "manifest.json").read_text(encoding="utf-8"))
     key, members = next(iter(samples.items()))
     other = next(sample for sample in samples.values() if sample["txt"] != members["txt"])
 
@@ -131,7 +131,7 @@ def test_records_index_card_and_table_say_the_same_of_physics(made: tuple[Path, 
     stable = {record["key"]: record["physics"]["stable"] for record in records}
     assert {row["key"]: row["stable"] for row in rows} == stable
     share = 100 * sum(stable.values()) / len(stable)
-    assert f"| {share:.1f}% |" in (made[0] / "toy" / "README.md").read_text()
+    assert f"| {share:.1f}% |" in (made[0] / "toy" / "README.md").read_text(encoding="utf-8")
     command = [sys.executable, "-m", "pipeline", "eval", "physical", *made[1]]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

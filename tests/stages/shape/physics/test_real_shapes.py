@@ -54,7 +54,7 @@ def test_furniture_is_rooted_and_as_often_stable_as_in_simulation(category: str)
 
 def test_dropped_furniture_falls_where_it_falls_in_simulation() -> None:
     """The six that are missed stand squarely on the ground: what throws them over is no slow push."""
-    verdicts = json.loads((SHARED / "shapeassembly" / "verdicts.json").read_text())
+    verdicts = json.loads((SHARED / "shapeassembly" / "verdicts.json").read_text(encoding="utf-8"))
     caught, false = [], 0
     for category, listed in verdicts.items():
         texts = shared_texts(category)

@@ -85,7 +85,7 @@ def exemplar_scene(name) -> Scene:
     if not folder.is_dir():
         pytest.skip("no real exemplars here")
     loaded = trimesh.load(folder / "model.glb", process=False)
-    listed = json.loads((folder / "exemplar.json").read_text())
+    listed = json.loads((folder / "exemplar.json").read_text(encoding="utf-8"))
     types, index, poses = [], [], []
     known = {}
     for part in listed["part_list"]:

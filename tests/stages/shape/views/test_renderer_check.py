@@ -25,7 +25,9 @@ def test_the_rasteriser_draws_everywhere():
 
 
 def test_a_backend_that_cannot_draw_says_why_in_one_line(tmp_path):
-    (tmp_path / "pyrender.py").write_text("raise ImportError('libXrender.so.1: cannot open shared object file')\n")
+    (tmp_path / "pyrender.py").write_text(
+        "raise ImportError('libXrender.so.1: cannot open shared object file')\n", encoding="utf-8"
+    )
     done = run("egl", PYTHONPATH=str(tmp_path))
     assert done.returncode == 1
     assert done.stdout.startswith("no OpenGL context on EGL: ImportError: libXrender.so.1")

@@ -16,7 +16,7 @@ from stages.shapeassembly.execution.parameters import parameter_ranges, paramete
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.validity import execution_boxes
 
-CHAIR = parse(Path("datasets/exemplars/programs/chair-slats.txt").read_text())
+CHAIR = parse(Path("datasets/exemplars/programs/chair-slats.txt").read_text(encoding="utf-8"))
 
 
 def test_perturbed_chair_is_fitted_back() -> None:

@@ -30,10 +30,10 @@ def tables(folder: Path) -> Path:
         high = 0.6 + 0.05 * number
         legs = [leaf("leg", (x, -0.05 - high / 2, z), (0.1, high, 0.1)) for x in (-0.7, 0.7) for z in (-0.3, 0.3)]
         shape = hierarchy(leaf("top", (0, 0, 0), (1.6, 0.1, 0.8)), *legs)
-        (folder / f"{number}.json").write_text(json.dumps(structurenet(shape.root)))
+        (folder / f"{number}.json").write_text(json.dumps(structurenet(shape.root)), encoding="utf-8")
     pieces = hierarchy(*(leaf("piece", (0, 3.0 * i * i, 0), (1, 1 + i, 1)) for i in range(4)))
-    (folder / "pieces.json").write_text(json.dumps(structurenet(pieces.root)))
-    (folder / "broken.json").write_text("{")
+    (folder / "pieces.json").write_text(json.dumps(structurenet(pieces.root)), encoding="utf-8")
+    (folder / "broken.json").write_text("{", encoding="utf-8")
     return folder
 
 
@@ -41,7 +41,7 @@ def made(folder: Path, workers: int) -> tuple[str, Path]:
     """Run the stage on the tables; what it printed and its folder."""
     section = {"hierarchies": [{"name": "table", "path": str(folder / "tables"), "kind": "structurenet"}]}
     config = folder / "toy.yaml"
-    config.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "shapeassembly": section}))
+    config.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "shapeassembly": section}), encoding="utf-8")
     out = folder / f"out-{workers}"
     command = [sys.executable, "-m", "pipeline", "run", "shapeassembly", "--config", str(config), "--out", str(out)]
     done = subprocess.run([*command, "--workers", str(workers)], capture_output=True, text=True)
@@ -73,7 +73,7 @@ def test_programs_of_one_structure_share_a_split(toy: tuple[Path, str, Path]) ->
 
 
 def test_rejections_are_counted_by_reason(toy: tuple[Path, str, Path]) -> None:
-    lines = [line for path in (toy[2] / "rejects").iterdir() for line in path.read_text().splitlines()]
+    lines = [line for path in (toy[2] / "rejects").iterdir() for line in path.read_text(encoding="utf-8").splitlines()]
     refused = Counter(json.loads(line)["reason"] for line in lines)
     assert refused == {"unreadable hierarchy": 1, "parts not connected": 1}
     assert "1 unreadable hierarchy" in toy[1]

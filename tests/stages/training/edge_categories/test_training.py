@@ -37,7 +37,7 @@ def made_ready(out: Path, split: str) -> LabelledStrings:
 
 
 def test_prepared_strings_have_the_categories_of_their_shapes(out: Path) -> None:
-    described = json.loads((out / WORK / "toy-edge_categories.json").read_text())
+    described = json.loads((out / WORK / "toy-edge_categories.json").read_text(encoding="utf-8"))
     for split, seeds in (("train", range(12)), ("val", range(12, 18))):
         found = made_ready(out, split)
         assert described["counts"][split] == {"strings": len(found), "graphs": len(seeds), "tokens": len(found.rows)}
@@ -52,7 +52,7 @@ def test_prepared_strings_have_the_categories_of_their_shapes(out: Path) -> None
 
 def test_model_is_published_and_read_with_its_kit(out: Path) -> None:
     folder = out / "nets-models/tiny-toy-0"
-    rows = list(csv.DictReader((folder / "curves.csv").read_text().splitlines()))
+    rows = list(csv.DictReader((folder / "curves.csv").read_text(encoding="utf-8").splitlines()))
     assert [int(row["step"]) for row in rows] == [4, 8]
     assert {"val_accuracy", "val_tokens", "val_strings", "train_accuracy"} <= set(rows[0])
     model = load_edge_categories(folder / "weights.safetensors", kit())

@@ -18,7 +18,9 @@ from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SQUEEZE, 
 from stages.training.program_vae.partial_assembly import MAX_DEPTH, MAX_LINES
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
-EXAMPLES = [parse(path.read_text()) for path in sorted(Path("datasets/exemplars/programs").glob("*.txt"))]
+EXAMPLES = [
+    parse(path.read_text(encoding="utf-8")) for path in sorted(Path("datasets/exemplars/programs").glob("*.txt"))
+]
 PROGRAMS = [*EXAMPLES, parse(STOOL), parse(BOX)]
 UNIT = max(max(program.root.bbox.dims) for program in PROGRAMS)
 WORDED = [program_words(program, UNIT) for program in PROGRAMS]

@@ -21,9 +21,9 @@ FOLDER = "stools-models/small-tests_stages_programs_stool-0"
 def test_model_of_a_program_is_published_deterministically(kind: str, tmp_path: Path) -> None:
     wanted = config(input=kind)
     assert train(wanted, tmp_path / "one").made == 6
-    card = (tmp_path / "one" / FOLDER / "README.md").read_text()
+    card = (tmp_path / "one" / FOLDER / "README.md").read_text(encoding="utf-8")
     assert "A `recovery` of program `tests.stages.programs.stool`" in card
-    rows = list(csv.DictReader((tmp_path / "one" / FOLDER / "curves.csv").read_text().splitlines()))
+    rows = list(csv.DictReader((tmp_path / "one" / FOLDER / "curves.csv").read_text(encoding="utf-8").splitlines()))
     assert [int(row["step"]) for row in rows] == [6, 12]
     assert train(wanted, tmp_path / "two", workers=2).made == 6
     assert made(tmp_path / "one/stools-models") == made(tmp_path / "two/stools-models")
@@ -33,7 +33,8 @@ def test_model_of_a_program_is_published_deterministically(kind: str, tmp_path: 
 def test_rounds_learn_from_their_shapes_and_earlier_ones(tmp_path: Path) -> None:
     train(config(), tmp_path)
     records = {
-        path.stem: json.loads(path.read_text()) for path in tmp_path.glob(".work/stools/training/records/*.json")
+        path.stem: json.loads(path.read_text(encoding="utf-8"))
+        for path in tmp_path.glob(".work/stools/training/records/*.json")
     }
     name = "small-tests_stages_programs_stool-"
     inputs = [sorted(records[f"{name}0-r000{number}"]["inputs"]) for number in (0, 1)]
@@ -56,7 +57,7 @@ def test_training_learns_a_stool(tmp_path: Path) -> None:
         dropout=0,
     )
     train(wanted, tmp_path)
-    rows = list(csv.DictReader((tmp_path / FOLDER / "curves.csv").read_text().splitlines()))
+    rows = list(csv.DictReader((tmp_path / FOLDER / "curves.csv").read_text(encoding="utf-8").splitlines()))
     # a random choice is right in about a sixth
     assert float(rows[-1]["val_accuracy"]) > 0.3
     assert float(rows[-1]["val_chamfer"]) < 0.02

@@ -19,7 +19,7 @@ UPRIGHT = [0.0, 0.0, 0.0, 2.0, 1.0, 3.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
 
 def written(folder: Path, tree: object) -> Path:
     path = folder / "shape.json"
-    path.write_text(tree if isinstance(tree, str) else json.dumps(tree))
+    path.write_text(tree if isinstance(tree, str) else json.dumps(tree), encoding="utf-8")
     return path
 
 
@@ -124,12 +124,14 @@ def partnet(folder: Path) -> Path:
         ("new-0", upper @ turn[:3, :3].T),
         ("new-1", lower @ turn[:3, :3].T),
     ):
-        (objs / f"{name}.obj").write_text("".join(f"v {x} {y} {z}\n" for x, y, z in points) + "f 1 2 3\n")
+        (objs / f"{name}.obj").write_text(
+            "".join(f"v {x} {y} {z}\n" for x, y, z in points) + "f 1 2 3\n", encoding="utf-8"
+        )
     top = {"name": "tabletop", "objs": ["original-1"]}
     leg = {"name": "leg", "objs": ["new-0", "new-1"]}
     tree = [{"name": "table", "id": 0, "children": [top, {"name": "table_base", "children": [leg]}]}]
     path = folder / "9" / "result_after_merging.json"
-    path.write_text(json.dumps(tree))
+    path.write_text(json.dumps(tree), encoding="utf-8")
     return path
 
 
@@ -157,10 +159,10 @@ def test_partnet_boxes_are_the_smallest_around_the_meshes_of_a_part(tmp_path: Pa
 )
 def test_invalid_partnet_leaf_is_rejected(tmp_path: Path, change: dict[str, object], words: str) -> None:
     path = partnet(tmp_path)
-    tree = json.loads(path.read_text())
+    tree = json.loads(path.read_text(encoding="utf-8"))
     tree[0]["children"][0] |= change
-    path.write_text(json.dumps(tree))
-    (tmp_path / "secret.obj").write_text("v 0 0 0\n")
+    path.write_text(json.dumps(tree), encoding="utf-8")
+    (tmp_path / "secret.obj").write_text("v 0 0 0\n", encoding="utf-8")
     with pytest.raises(Rejected, match=words):
         read_partnet(path)
 
@@ -170,7 +172,7 @@ def test_invalid_partnet_leaf_is_rejected(tmp_path: Path, change: dict[str, obje
 )
 def test_invalid_partnet_mesh_is_rejected(tmp_path: Path, text: str, words: str) -> None:
     path = partnet(tmp_path)
-    (path.parent / "objs" / "original-1.obj").write_text(text)
+    (path.parent / "objs" / "original-1.obj").write_text(text, encoding="utf-8")
     with pytest.raises(Rejected, match=words):
         read_partnet(path)
 

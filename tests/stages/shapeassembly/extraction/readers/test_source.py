@@ -16,8 +16,8 @@ def folder(path: Path) -> Path:
     for name in ("b/2.json", "a/1.json", "c/3.json"):
         file = path / name
         file.parent.mkdir(parents=True)
-        file.write_text(json.dumps({"label": name[2], "box": BOX}))
-    (path / "b" / "readme.txt").write_text("no hierarchy")
+        file.write_text(json.dumps({"label": name[2], "box": BOX}), encoding="utf-8")
+    (path / "b" / "readme.txt").write_text("no hierarchy", encoding="utf-8")
     return path
 
 
@@ -31,14 +31,14 @@ def test_folder_is_read_in_the_order_of_its_names_and_by_slices(tmp_path: Path) 
 
 def test_unreadable_file_is_one_rejection_among_the_others(tmp_path: Path) -> None:
     source = HierarchySource(folder(tmp_path), "structurenet", "y")
-    (tmp_path / "b" / "2.json").write_text("{")
+    (tmp_path / "b" / "2.json").write_text("{", encoding="utf-8")
     assert [isinstance(item, Rejected) for _, item in source.read(0, 3)] == [False, True, False]
 
 
 def test_digest_depends_on_names_and_bytes_of_its_slice(tmp_path: Path) -> None:
     source = HierarchySource(folder(tmp_path), "structurenet", "y")
     first, rest = source.digest(0, 1), source.digest(1, 3)
-    (tmp_path / "c" / "3.json").write_text(json.dumps({"label": "changed", "box": BOX}))
+    (tmp_path / "c" / "3.json").write_text(json.dumps({"label": "changed", "box": BOX}), encoding="utf-8")
     assert source.digest(0, 1) == first
     assert source.digest(1, 3) != rest
     (tmp_path / "a" / "1.json").rename(tmp_path / "a" / "0.json")
@@ -47,12 +47,12 @@ def test_digest_depends_on_names_and_bytes_of_its_slice(tmp_path: Path) -> None:
 
 def test_partnet_digest_sees_the_meshes(tmp_path: Path) -> None:
     (tmp_path / "7" / "objs").mkdir(parents=True)
-    (tmp_path / "7" / "result_after_merging.json").write_text("[]")
+    (tmp_path / "7" / "result_after_merging.json").write_text("[]", encoding="utf-8")
     mesh = tmp_path / "7" / "objs" / "original-0.obj"
-    mesh.write_text("v 0 0 0\n")
+    mesh.write_text("v 0 0 0\n", encoding="utf-8")
     source = HierarchySource(tmp_path, "partnet", "y")
     before = source.digest(0, 1)
-    mesh.write_text("v 0 0 1\nv 0 1 0\n")
+    mesh.write_text("v 0 0 1\nv 0 1 0\n", encoding="utf-8")
     assert source.digest(0, 1) != before
 
 
