@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from stages.shape.kit import Kit
     from stages.shape.shape import Shape
     from stages.shapeassembly.syntax.program import AssemblyProgram as ShapeAssemblyProgram
+    from stages.training.load import TrainedModel
 
 MAX_SHAPES_TRIED = 600
 """Shapes that `recover` makes of a program, at most."""
@@ -107,14 +108,15 @@ def open_dataset(folder: str | Path) -> Dataset:
     return Dataset.open(Path(folder))
 
 
-def load_model(folder: str | Path) -> Any:
+def load_model(folder: str | Path, kit: Kit | None = None) -> TrainedModel:
     """Load a trained model from its folder or its `weights.safetensors`; the header says which kind it is.
 
-    Raises ConfigError for weights that are missing or damaged.
+    kit: the kit that a model of edge categories was trained on; only these need one.
+    Raises CheckpointError for weights that are missing, damaged or of an unknown kind.
     """
     from stages.training.load import load_model as load
 
-    return load(Path(folder))
+    return load(Path(folder), kit=kit)
 
 
 def recover(source: str | Path | FloatArray | ByteArray, program: str = "", seed: int = 0) -> RecoveryResult:

@@ -83,6 +83,21 @@ def test_config_examples_of_a_page_are_valid(page: Path, tmp_path: Path, monkeyp
         load_config(config, {name: stage.config for name, stage in find_stages().items()})
 
 
+def config_keys() -> set[str]:
+    """Every key of a config, such as `variations.search.upright`, from the generated tables."""
+    tables = "\n".join(page.read_text(encoding="utf-8") for page in (ROOT / "configs/sections").glob("*.md"))
+    return {key.replace("[]", "") for key in re.findall(r"(?m)^\| `([^`]+)` \|", tables)}
+
+
+@pytest.mark.parametrize("page", pages(), ids=lambda page: str(page.relative_to(ROOT)))
+def test_config_keys_that_a_page_names_exist(page: Path) -> None:
+    keys = config_keys()
+    sections = {key.partition(".")[0] for key in keys if "." in key}
+    named = re.findall(r"`([a-z_]+(?:\.[a-z_]+(?:\[\])?)+)(?::[^`]*)?`", page.read_text(encoding="utf-8"))
+    wanted = {name.replace("[]", "") for name in named if name.partition(".")[0] in sections}
+    assert sorted(name for name in wanted - keys if not name.endswith(".npy")) == []
+
+
 def test_readme_is_one_short_page() -> None:
     assert len((ROOT / "README.md").read_bytes()) <= MAX_README_BYTES
 
