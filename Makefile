@@ -59,6 +59,9 @@ endif
 export $(VARIABLES)
 # Images of containers often ask for no compiled files; every stage and worker would then compile 400 modules again.
 unexport PYTHONDONTWRITEBYTECODE
+# `python -m pipeline` finds the project in the working folder, and text is UTF-8 in every locale.
+unexport PYTHONSAFEPATH
+export PYTHONUTF8 := 1
 
 PYTHON    := .venv/bin/python
 SHAPEMILL := $(PYTHON) -m pipeline
@@ -133,7 +136,7 @@ eval: setup-models  ## Print TABLE about the finished dataset and keep it; all: 
 	@$(SHAPEMILL) eval $(DATASET) --workers "$$WORKERS" -- "$$TABLE"
 cluster: setup-cluster  ## Start a cluster of WORKERS workers on this machine, and print the CLUSTER of its scheduler
 	@$(SHAPEMILL) cluster --workers "$$WORKERS"
-doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails
+doctor: setup  ## Try everything that Shapemill needs on this machine, with the remedy for what fails
 	@$(SHAPEMILL) doctor --out "$$OUT"
 
 # Working on it ------------------------------------------------------------------------------------------------------

@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from pipeline.cli import main
+from pipeline.interpreter import prepare_interpreter
+
+
+def main() -> None:
+    """Prepare the interpreter, then run the command line."""
+    prepare_interpreter()
+    from pipeline.cli import main as run
+
+    run()
+
 
 if __name__ == "__main__":
     main()

@@ -135,11 +135,11 @@ def _limit(parent: int, cpu_seconds: int, memory_mb: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     faulthandler.disable()
-    silent = open(os.devnull, "r+")
+    silent = open(os.devnull, "r+", encoding="utf-8")
     for descriptor in (0, 1, 2):
         os.dup2(silent.fileno(), descriptor)
     sys.stdout = sys.stderr = silent
-    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[0])
     max_bytes = pages * resource.getpagesize() + (memory_mb << 20)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_CPU, (cpu_seconds, cpu_seconds + 1))

@@ -8,6 +8,7 @@ Ctrl-C; 143 by SIGTERM, 129 by SIGHUP.
 from __future__ import annotations
 
 import importlib
+import io
 import re
 import shutil
 import sys
@@ -36,6 +37,7 @@ from pipeline.options import (
     load_dataset,
     run_stages,
 )
+from pipeline.package_groups import missing_group
 from pipeline.registry import find_stages, folders_with
 from pipeline.stall_timeout import DEFAULT_STALL_MINUTES
 
@@ -115,7 +117,7 @@ def clean(context: typer.Context, config: ConfigOption = DEFAULT_CONFIG, out: Ou
 
 @SYSTEM_COMMANDS.command(rich_help_panel=SYSTEM)
 def doctor(out: OutOption = DEFAULT_OUT) -> None:
-    """Try everything that Shapemill needs on this machine, with the mend for what fails."""
+    """Try everything that Shapemill needs on this machine, with the remedy for what fails."""
     from pipeline.doctor import examine
 
     raise typer.Exit(examine(out))
@@ -174,8 +176,17 @@ def _commands_of(packages: tuple[str, ...]) -> Iterator[typer.Typer]:
 
 def main(package: str = "stages") -> None:
     """Run the command line on the stages of a package, and exit with its code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         command_line(package, *(["eval"] if package == "stages" else []))(obj=package, prog_name="shapemill")
+    except ModuleNotFoundError as error:
+        missing = missing_group(error)
+        if missing is None:
+            raise
+        print(missing, file=sys.stderr)
+        sys.exit(2)
     except ConfigError as error:
         print(error, file=sys.stderr)
         sys.exit(2)

@@ -114,7 +114,9 @@ def _client(address: str) -> Client:
         dask.config.set({"distributed.logging": dict.fromkeys(("distributed", "distributed.client"), "critical")})
         from distributed import Client
     except ImportError as error:
-        raise ConfigError(f"a cluster needs dask.distributed, which is not there ({error}): run make setup") from error
+        raise ConfigError(
+            f"a cluster needs dask.distributed, which is not there ({error}): run `make setup-cluster`"
+        ) from error
     dask.config.set({"distributed.comm.timeouts.connect": _ANSWER_SECONDS})
     try:
         return Client(address, timeout=_ANSWER_SECONDS, set_as_default=False)

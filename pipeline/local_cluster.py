@@ -8,6 +8,7 @@ import sys
 import tempfile
 import time
 
+from pipeline.package_groups import require_group
 from pipeline.termination import die_with_parent, exit_on_signals
 
 _ENVIRONMENT = {
@@ -20,8 +21,9 @@ _ENVIRONMENT = {
 def serve_cluster(workers: int, port: int) -> int:
     """Run a scheduler on a port of this machine, and workers of one thread each, until a signal ends them.
 
-    Returns the exit code: 1 where the scheduler ended by itself.
+    Returns the exit code: 1 where the scheduler ended by itself. Raises ConfigError where Dask is not installed.
     """
+    require_group("cluster")
     address = f"tcp://127.0.0.1:{port}"
     with exit_on_signals(), tempfile.TemporaryDirectory(prefix="shapemill-cluster-") as folder:
         quiet = ["--no-dashboard", "--dashboard-address", "127.0.0.1:0"]

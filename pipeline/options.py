@@ -63,7 +63,7 @@ def run_stages(
         for name in names:
             result = run_stage(name, stages, config, paths, workers, **how)
             if result.failed:
-                print(f"{name}: failed: {', '.join(result.failed)}; mend the cause, then run again", file=sys.stderr)
+                print(f"{name}: failed: {', '.join(result.failed)}; remove the cause, then run again", file=sys.stderr)
                 raise typer.Exit(1)
 
 

@@ -52,7 +52,7 @@ def shard_count_text(shards: int) -> str:
 
 def _finished_share(paths: StagePaths, shard: str) -> float:
     try:
-        done, total = (paths.progress / shard).read_text().split()
+        done, total = (paths.progress / shard).read_text(encoding="utf-8").split()
         return min(int(done) / int(total), 1.0)
     except (OSError, ValueError, ZeroDivisionError):
         return 0.0

@@ -56,7 +56,7 @@ class StallWatch:
 
     def _reported(self, shard: str) -> str:
         try:
-            return (self._paths.progress / shard).read_text()
+            return (self._paths.progress / shard).read_text(encoding="utf-8")
         except (OSError, ValueError):
             return ""
 

@@ -18,6 +18,7 @@ import numpy as np
 from pipeline.code import transitive_imports
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal, Rejected, ShardFailed
+from pipeline.package_groups import missing_group
 from pipeline.paths import (
     DatasetPaths,
     StagePaths,
@@ -83,9 +84,10 @@ def make_shard(job: Job) -> Report:
         _check_code(job)
         task.commit(outcome)
         return Report(job.shard.name, "done", cpu_seconds=time.process_time() - start)
-    except BaseException as error:
+    except BaseException as raised:
         task.withdraw()
         trace = traceback.format_exc()
+        error = missing_group(raised) or raised
         if task.corruption is not None:
             return task.corruption
         culprit = fatal_cause(error)
@@ -177,7 +179,7 @@ class _ShardTask:
         now = time.perf_counter()
         if now - self._noted >= _PROGRESS_SECONDS:
             self._noted = now
-            (self._paths.progress / self.shard.name).write_text(f"{done} {total}")
+            (self._paths.progress / self.shard.name).write_text(f"{done} {total}", encoding="utf-8")
 
     @property
     def _reject_path(self) -> Path:

@@ -19,6 +19,7 @@ from typing import Any
 from joblib.externals.loky.backend.utils import kill_process_tree
 from joblib.externals.loky.process_executor import BrokenProcessPool, ProcessPoolExecutor, TerminatedWorkerError
 
+from pipeline.shared_memory import semaphores_needed
 from pipeline.task import Job, Report, make_shard
 from pipeline.termination import die_with_parent
 
@@ -36,7 +37,7 @@ def _same_arithmetic() -> dict[str, str]:
 
     Its kernels differ by processor and cache size, and their sums in the last digits.
     """
-    flags = Path("/proc/cpuinfo").read_text().split() if Path("/proc/cpuinfo").is_file() else []
+    flags = Path("/proc/cpuinfo").read_text(encoding="utf-8").split() if Path("/proc/cpuinfo").is_file() else []
     return {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_L2_SIZE": "512"} if {"avx2", "fma"} <= set(flags) else {}
 
 
@@ -82,13 +83,14 @@ class _Worker:
             self.stop(kill=False)
         if self._executor is None:
             self._made = 0
-            self._executor = ProcessPoolExecutor(
-                max_workers=1,
-                timeout=None,
-                initializer=_start_worker,
-                initargs=(os.getpid(), self._output),
-                env=_ENVIRONMENT,
-            )
+            with semaphores_needed():
+                self._executor = ProcessPoolExecutor(
+                    max_workers=1,
+                    timeout=None,
+                    initializer=_start_worker,
+                    initargs=(os.getpid(), self._output),
+                    env=_ENVIRONMENT,
+                )
         self._made += 1
         future: Future[Report] = self._executor.submit(make_shard, job)
         return future

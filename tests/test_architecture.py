@@ -116,6 +116,20 @@ def test_bytes_depend_on_no_global_randomness_no_clock_no_uuid() -> None:
     assert faults(nondeterministic, CODE) == []
 
 
+def unnamed_encodings(path: Path) -> Iterator[str]:
+    for name, call in calls(parsed(path)):
+        words = {keyword.arg for keyword in call.keywords}
+        method = name.rpartition(".")[2]
+        reads, writes = method == "read_text" and not call.args, method == "write_text" and len(call.args) == 1
+        mode = ast.unparse(call.args[1]) if len(call.args) > 1 else "'r'"
+        if (reads or writes or (name == "open" and "b" not in mode)) and "encoding" not in words:
+            yield f"line {call.lineno}: {method} without encoding depends on the locale"
+
+
+def test_text_files_name_their_encoding() -> None:
+    assert not faults(unnamed_encodings, ALL)
+
+
 def test_stages_hold_only_files_that_fingerprints_cover() -> None:
     files = (path for path in (ROOT / "stages").rglob("*") if path.is_file() and "__pycache__" not in path.parts)
     assert {path.suffix for path in files} <= {".py", ".md"}, "pipeline/code.py digests Python alone"

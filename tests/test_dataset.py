@@ -126,7 +126,7 @@ def test_every_table_about_kits_is_in_the_report(made: tuple[Path, Path], tmp_pa
     about_kits = {"compression", "corpora", "growth", "near_duplicates", "physical"}
     results = tmp_path / "small-eval"
     assert about_kits <= {path.stem for path in results.glob("*.csv")}
-    header, *rows = csv.reader((results / "compression.csv").open())
+    header, *rows = csv.reader((results / "compression.csv").open(encoding="utf-8"))
     assert [row[:2] for row in rows] == [[kit, edges] for kit in ("castle", "playground") for edges in ("all", "tree")]
     assert all(row[header.index("exact %")] == "100.0" for row in rows)
     report = (results / "report.html").read_text(encoding="utf-8")

@@ -66,7 +66,7 @@ def trained_models(
 
 def training_curve(folder: Path, column: str) -> list[tuple[float, float]]:
     """Return a column of a published model's training log, as (step, value)."""
-    with open(folder / "curves.csv", newline="") as stream:
+    with open(folder / "curves.csv", newline="", encoding="utf-8") as stream:
         return [(float(row["step"]), float(row[column])) for row in csv.DictReader(stream)]
 
 

@@ -60,7 +60,7 @@ def report_html(
         unmade=list(unmade.items()),
         facts=_facts(run, started),
         libraries=list(library_versions().items()),
-        config=config.path.read_text(),
+        config=config.path.read_text(encoding="utf-8"),
         colors=NUM_COLORS,
     )
 

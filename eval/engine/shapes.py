@@ -33,7 +33,7 @@ def dataset_shapes(folder: Path, max_shapes: int) -> Iterator[tuple[str, Shape]]
     Raises ConfigError if there is no dataset in `folder`.
     """
     shards = _data_shards(folder)
-    total: int = json.loads((folder / "manifest.json").read_text())["samples"]
+    total: int = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["samples"]
     step = max(1, -(-total // max_shapes))
     samples = (members for shard in shards for _, members in read_shard(shard))
     for members in islice(samples, 0, None, step):

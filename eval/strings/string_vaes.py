@@ -77,7 +77,7 @@ def string_vaes(folder: Path) -> list[TrainedModel[TrainedStringVae]]:
 
 def corpus_strings(folder: Path, kit: str, split: str, model: TrainedStringVae) -> list[str]:
     """Return the strings of a published corpus whose length and cycles a model can represent."""
-    lines = (folder / f"{kit}-{split}.txt").read_text().splitlines()
+    lines = (folder / f"{kit}-{split}.txt").read_text(encoding="utf-8").splitlines()
     return [line for line in lines if model.is_valid(line)]
 
 

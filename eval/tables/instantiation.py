@@ -99,7 +99,7 @@ def _compute(run: DatasetRun, options: InstantiationOptions) -> TableResult:
 
 def _lines(run: DatasetRun, kit: str, split: str) -> list[str]:
     path = run.corpus / f"{kit}-{split}.txt"
-    return path.read_text().splitlines() if path.is_file() else []
+    return path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
 
 
 def _has_all_contacts(run: DatasetRun, kit: str) -> bool:

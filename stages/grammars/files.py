@@ -36,7 +36,7 @@ def write_grammar(description: Mapping[str, Any], grammar: ShapeGrammar, text: A
 @lru_cache(maxsize=8)
 def load_grammar(text: Path, arrays: Path) -> ShapeGrammar:
     """Load a grammar that `write_grammar` wrote to these two files; it is read once per process."""
-    stored = json.loads(text.read_text())
+    stored = json.loads(text.read_text(encoding="utf-8"))
     names = [*(terminal["name"] for terminal in stored["terminals"]), "exemplar"]
     meshes: list[PartMesh] = []
     seams: dict[int, np.ndarray] = {}

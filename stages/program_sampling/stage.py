@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Rejected, ShardFailed
+from pipeline.package_groups import require_group
 from pipeline.paths import file_digest
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
@@ -99,6 +100,12 @@ def estimate_bytes(plan: Plan) -> int:
     return BYTES_PER_PROGRAM * sum(source.samples for source in plan.config.section(ShapeAssemblyConfig).sampled)
 
 
+def check_environment(config: Config) -> None:
+    """Raise ConfigError where the config names trained models and torch is not installed."""
+    if config.section(ShapeAssemblyConfig).sampled:
+        require_group("models")
+
+
 def trial(config: Config) -> ProgramSamplingConfig:
     """Return the same config: the trial of stage `shapeassembly` has few programs."""
     return config.section(ProgramSamplingConfig)
@@ -114,5 +121,6 @@ STAGE = Stage(
     estimate_bytes=estimate_bytes,
     report=report,
     sections=("shapeassembly",),
+    check_environment=check_environment,
     trial_config=trial,
 )

@@ -128,7 +128,11 @@ def shape_from_text(program: str, text: str) -> Shape:
 def program_names() -> tuple[str, ...]:
     """Names of the programs of the library: files with PROGRAM at the start of a line. Nothing is imported."""
     folder = Path(__file__).parent / "library"
-    return tuple(path.stem for path in sorted(folder.glob("*.py")) if re.search(r"(?m)^PROGRAM\b", path.read_text()))
+    return tuple(
+        path.stem
+        for path in sorted(folder.glob("*.py"))
+        if re.search(r"(?m)^PROGRAM\b", path.read_text(encoding="utf-8"))
+    )
 
 
 def find_program(name: str) -> Program:

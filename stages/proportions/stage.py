@@ -156,7 +156,9 @@ def run_choice(task: Task) -> Outcome:
     texts: dict[str, list[str]] = {}
     for search in task.shard.params["searches"]:
         kit = search.rpartition("-lane")[0]
-        texts.setdefault(kit, []).extend(task.input("proportions", f"{search}.txt").read_text().splitlines())
+        texts.setdefault(kit, []).extend(
+            task.input("proportions", f"{search}.txt").read_text(encoding="utf-8").splitlines()
+        )
     rows: list[dict[str, Any]] = []
     counts: dict[str, int] = {}
     files = {kit.name: [shape.path for shape in kit.shapes] for kit in task.config.section(ExemplarsConfig).kits}

@@ -34,6 +34,7 @@ def recover(
     seed: Annotated[int, typer.Option(min=0, help="seed of the search")] = 0,
 ) -> None:
     """Find the program and parameters of a scan, mesh or drawing; exit with 1 where an input was refused."""
+    from pipeline.package_groups import require_group
     from stages.programs.program import find_program
     from stages.recovery.files import write_recovery
     from stages.recovery.inputs import InputError
@@ -41,6 +42,7 @@ def recover(
     from stages.recovery.recover import recover_input
     from stages.training.recovery.trained import PRETRAINED_FOLDER, find_models
 
+    require_group("models")
     if program:
         find_program(program)
     models, problems = find_models(out, PRETRAINED_FOLDER)

@@ -105,7 +105,7 @@ def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
 
 def load_kit(text: Path, arrays: Path) -> Kit:
     """Return the kit that `write_kit` wrote to these two files."""
-    described = json.loads(text.read_text())
+    described = json.loads(text.read_text(encoding="utf-8"))
     heads = iter([(kind["name"], kind.get("meaning", "")) for kind in described["types"]])
     types: list[PartType] = []
     exemplars: list[Exemplar] = []

@@ -100,4 +100,4 @@ def read_pool(task: Task, pool: str) -> list[dict[str, Any]]:
 
 def pool_graphs(task: Task, pool: str) -> list[str]:
     """Read the digests of the graphs in a pool, one of the inputs."""
-    return task.input("string_sampling", f"{pool}.graphs.txt").read_text().split()
+    return task.input("string_sampling", f"{pool}.graphs.txt").read_text(encoding="utf-8").split()

@@ -118,7 +118,7 @@ def read_source(task: Task, shard: str, kit: Kit) -> ModelSource:
 
     path: Path = task.input("string_sampling", f"{shard}.weights.safetensors")
     model = load_string_vae(path, _expected(kit))
-    strings = task.input("string_sampling", f"{shard}.strings.txt").read_text().splitlines()
+    strings = task.input("string_sampling", f"{shard}.strings.txt").read_text(encoding="utf-8").splitlines()
     known = np.load(task.input("string_sampling", f"{shard}.known.npy"), allow_pickle=False)
     digests = frozenset(bytes(digest) for digest in known)
     edges = json.loads(task.input("string_sampling", f"{shard}.json").read_bytes())["edges"]

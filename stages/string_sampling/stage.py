@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from pipeline.config import Config
 from pipeline.errors import ConfigError
+from pipeline.package_groups import require_group
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
 from stages.string_sampling.collection import assignment_shard, planned_collection, run_assignment, run_collection
@@ -93,6 +94,12 @@ def requested_samples(config: Config) -> Sequence[int]:
     return section.splits.shard_sizes(sum(source.samples for source in section.sources))
 
 
+def check_environment(config: Config) -> None:
+    """Raise ConfigError where the config names trained models and torch is not installed."""
+    if config.section(StringSamplingConfig).sources:
+        require_group("models")
+
+
 def trial(config: Config) -> StringSamplingConfig:
     """Return a config with a few shapes of each model."""
     section = config.section(StringSamplingConfig)
@@ -119,6 +126,7 @@ STAGE = Stage(
     report=report,
     check=check,
     requested_samples=requested_samples,
+    check_environment=check_environment,
     trial_config=trial,
     whole_section=False,
 )

@@ -36,8 +36,10 @@ def train(
     cluster: ClusterOption = "",
 ) -> None:
     """Train the models of a config, after making the samples that they learn from."""
+    from pipeline.package_groups import require_group
     from pipeline.registry import upstream
 
+    require_group("models")
     stages, loaded, paths = load_dataset(context, config, out, seed)
     if stages["training"].uses_input(loaded, only):
         samples = [name for name in upstream(stages, "training") if name != "training"]

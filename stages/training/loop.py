@@ -50,7 +50,7 @@ def resolve_precision(setting: str, device: torch.device) -> str:
 def _processor_flags() -> frozenset[str]:
     """Read the features of the processor, as Linux names them."""
     try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
         return frozenset()
     flags = (line.partition(":")[2] for line in lines if line.startswith(("flags", "Features")))

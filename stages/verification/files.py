@@ -140,7 +140,7 @@ def check_classes(folder: Path, tally: ClassCounts, findings: Findings) -> None:
 def _listed(folder: Path, findings: Findings) -> dict[str, str]:
     """Return `{file: sha256}` of the checksums file."""
     try:
-        lines = (folder / CHECKSUMS).read_text().splitlines()
+        lines = (folder / CHECKSUMS).read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError) as error:
         findings.fault("checksums", CHECKSUMS, f"cannot be read: {error}")
         return {}

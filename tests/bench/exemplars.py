@@ -96,7 +96,9 @@ def measured(models: Sequence[Path], folder: Path, minutes: float, template: boo
     if template:
         config = folder / "template" / config.name
         config.parent.mkdir(parents=True, exist_ok=True)
-        config.write_text(TEMPLATE.format(name=config.stem, shapes=json.dumps(list(map(str, models)))))
+        config.write_text(
+            TEMPLATE.format(name=config.stem, shapes=json.dumps(list(map(str, models)))), encoding="utf-8"
+        )
     made, ends = _make(config, folder, minutes)
     resolved, estimate = inspection["autoconfig"]["resolved"], inspection["yield_estimate"]
     settings = {

@@ -59,7 +59,7 @@ class Run:
         return self.process.returncode
 
     def output(self) -> str:
-        return self.output_file.read_text(errors="replace")
+        return self.output_file.read_text(encoding="utf-8", errors="replace")
 
 
 def alive(pid: int) -> bool:

@@ -129,7 +129,8 @@ def test_failing_table_is_reported_and_others_are_made(tmp_path: Path) -> None:
     (tables / "sound.py").write_text(
         text.format(
             "return TableResult([Table('T', ('a', 'b'), (('one', 2),))], figures=[Figure('drawn', 'D', b'png')])"
-        )
+        ),
+        encoding="utf-8",
     )
     command = [
         sys.executable,

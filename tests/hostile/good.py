@@ -27,7 +27,7 @@ def write_good(folder: Path) -> list[Path]:
     textured_glb("skin.png").write(folder / "skin.glb")
     glb.write(folder / "whole.glb")
     write_obj(folder / "boxes.obj", BOXES, "mtllib skin.mtl\nvt 0 0\nvt 1 0\nvt 0 1", {"roof": "usemtl red"})
-    with open(folder / "boxes.obj", "a") as stream:
+    with open(folder / "boxes.obj", "a", encoding="utf-8") as stream:
         stream.write(
             "o card\nusemtl skin\nv 9 0 0\nv 9 1 0\nv 9 1 1\nv 9 0 1 0.5 0.5 0.5\nf 17/1 18/2 19/3\nf -1 -2 -3 -4\n"
         )
@@ -45,7 +45,8 @@ def write_good(folder: Path) -> list[Path]:
             .replace("solid", f"solid {name}", 1)
             + "\n"
             for name, item in BOXES.items()
-        )
+        ),
+        encoding="utf-8",
     )
     mesh.export(folder / "boxes.off")
     return sorted(path for path in folder.iterdir() if path.suffix not in (".png", ".mtl", ".bin"))

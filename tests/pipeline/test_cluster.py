@@ -72,7 +72,7 @@ def test_cluster_makes_the_same_bytes_despite_dying_workers(
         os.kill(victim, signal.SIGKILL)
         assert run.wait(timeout=120) == 1
         assert run.stderr is not None
-        assert "failed: harvest1-0; mend the cause" in run.stderr.read()
+        assert "failed: harvest1-0; remove the cause" in run.stderr.read()
     # Each killer is one that the test knows: a worker killed while it makes the poisoned shard would count for that.
     tried = {shard: (tmp_path / "marks" / shard).read_text(encoding="utf-8") for shard in trouble}
     assert tried["harvest1-0"] == "xxxx", "three times among others, once in isolation"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import subprocess
@@ -9,6 +10,9 @@ import sys
 from pathlib import Path
 
 import pytest
+
+from pipeline import doctor, workers
+from pipeline.errors import Fatal
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -29,7 +33,7 @@ def set_up(project: Path, tools: Path) -> subprocess.CompletedProcess[str]:
         found = shutil.which(name, path=f"{os.environ['PATH']}:/usr/sbin:/sbin")
         assert found is not None, name
         (tools / name).symlink_to(found)
-    (tools / "python3.11").symlink_to(sys.executable)
+    (tools / "python3").symlink_to(sys.executable)
     return subprocess.run(
         ["sh", "pipeline/setup.sh"],
         cwd=project,
@@ -45,7 +49,7 @@ def test_set_up_names_the_packages_without_apt(tmp_path: Path) -> None:
     tools.mkdir()
     done = set_up(project_with_missing_library(tmp_path / "project"), tools)
     assert done.returncode == 1
-    assert "Shapemill needs what Debian 12 calls: libnowhere9" in done.stderr
+    assert "Shapemill needs what Debian calls: libnowhere9" in done.stderr
     assert not (tmp_path / "project/.venv").exists()
 
 
@@ -66,8 +70,9 @@ def test_doctor_finds_a_library_that_does_not_load_and_names_the_package(tmp_pat
         "raise ImportError('libGL.so.1: cannot open shared object file')\n", encoding="utf-8"
     )
     (tmp_path / "igraph.py").write_text("import os\nos.abort()\n", encoding="utf-8")
+    (tmp_path / "pymeshlab.py").touch()
     done = subprocess.run(
-        [sys.executable, "-m", "pipeline", "doctor", "--out", str(tmp_path / "out")],
+        [sys.executable, "-c", "from pipeline.cli import main; main()", "doctor", "--out", str(tmp_path / "out")],
         cwd=ROOT,
         env={**os.environ, "PYTHONPATH": str(tmp_path)},
         capture_output=True,
@@ -77,20 +82,56 @@ def test_doctor_finds_a_library_that_does_not_load_and_names_the_package(tmp_pat
     lines = [" ".join(line.split()) for line in done.stdout.splitlines()]
     assert done.returncode == 1
     at = next(index for index, line in enumerate(lines) if line.startswith("python-fcl FAILED"))
-    assert lines[at + 1] == "mend: apt-get install libgl1"
+    assert lines[at + 1] == "remedy: apt-get install libgl1"
     assert "igraph FAILED killed by signal 6" in lines
+    at = next(index for index, line in enumerate(lines) if line.startswith("pymeshlab FAILED"))
+    assert f"imported from {tmp_path / 'pymeshlab.py'}" in lines[at]
+    assert lines[at + 1].startswith("remedy: unset PYTHONPATH")
     assert any(line.startswith("numpy ok") for line in lines)
     assert any(line.startswith("draw: raster ok") for line in lines)
-    assert lines[-1] == "2 of these must be mended"
+    assert lines[-1] == "3 checks failed"
+
+
+def test_doctor_regards_only_installed_groups(monkeypatch: pytest.MonkeyPatch) -> None:
+    installed = doctor._installed
+    without_models = {"torch": "", "safetensors": "", "sympy": ""}
+    monkeypatch.setattr(doctor, "_installed", lambda package: without_models.get(package, installed(package)))
+    groups = doctor.installed_groups()
+    assert "models" not in groups
+    check = doctor._locked_versions(groups)
+    assert check.state == "ok", check.note
+    assert "not installed: models" in check.note
+    monkeypatch.setattr(doctor, "_installed", lambda package: "1.0" if package == "numpy" else installed(package))
+    check = doctor._locked_versions(["models"])
+    assert check.state == "FAILED"
+    assert check.note.startswith("numpy is 1.0, not ")
+    assert check.remedy == "pipeline/setup.sh models"
+
+
+@pytest.mark.parametrize(("python", "state"), [("3.10.9", "FAILED"), ("3.11.7", "ok"), ("3.13.0", "ok")])
+def test_doctor_accepts_the_versions_that_set_up_takes(
+    python: str, state: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("platform.python_version", lambda: python)
+    assert doctor._python().state == state
+    versions = " ".join(doctor._PYTHONS)
+    assert f'VERSIONS="{versions}"' in (ROOT / "pipeline/setup.sh").read_text(encoding="utf-8")
+
+
+def test_run_blames_shared_memory_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(**_: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(workers, "ProcessPoolExecutor", refuse)
+    with pytest.raises(Fatal, match=r"/dev/shm cannot hold .*Read-only file system.*: mount a writable one"):
+        workers._Worker(tmp_path / "workers.txt").submit(None)  # type: ignore[arg-type]
 
 
 def test_workers_have_the_same_environment_in_every_shell(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Kernels of OpenBLAS for other processors give other last digits; a worker has the same ones everywhere."""
-    from pipeline.workers import _ENVIRONMENT
-
     products = set()
     for said in ("Haswell", "Nehalem", "Zen"):
-        environment = {**os.environ, "OPENBLAS_CORETYPE": said, **_ENVIRONMENT}
+        environment = {**os.environ, "OPENBLAS_CORETYPE": said, **workers._ENVIRONMENT}
         command = "import numpy as np; a, b = np.random.default_rng(1).random((2, 99, 99)); print((a @ b).tobytes())"
         done = subprocess.run([sys.executable, "-c", command], env=environment, capture_output=True, text=True)
         products.add(done.stdout)

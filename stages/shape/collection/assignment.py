@@ -131,7 +131,7 @@ def write_listed_samples(task: Task, producer: str, assignment: str) -> Outcome:
     assignment: the shard that wrote the listings.
     """
     split, number = task.shard.params["split"], task.shard.params["number"]
-    listing = task.input(producer, f"{assignment}.{split}-{number:06d}.jsonl").read_text()
+    listing = task.input(producer, f"{assignment}.{split}-{number:06d}.jsonl").read_text(encoding="utf-8")
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for line in listing.rstrip("\n").split("\n"):
             row = json.loads(line)

@@ -66,5 +66,5 @@ def read_program_texts(task: Task) -> Iterator[ProgramText]:
     """Yield the programs of all shards among the inputs of a task, in order."""
     for record in task.shard.inputs:
         stage, shard = record.split("/")
-        for line in task.input(stage, f"{shard}.jsonl").read_text().splitlines():
+        for line in task.input(stage, f"{shard}.jsonl").read_text(encoding="utf-8").splitlines():
             yield ProgramText(**json.loads(line))

@@ -34,7 +34,7 @@ def run_collection(task: Task) -> Outcome:
     assignment = f"{task.config.name}-assignment"
     rows = np.load(task.input("variations", f"{assignment}.rows.npy"), allow_pickle=False)
     parents = task.input("variations", f"{assignment}.parents.jsonl").read_bytes().splitlines()
-    searches = task.input("variations", f"{assignment}.searches.txt").read_text().splitlines()
+    searches = task.input("variations", f"{assignment}.searches.txt").read_text(encoding="utf-8").splitlines()
     kits = [kit.name for kit in task.config.section(ExemplarsConfig).kits]
     split: str = task.shard.params["split"]
     mine = np.flatnonzero((rows[:, 4] == SPLITS.index(split)) & (rows[:, 5] == task.shard.params["number"]))

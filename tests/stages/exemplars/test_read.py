@@ -352,10 +352,10 @@ end_header
     def test_off_carries_face_and_vertex_colours(self, tmp_path: Path) -> None:
         points = "0 0 0{0}\n1 0 0{0}\n0 1 0{0}\n0 0 1{1}\n"
         (tmp_path / "f.off").write_text(
-            "OFF\n4 2 0\n" + points.format("", "") + "3 0 1 2 255 0 0\n3 0 1 3 0.0 0.5 1.0  # blue\n"
+            "OFF\n4 2 0\n" + points.format("", "") + "3 0 1 2 255 0 0\n3 0 1 3 0.0 0.5 1.0  # blue\n", encoding="utf-8"
         )
         (tmp_path / "v.off").write_text(
-            "COFF\n4 2 0\n" + points.format(" 10 20 30 255", " 7 7 7 255") + "3 0 1 2\n3 0 1 3\n"
+            "COFF\n4 2 0\n" + points.format(" 10 20 30 255", " 7 7 7 255") + "3 0 1 2\n3 0 1 3\n", encoding="utf-8"
         )
         assert read_model(tmp_path / "f.off", "objects").parts[0].face_colors.tolist() == [[255, 0, 0], [0, 128, 255]]
         assert read_model(tmp_path / "v.off", "objects").parts[0].face_colors.tolist() == [[10, 20, 30], [10, 20, 30]]
@@ -397,7 +397,7 @@ end_header
 class TestWavefront:
     def test_materials_and_textures_come_from_the_library(self, tmp_path: Path) -> None:
         (tmp_path / "my colours.mtl").write_text(
-            "newmtl red\nKd 1 0 0\nnewmtl tiled\nKd 0 0 0\nmap_Kd -s 1 1 1 -clamp on tile map.png\n"
+            "newmtl red\nKd 1 0 0\nnewmtl tiled\nKd 0 0 0\nmap_Kd -s 1 1 1 -clamp on tile map.png\n", encoding="utf-8"
         )
         (tmp_path / "tile map.png").write_bytes(png(np.array([[[1, 2, 3]]])))
         lines = """mtllib my colours.mtl

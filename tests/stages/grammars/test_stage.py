@@ -25,7 +25,9 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     vertices, faces = mesh(wall(4))
     path = tmp_path_factory.mktemp("model") / "wall.off"
     lines = ["OFF", f"{len(vertices)} {len(faces)} 0", *(" ".join(map(str, vertex)) for vertex in vertices.tolist())]
-    path.write_text("\n".join([*lines, *("3 " + " ".join(map(str, face)) for face in faces.tolist())]) + "\n")
+    path.write_text(
+        "\n".join([*lines, *("3 " + " ".join(map(str, face)) for face in faces.tolist())]) + "\n", encoding="utf-8"
+    )
     return path
 
 

@@ -24,7 +24,7 @@ def test_the_code_version_is_a_function_of_the_code_alone(tmp_path: Path) -> Non
         return subprocess.run(ask, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
 
     assert copied() == code_version()
-    with open(tmp_path / "stages" / "points" / "stage.py", "a") as file:
+    with open(tmp_path / "stages" / "points" / "stage.py", "a", encoding="utf-8") as file:
         file.write("EDITED = True\n")
     assert copied() != code_version()
 

@@ -137,7 +137,9 @@ def check_sampled_dataset(folder: Path, out: Path, model: str, asked: tuple[int,
             assert code == 0, printed
         work = made / ".work/sampled"
         written = [
-            json.loads(line) for path in sorted((work / "program_sampling").glob("*.jsonl")) for line in path.open()
+            json.loads(line)
+            for path in sorted((work / "program_sampling").glob("*.jsonl"))
+            for line in path.open(encoding="utf-8")
         ]
         assert [row["name"] for row in written] == [f"toy-models/{model}-furniture-0/{n:06d}" for n in range(12)]
         texts = {row["name"]: row["text"] for row in written}

@@ -51,7 +51,7 @@ def _meet(config: FlourConfig, task: Task) -> None:
     if trouble is None:
         return
     config.marks.mkdir(exist_ok=True)
-    with open(config.marks / task.shard.name, "a") as marks:
+    with open(config.marks / task.shard.name, "a", encoding="utf-8") as marks:
         marks.write("x")
     first = (config.marks / task.shard.name).stat().st_size == 1
     if trouble == "dies" or (trouble == "dies once" and first):

@@ -119,7 +119,9 @@ def test_user_constraint_is_found_and_its_code_counts(tmp_path: Path) -> None:
     folder.mkdir(parents=True)
     (folder / "small.py").write_text(
         "from stages.variations.constraint import GlobalConstraint\n"
-        "CONSTRAINT = GlobalConstraint((), (), lambda kit, labels: lambda shape: None if len(shape) < 3 else 'large')\n"
+        "CONSTRAINT = GlobalConstraint("
+        "(), (), lambda kit, labels: lambda shape: None if len(shape) < 3 else 'large')\n",
+        encoding="utf-8",
     )
     asked = (
         "from pipeline.code import transitive_imports\n"
