@@ -16,6 +16,9 @@ from pipeline.time_left import TimeLeft
 _LINE_SECONDS = 20.0
 """Between two lines where there is no terminal."""
 
+_COMPILATION_LINE_SECONDS = 5.0
+"""Before the first line that says that kernels are compiled."""
+
 
 def duration_text(seconds: float) -> str:
     """Return a duration for people: `8s`, `4m10s`, `2h05m`."""
@@ -38,6 +41,7 @@ class Progress:
     worked: number of those samples that are made, running shards included
     samples: number of samples in finished shards
     rejects: number of items that finished shards refused
+    kernels: number of kernels that the workers have compiled; None while they compile nothing
     """
 
     planned: int
@@ -47,6 +51,7 @@ class Progress:
     worked: float
     samples: int
     rejects: int
+    kernels: int | None = None
 
 
 class EventLog:
@@ -57,6 +62,7 @@ class EventLog:
         self._log = log
         self._start = time.monotonic()
         self._last_line = self._start
+        self._line_said_compiling = False
         self._left = TimeLeft()
         self._bar: tqdm[NoReturn] | None = None
 
@@ -91,8 +97,11 @@ class EventLog:
             self._bar.bar_format = f"{self._stage:<14}{bar}{{desc}}"
             self._bar.total, self._bar.n = progress.work, progress.worked
             self._bar.set_description_str(text)
-        elif now - self._last_line >= _LINE_SECONDS:
+            return
+        begins = progress.kernels is not None and not self._line_said_compiling
+        if now - self._last_line >= (_COMPILATION_LINE_SECONDS if begins else _LINE_SECONDS):
             self._last_line = now
+            self._line_said_compiling |= begins
             self.say(text)
 
     def close(self) -> None:
@@ -115,6 +124,9 @@ def progress_text(progress: Progress, seconds: float, left: float | None) -> str
         items.append(f"{progress.rejects:,} rejects")
     if progress.failed:
         items.append(f"{progress.failed} quarantined")
+    if progress.kernels is not None:
+        done = f" ({progress.kernels:,} done)" if progress.kernels else ""
+        items.append(f"compiling kernels once on this machine{done}")
     items.append(f"{duration_text(seconds)} elapsed")
     if left is not None:
         items.append(f"about {duration_text(left)} left")

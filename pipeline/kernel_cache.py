@@ -6,6 +6,10 @@ without comments, docstrings and formatting. The file name of an entry also depe
 and fields of named tuples), on Python, Numba and the CPU. So each file has one possible content, and concurrent
 processes cannot mix their entries.
 
+A process that compiles a kernel holds a lock next to its entry. Others that need the kernel wait, then load it. A
+process that holds one lock waits only for kernels that the locked one calls. Calls between kernels have no circles, so
+waits have none either. MAX_WAIT_SECONDS ends what this leaves: a stopped process, kernels that call one another.
+
 `stages/__init__.py` names `KernelLocator` to Numba in the environment; Numba imports it with the first cached kernel.
 """
 
@@ -13,6 +17,7 @@ from __future__ import annotations
 
 import ast
 import atexit
+import fcntl
 import hashlib
 import os
 import shutil
@@ -25,13 +30,19 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numba
-from numba.core import caching, sigutils, types
+from numba.core import caching, dispatcher, sigutils, types
+from numba.core.compiler_lock import global_compiler_lock
 
 from pipeline.code import SourceTree, absolute_name, code_words, is_prose, read_note, write_note
+from pipeline.compilation_note import note_compilation, note_end_of_compilation
 
 UNUSED_DAYS = 30
 """Entries that no process loads for this long are deleted."""
 
+MAX_WAIT_SECONDS = 600.0
+"""A process that has waited this long for another's kernel compiles it by itself."""
+
+_POLL_SECONDS = 0.05
 _DAY_SECONDS = 86_400.0
 _PACKAGES = ("pipeline", "stages", "eval")
 
@@ -124,6 +135,17 @@ def _load(store: caching.FunctionCache, signature: Any, context: Any) -> Any:
         return _numba_load(store, signature, context)
     store._cache_file = _entry(store, signature, context.codegen())
     index = Path(store._cache_file._index_path)
+    compiled = _load_entry(store, signature, context, index)
+    if compiled is None and _compilations:
+        note_compilation(len(_saved))
+        lock = _lock(index)
+        if lock is not None:
+            _compilations[-1].append(lock)
+            compiled = _load_entry(store, signature, context, index)
+    return compiled
+
+
+def _load_entry(store: caching.FunctionCache, signature: Any, context: Any, index: Path) -> Any:
     try:
         compiled = _numba_load(store, signature, context)
         if compiled is not None and time.time() - index.stat().st_mtime > _DAY_SECONDS:
@@ -140,12 +162,98 @@ def _save(store: caching.FunctionCache, signature: Any, compiled: Any) -> None:
         store._cache_file = _entry(store, signature, compiled.codegen)
         with suppress(OSError):  # a full disk: the kernel works without an entry
             _numba_save(store, signature, compiled)
+        _saved.append(store._cache_file._index_path)
+        note_compilation(len(_saved))
     else:
         _numba_save(store, signature, compiled)
 
 
 _numba_load, _numba_save = caching.FunctionCache.load_overload, caching.FunctionCache.save_overload
 caching.FunctionCache.load_overload, caching.FunctionCache.save_overload = _load, _save
+
+
+# Locks --------------------------------------------------------------------------------------------------------------
+
+
+class _Lock(NamedTuple):
+    """A lock that this process holds."""
+
+    path: Path
+    descriptor: int
+
+    def release(self) -> None:
+        """Delete the file, then unlock: whoever waits for it sees that it is gone."""
+        with suppress(OSError):
+            self.path.unlink()
+        with suppress(OSError):
+            fcntl.flock(self.descriptor, fcntl.LOCK_UN)  # closing alone would leave it to forked children
+        os.close(self.descriptor)
+
+
+_compilations: list[list[_Lock]] = []
+"""Locks of each call of `Dispatcher.compile` in progress, callers before callees; guarded by Numba's compiler lock."""
+
+_saved: list[str] = []
+"""Entries of kernels that this process has compiled."""
+
+
+def _compile(kernel: dispatcher.Dispatcher, signature: Any) -> Any:
+    with global_compiler_lock:
+        _compilations.append([])
+        try:
+            return _numba_compile(kernel, signature)
+        finally:
+            for lock in _compilations.pop():
+                lock.release()
+            if not _compilations:
+                note_end_of_compilation(len(_saved))
+
+
+def _lock(index: Path) -> _Lock | None:
+    """Wait for the lock of an entry; None where it cannot be had, and the kernel is compiled without it.
+
+    So it is in a folder that cannot be written or locked, in a kernel that calls itself, and after MAX_WAIT_SECONDS.
+    """
+    path = index.with_name(f".{index.name}.lock")
+    if any(lock.path == path for locks in _compilations for lock in locks):
+        return None
+    until = time.monotonic() + MAX_WAIT_SECONDS
+    with suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        while time.monotonic() < until:
+            lock = _Lock(path, os.open(path, os.O_RDWR | os.O_CREAT, 0o644))
+            locked = False
+            try:
+                locked = _flock(lock.descriptor, until) and _is_current(lock)
+            finally:
+                if not locked:
+                    os.close(lock.descriptor)
+            if locked:
+                return lock
+    return None
+
+
+def _flock(descriptor: int, until: float) -> bool:
+    while True:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        except BlockingIOError:
+            if time.monotonic() > until:
+                return False
+            time.sleep(_POLL_SECONDS)
+
+
+def _is_current(lock: _Lock) -> bool:
+    """Whether the locked file still has its name: the process that held it before may have deleted it."""
+    try:
+        return os.path.samestat(lock.path.stat(), os.fstat(lock.descriptor))
+    except FileNotFoundError:
+        return False
+
+
+_numba_compile = dispatcher.Dispatcher.compile
+dispatcher.Dispatcher.compile = _compile
 
 
 # Keys ---------------------------------------------------------------------------------------------------------------

@@ -53,6 +53,9 @@ class StagePaths:
     def progress(self) -> Path:
         return self.root / "progress"
 
+    def compilation_note(self, shard: str) -> Path:
+        return self.progress / f"{shard}.kernels"
+
     @property
     def engine(self) -> Path:
         return self.root / "engine"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from pipeline.compilation_note import read_compilation_note
 from pipeline.disk_space import byte_size
 from pipeline.event_log import Progress, duration_text
 from pipeline.inventory import StageInventory
@@ -12,8 +13,9 @@ from pipeline.paths import StagePaths
 
 def stage_progress(state: StageInventory, running: Iterable[str], failed: int) -> Progress:
     """Return the progress of a stage: `running` names the shards being made, `failed` counts quarantined ones."""
-    records = state.records
+    records, running = state.records, list(running)
     share = {name: _finished_share(state.paths, name) for name in running} | dict.fromkeys(records, 1.0)
+    notes = [read_compilation_note(state.paths.compilation_note(name)) for name in running]
     work = {shard.name: int(shard.params.get("samples", 0)) for shard in state.shards}
     return Progress(
         planned=len(state.shards),
@@ -23,6 +25,7 @@ def stage_progress(state: StageInventory, running: Iterable[str], failed: int) -
         worked=sum(samples * share.get(name, 0.0) for name, samples in work.items()),
         samples=sum(record.samples for record in records.values()),
         rejects=sum(sum(record.rejects.values()) for record in records.values()),
+        kernels=sum(count for count, _ in notes) if any(compiles for _, compiles in notes) else None,
     )
 
 

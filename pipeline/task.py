@@ -16,6 +16,7 @@ from typing import BinaryIO, Literal
 import numpy as np
 
 from pipeline.code import transitive_imports
+from pipeline.compilation_note import compilation_noted_in
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal, Rejected, ShardFailed
 from pipeline.package_groups import missing_group
@@ -80,7 +81,8 @@ def make_shard(job: Job) -> Report:
     """Make and commit one shard. Never raises: an exception becomes the status of the report."""
     task, start = _ShardTask(job), time.process_time()
     try:
-        outcome = job.run_shard(task)
+        with compilation_noted_in(job.paths.stage(job.stage).compilation_note(job.shard.name)):
+            outcome = job.run_shard(task)
         _check_code(job)
         task.commit(outcome)
         return Report(job.shard.name, "done", cpu_seconds=time.process_time() - start)

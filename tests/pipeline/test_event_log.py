@@ -9,13 +9,14 @@ import subprocess
 import sys
 import termios
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipeline.config import Config, StrictModel
-from pipeline.event_log import Progress, progress_text
+from pipeline.event_log import EventLog, Progress, progress_text
 from pipeline.paths import DatasetPaths
 from pipeline.run import run_stage
 from pipeline.stage import Outcome, Stage
@@ -70,6 +71,24 @@ def test_progress_counts_samples_where_the_plan_has_their_number() -> None:
     )
     grows = Progress(planned=8, done=6.4, failed=0, work=0, worked=0.0, samples=0, rejects=0)
     assert progress_text(grows, 41.0, None) == "6.4 of 8 shards, 41s elapsed"
+
+
+def test_progress_says_that_kernels_are_compiled(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    idle = Progress(planned=4, done=0, failed=0, work=0, worked=0.0, samples=0, rejects=0)
+    waiting, compiling = replace(idle, kernels=0), replace(idle, kernels=112)
+    assert progress_text(waiting, 9.0, None) == "0.0 of 4 shards, compiling kernels once on this machine, 9s elapsed"
+    assert "once on this machine (112 done), 9s" in progress_text(compiling, 9.0, None)
+
+    clock = iter([0.0, 4.0, 6.0, 7.0, 11.0, 12.0, 25.0, 27.0])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("pipeline.event_log.time.monotonic", lambda: next(clock))
+        log = EventLog("exemplars", tmp_path / "log")
+        for progress in (compiling, idle, waiting, idle, compiling, idle, compiling):
+            log.show(progress)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2, "one line when it begins, then a line now and then"
+    assert lines[0].endswith("compiling kernels once on this machine, 7s elapsed")
+    assert "(112 done), 27s" in lines[1]
 
 
 def seen_on_a_terminal(*arguments: object) -> str:

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.kernel_cache import _prune
+from pipeline import kernel_cache
+from pipeline.kernel_cache import _lock, _prune
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -66,10 +67,10 @@ class Checkout:
         assert old in text
         path.write_text(text.replace(old, new), encoding="utf-8")
 
-    def start(self) -> subprocess.Popen[str]:
+    def start(self, module: str = "main") -> subprocess.Popen[str]:
         env = os.environ | {"PYTHONPATH": f"{self.folder}:{ROOT}", "XDG_CACHE_HOME": str(self.cache)}
         env.pop("NUMBA_CACHE_DIR", None)
-        return subprocess.Popen([sys.executable, "-m", "shop.main"], env=env, stdout=subprocess.PIPE, text=True)
+        return subprocess.Popen([sys.executable, "-m", f"shop.{module}"], env=env, stdout=subprocess.PIPE, text=True)
 
     def run(self) -> str:
         process = self.start()
@@ -122,6 +123,141 @@ def test_concurrent_processes_and_corrupted_entries_do_no_harm(checkout: Checkou
             entry.write_bytes(content)
         assert checkout.run() == "31 8 7 compiled area double total width"
         assert checkout.run() == "31 8 7 compiled"
+
+
+SLOW_KERNEL = """
+import os, time
+import numba
+from numba.extending import overload
+
+def pause():
+    pass
+
+@overload(pause)
+def _pause():
+    with open(os.path.dirname(__file__) + "/compilations", "a") as log:
+        log.write(f"{os.getpid()}\\n")
+    until = time.monotonic() + 60
+    while not os.path.exists(os.path.dirname(__file__) + "/go") and time.monotonic() < until:
+        time.sleep(0.01)
+    if "FAIL" in os.environ:
+        raise numba.TypingError("it fails")
+    return lambda: 0
+
+@numba.njit(cache=True)
+def inner(number):
+    pause()
+    return number + 1
+
+@numba.njit(cache=True)
+def outer(number):
+    return inner(number) * 2
+"""
+
+USE_OF_SLOW_KERNEL = """
+import os, stages
+from pathlib import Path
+from pipeline.compilation_note import compilation_noted_in
+from shop.slow import inner, outer
+
+with compilation_noted_in(Path(__file__).with_name(f"note-{os.getpid()}")):
+    kernels = (inner, outer) if "INNER" in os.environ else (outer, inner)
+    print(*(kernel(20) for kernel in kernels), sum(inner.stats.cache_misses.values()))
+"""
+
+
+@pytest.fixture
+def slow(checkout: Checkout) -> Checkout:
+    """Return a checkout with a kernel whose compilation lasts until there is a file `go`."""
+    (checkout.folder / "shop/slow.py").write_text(SLOW_KERNEL, encoding="utf-8")
+    (checkout.folder / "shop/use.py").write_text(USE_OF_SLOW_KERNEL, encoding="utf-8")
+    return checkout
+
+
+def begun(checkout: Checkout, count: int = 1) -> list[int]:
+    """Wait until the slow kernel has begun to be compiled `count` times; return the processes that did."""
+    log = checkout.folder / "shop/compilations"
+    until = time.monotonic() + 60
+    while time.monotonic() < until and (not log.exists() or log.read_text(encoding="utf-8").count("\n") < count):
+        time.sleep(0.01)
+    return [int(line) for line in log.read_text(encoding="utf-8").split()]
+
+
+def locks(checkout: Checkout) -> list[Path]:
+    return list(checkout.cache.rglob("*.lock"))
+
+
+def notes(checkout: Checkout) -> int:
+    return len(list((checkout.folder / "shop").glob("note-*")))
+
+
+def test_kernel_that_processes_need_at_the_same_time_is_compiled_once(
+    slow: Checkout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    together = [slow.start("use") for _ in range(2)]
+    monkeypatch.setenv("INNER", "1")
+    together.append(slow.start("use"))
+    while notes(slow) < 3 and any(process.poll() is None for process in together):
+        time.sleep(0.01)
+    assert notes(slow) == 3, "the waiting processes note it, too"
+    (slow.folder / "shop/go").touch()
+    answers = sorted(process.communicate(timeout=60)[0] for process in together)
+    assert [answer.split()[:2] for answer in answers] == [["21", "42"], ["42", "21"], ["42", "21"]]
+    assert sorted(int(answer.split()[2]) for answer in answers) == [0, 0, 1]
+    assert len(begun(slow)) == 1
+    assert notes(slow) == len(locks(slow)) == 0
+    assert len(list(slow.cache.rglob("*.nb[ci]"))) == 4
+
+
+def test_process_that_waits_for_a_killed_one_compiles_by_itself(slow: Checkout) -> None:
+    first = slow.start("use")
+    assert begun(slow) == [first.pid]
+    second = slow.start("use")
+    while notes(slow) < 2 and second.poll() is None:
+        time.sleep(0.01)
+    first.kill()
+    (slow.folder / "shop/go").touch()
+    assert second.communicate(timeout=60)[0].split() == ["42", "21", "1"]
+    assert begun(slow, 2) == [first.pid, second.pid]
+    assert not locks(slow)
+    first.communicate()
+
+
+def test_process_whose_compilation_fails_does_not_keep_others_waiting(
+    slow: Checkout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FAIL", "1")
+    first = slow.start("use")
+    begun(slow)
+    monkeypatch.delenv("FAIL")
+    second = slow.start("use")
+    while notes(slow) < 2 and second.poll() is None:
+        time.sleep(0.01)
+    (slow.folder / "shop/go").touch()
+    assert second.communicate(timeout=60)[0].split() == ["42", "21", "1"]
+    assert first.wait(timeout=60) == 1
+    assert not locks(slow)
+
+
+def test_kernels_are_compiled_where_nothing_can_be_locked(slow: Checkout) -> None:
+    (slow.folder / "shop/go").touch()
+    no_locks = "import errno, fcntl\ndef flock(*_): raise OSError(errno.ENOLCK, 'no locks')\nfcntl.flock = flock\n"
+    (slow.folder / "shop/use.py").write_text(no_locks + USE_OF_SLOW_KERNEL, encoding="utf-8")
+    assert slow.start("use").communicate(timeout=60)[0].split() == ["42", "21", "1"]
+    assert slow.start("use").communicate(timeout=60)[0].split() == ["42", "21", "0"]
+
+
+def test_wait_for_a_lock_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    index = tmp_path / "kernel.nbi"
+    held = _lock(index)
+    assert held is not None
+    monkeypatch.setattr(kernel_cache, "MAX_WAIT_SECONDS", 0.2)
+    assert _lock(index) is None, "as if a stopped process held it"
+    held.release()
+    after = _lock(index)
+    assert after is not None
+    after.release()
+    assert not list(tmp_path.iterdir())
 
 
 def test_entries_unused_for_a_month_are_pruned(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.compilation_note import note_compilation, note_end_of_compilation, read_compilation_note
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal, Rejected, ShardFailed
 from pipeline.paths import DatasetPaths
@@ -52,6 +53,27 @@ def test_files_appear_together_with_their_record(make: Callable[[Body], Report],
     assert sorted(path.name for path in own(tmp_path).glob("*.*")) == ["shard.a", "shard.b.txt"]
     assert (own(tmp_path) / "shard.b.txt").read_text(encoding="utf-8") == "flour"
     assert (own(tmp_path) / "records/shard.json").is_file()
+
+
+def test_compilation_of_kernels_is_noted_while_it_lasts(make: Callable[[Body], Report], tmp_path: Path) -> None:
+    note = DatasetPaths(tmp_path, "toy").stage("own").compilation_note("shard")
+    seen = []
+
+    def body(task: Task) -> Outcome:
+        seen.append(read_compilation_note(note))
+        note_compilation(0)
+        note_compilation(3)
+        seen.append(read_compilation_note(note))
+        note_end_of_compilation(3)
+        seen.append(read_compilation_note(note))
+        note_compilation(4)
+        raise ShardFailed("no salt")
+
+    assert make(body).message == "no salt"
+    assert seen == [(0, False), (3, True), (3, False)]
+    assert not note.exists()
+    note_compilation(5)
+    assert not note.exists(), "no shard is made"
 
 
 def test_file_that_the_shard_writes_no_more_is_removed(make: Callable[[Body], Report], tmp_path: Path) -> None:

@@ -1,0 +1,52 @@
+"""Note of a shard whose worker compiles kernels, for the progress of the run.
+
+It imports no Numba, which would take the driver of a run half a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+_files: list[Path] = []
+"""Note of the shard that this process makes, if any."""
+
+
+@contextmanager
+def compilation_noted_in(file: Path) -> Iterator[None]:
+    """Within the context, note in this file that kernels are compiled."""
+    delete_note(file)
+    _files.append(file)
+    try:
+        yield
+    finally:
+        delete_note(_files.pop())
+
+
+def note_compilation(compiled: int) -> None:
+    """Note that a kernel is compiled now, and how many this process has compiled before."""
+    for file in _files:
+        with suppress(OSError):
+            file.write_text(f"{compiled} 1")
+
+
+def note_end_of_compilation(compiled: int) -> None:
+    """Note that nothing is compiled now, where a note says otherwise."""
+    for file in _files:
+        with suppress(OSError):
+            if file.exists():
+                file.write_text(f"{compiled} 0")
+
+
+def read_compilation_note(file: Path) -> tuple[int, bool]:
+    """Return how many kernels the process of a note has compiled, and whether it compiles now."""
+    with suppress(OSError, ValueError):
+        compiled, compiles = file.read_text().split()
+        return int(compiled), compiles == "1"
+    return 0, False
+
+
+def delete_note(file: Path) -> None:
+    with suppress(OSError):
+        file.unlink()
