@@ -625,7 +625,7 @@ class TestBadFiles:
         glb = boxes_glb()
         glb.header["nodes"][0]["children"] = [1]
         glb.header["nodes"][1]["children"] = [0]
-        with pytest.raises(ConfigError, match="two places"):
+        with pytest.raises(ConfigError, match="two parents"):
             read_model(glb.write(tmp_path / "m.glb"))
 
     def test_what_is_no_model_file_is_refused_with_the_nearest_right_thing(self, tmp_path: Path) -> None:
