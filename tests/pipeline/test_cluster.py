@@ -103,7 +103,7 @@ def test_shard_ends_with_its_run_and_the_cluster_survives(
 def test_lost_scheduler_is_reported_and_the_run_continues_here(
     tmp_path: Path, write_config: WriteConfig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pipeline.cluster._ANSWERS_WITHIN", 3.0)
+    monkeypatch.setattr("pipeline.cluster._ANSWER_SECONDS", 3.0)
     out, mine = tmp_path / "out", Cluster()
     config = write_config(flour={"seconds": 0.1})
     run_toy_stages(config, out, "salt", "grain")
