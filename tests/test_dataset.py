@@ -42,7 +42,7 @@ def write_config(folder: Path) -> Path:
         "exemplars": {"kits": kits},
         "variations": {"samples_per_kit": 40, "splits": {"shards": 2}},
         "points": {"uniform": 256},
-        "sketches": {"size": 64, "backend": "raster", "views": [{"name": "front"}]},
+        "sketches": {"size": 64, "renderer": "raster", "views": [{"name": "front"}]},
         "package": {"previewed": 4},
     }
     path = folder / "small.yaml"

@@ -40,7 +40,13 @@ def finish(surveyed: StageInventory) -> int:
 
 def record_of(surveyed: StageInventory, shard: Shard) -> ShardRecord:
     samples, split = int(shard.params.get("samples", 0)), shard.params.get("split")
-    rows: dict[str, Any] = {"split": split, "samples": samples, "tried": samples, "backend": "none", "renderer": "none"}
+    rows: dict[str, Any] = {
+        "split": split,
+        "samples": samples,
+        "tried": samples,
+        "renderer": "none",
+        "renderer_version": "none",
+    }
     rows |= {"rooted": samples, "stable": samples, "path": f"{shard.name}.tar", "members": ["glb"], "bytes": 1}
     return ShardRecord(
         stage=surveyed.stage.name,

@@ -184,7 +184,7 @@ HOSTILE = {
     _BOMB: "bread.yaml:6: holds more than 50,000 values by here",
     "name: " + "[" * 50_000: "bread.yaml:1: nests deeper than 40",
     "? " * 50_000: "bread.yaml:1: nests deeper than 40",
-    "name: bread\x00\n": "bread.yaml: is no YAML: it holds a character",
+    "name: bread\x00\n": "bread.yaml: is no YAML: it holds an invalid character or number",
     'name: bread\nbakery: {recipe: "a\\0b"}\n': "bread.yaml:2: a value holds a control character",
     'name: bread\ntitle: "\\ud800"\n': "bread.yaml:2: a value holds a control character or half a character",
     f"name: {'b' * 50_000}\n": "bread.yaml:1: name: string should have at most 64 characters",

@@ -166,7 +166,7 @@ def test_dataset_finishes_with_empty_shards(tmp_path: Path, name_of: Name) -> No
     assert "100 shapes were requested, but the program has only 8" in notes
     assert any(line.startswith("split train has ") for line in notes)
     card = (tmp_path / "out/.work/toy/package/dataset.README.md").read_text(encoding="utf-8")
-    assert "| all | 4 |" in card
+    assert "| total | 4 |" in card
 
 
 def test_program_whose_shapes_are_all_refused_fails_with_reasons(tmp_path: Path, name_of: Name) -> None:

@@ -143,7 +143,7 @@ def test_program_is_found_by_fit() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["points", "sketch"])
 def test_command_uses_the_trained_model(kind: str, tmp_path: Path) -> None:
-    train(config(input=kind, rounds=1), tmp_path)
+    train(config(input=kind, max_rounds=1), tmp_path)
     models, problems = find_models(tmp_path)
     assert list(models) == [(PROGRAM, kind)]
     assert not problems

@@ -47,7 +47,7 @@ def write_config(folder: Path, samples_per_kit: int = 0, **string_sampling: Any)
         "variations": {"samples_per_kit": samples_per_kit},
         "string_sampling": settings,
         "points": {"uniform": 64},
-        "sketches": {"size": 64, "backend": "raster", "views": [{"name": "front"}]},
+        "sketches": {"size": 64, "renderer": "raster", "views": [{"name": "front"}]},
         "package": {"previewed": 4},
     }
     path = folder / "sampled.yaml"
@@ -142,9 +142,11 @@ def test_known_shapes_can_be_kept_and_are_marked(bare: Path, tmp_path: Path) -> 
     kit = dataset_kits(DatasetPaths(bare, "sampled"))["chain"]
     publish_model(tmp_path, "parent", kit, [string_of(4)])
     assert run(config, tmp_path, *STAGES)[0] == 0
-    marks = {sample.lineage["string"]: sample.lineage["novelty"] for sample in samples(tmp_path)}
-    assert marks[string_of(4)] == "train"
-    assert {marks.get(string_of(links), "exemplar") for links in (2, 3)} == {"exemplar"}
+    marks = {sample.graph: sample.lineage["novelty"] for sample in samples(tmp_path)}
+    decoded = {links: decode(string_of(links), make_alphabet(kit.labels)) for links in (2, 3, 4)}
+    graphs = {links: graph_digest(chain.types, chain.edges) for links, chain in decoded.items()}
+    assert marks[graphs[4]] == "train"
+    assert {marks.get(graphs[links], "exemplar") for links in (2, 3)} == {"exemplar"}
     assert "new" in marks.values()
 
 
