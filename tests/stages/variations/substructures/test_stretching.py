@@ -56,7 +56,7 @@ def test_piece_replaces_a_longer_one_only_if_stretched(kit: Kit) -> None:
     rigid, none = found_in(kit)
     assert not none
     assert rigid.rejects["replaced: no embedding"]
-    _, bent = found_in(kit, most=1.6)
+    _, bent = found_in(kit, max_factor=1.6)
     assert sorted(map(tuple, (named(kit, entry) for entry in bent))) == [
         ("bar", "floor", "post", "post"),
         ("floor", "knot", "post", "post", "rail", "rail"),
@@ -68,13 +68,13 @@ def test_piece_replaces_a_longer_one_only_if_stretched(kit: Kit) -> None:
         contact.append(ContactTest(shape.meshes, kit.contact_tolerance))
         touching = contact[-1].contacts(shape.assembly.types, shape.assembly.poses)
         np.testing.assert_array_equal(touching, entry.assembly.edges)
-    _, less = found_in(kit, most=1.2)
+    _, less = found_in(kit, max_factor=1.2)
     assert not less
 
 
 def test_stretched_variants_pass_verification(kit: Kit) -> None:
     """By the other contact test, from the mesh as it stands in the file; one that is moved or too long is found out."""
-    _, bent = found_in(kit, most=1.6)
+    _, bent = found_in(kit, max_factor=1.6)
     for variant in bent:
         assert verified(kit, variant, np.eye(4)) == []
         longer = verified(kit, variant, np.diag([1.3, 1.0, 1.0, 1.0]))
@@ -104,6 +104,6 @@ def verified(kit: Kit, variant: Variant, motion: np.ndarray) -> list[str]:
 def test_rigid_parts_keep_their_size(kit: Kit) -> None:
     """Rails are squeezed and a knot between them is not: it comes to stand in them, which is seen; a bar alone stays
     out."""
-    line, found = found_in(kit, most=1.6, rigid=("knot", "bar"))
+    line, found = found_in(kit, max_factor=1.6, rigid=("knot", "bar"))
     assert not found
     assert line.rejects["stretched: parts clash"]
