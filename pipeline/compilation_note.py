@@ -28,7 +28,7 @@ def note_compilation(compiled: int) -> None:
     """Note that a kernel is compiled now, and how many this process has compiled before."""
     for file in _files:
         with suppress(OSError):
-            file.write_text(f"{compiled} 1")
+            file.write_text(f"{compiled} 1", encoding="utf-8")
 
 
 def note_end_of_compilation(compiled: int) -> None:
@@ -36,13 +36,13 @@ def note_end_of_compilation(compiled: int) -> None:
     for file in _files:
         with suppress(OSError):
             if file.exists():
-                file.write_text(f"{compiled} 0")
+                file.write_text(f"{compiled} 0", encoding="utf-8")
 
 
 def read_compilation_note(file: Path) -> tuple[int, bool]:
     """Return how many kernels the process of a note has compiled, and whether it compiles now."""
     with suppress(OSError, ValueError):
-        compiled, compiles = file.read_text().split()
+        compiled, compiles = file.read_text(encoding="utf-8").split()
         return int(compiled), compiles == "1"
     return 0, False
 

@@ -160,7 +160,7 @@ def test_certificates_of_open_cycles_do_not_change_the_mask(seed: int, partial: 
 
 @given(
     st.integers(0, 2**32),
-    st.integers(0, toy_training.SHAPES * len(toy_training.SPLITS) - 1),
+    st.integers(0, toy_training.SHAPES_PER_SHARD * len(toy_training.SPLITS) - 1),
     st.sampled_from(ALL_LEVELS),
 )
 def test_all_strings_of_an_admitted_graph_are_allowed(seed: int, number: int, strictness: Strictness) -> None:
