@@ -38,7 +38,7 @@ class YieldEstimate:
     layouts: estimated number of distinct graphs; None if very many.
     part_range: smallest and largest number of parts of the hits.
     seen_once: share of parts whose pattern occurs once.
-    sentence: what to expect, and the mend.
+    sentence: what to expect, and the remedy.
     variants: the hits.
     lost_support: the labels whose parts lose what is close above or below them.
     """

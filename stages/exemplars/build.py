@@ -31,7 +31,7 @@ class Observation:
     kinds: the kinds of these contacts.
     repairs: number of repairs by kind.
     aliases: for each type with several names in the models, its other names.
-    refusals: why a run does not start with these models, each with its mend.
+    refusals: why a run does not start with these models, each with its remedy.
     warnings: a sentence each.
     """
 
@@ -53,7 +53,7 @@ def read_kit(config: KitConfig) -> Kit:
 def build_kit(config: KitConfig, models: Sequence[Model]) -> tuple[Kit, Observation]:
     """Return the kit of `models`, and the observation that it comes from.
 
-    Raises ConfigError, with the model, the part and the mend, if no kit can be made.
+    Raises ConfigError, with the model, the part and the remedy, if no kit can be made.
     """
     observation = observe_models(config, models)
     if observation.refusals:

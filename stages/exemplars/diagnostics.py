@@ -1,4 +1,4 @@
-"""Refusals and warnings about a kit: each is one sentence with its mend."""
+"""Refusals and warnings about a kit: each is one sentence with its remedy."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def _hub_warning(exemplar: Exemplar) -> Iterator[str]:
 
 
 def _falls_apart(kit: Kit, exemplar: Exemplar, tolerance: float) -> str:
-    """Describe the pieces of an exemplar, and the mends that help."""
+    """Describe the pieces of an exemplar, and the remedies that help."""
     piece = connected_pieces(exemplar.assembly)
     sizes = np.bincount(piece).tolist()
     alone = listed_names([exemplar.part_names[index] for index in np.flatnonzero(piece).tolist()])

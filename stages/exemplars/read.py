@@ -16,7 +16,7 @@ from stages.exemplars.settings import ReadLimits, Segmentation
 def read_model(path: Path, segmentation: Segmentation = "auto", limits: ReadLimits | None = None) -> Model:
     """Return the parts of a model file: GLB, glTF, OBJ with MTL, PLY, STL, OFF or DAE; as `parse_model`.
 
-    Raises ConfigError, with the file, the element and the mend, for a file without usable parts, whatever it did
+    Raises ConfigError, with the file, the element and the remedy, for a file without usable parts, whatever it did
     to the child process, and for one that takes more than `limits`.
     """
     limits = limits or ReadLimits()
@@ -42,7 +42,7 @@ def parse_model(path: Path, segmentation: Segmentation, limits: ReadLimits) -> M
 
     Opens nothing outside the folder of `path`. Scale, shear and mirroring of the scene move into the vertices, so that
     poses are rigid. A model far from the origin is moved there, with a warning. Raises ConfigError, with the file, the
-    element and the mend, for a file without usable parts, and any error that a reader did not foresee.
+    element and the remedy, for a file without usable parts, and any error that a reader did not foresee.
     """
     scene = read_scene(path)
     check_size(path, scene, limits)

@@ -40,7 +40,7 @@ MAX_WARNINGS_SHOWN = 200
 def read_scene(path: Path) -> ModelScene:
     """Return the scene of a model file, once it is known to be a readable file of a known format.
 
-    Raises ConfigError, with the file, the element and the mend.
+    Raises ConfigError, with the file, the element and the remedy.
     """
     reader = READERS.get(path.suffix.lower())
     if reader is None:

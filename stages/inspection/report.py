@@ -29,7 +29,7 @@ OTHER_CUTS = (
     "cut it across, between bays and storeys with all that crosses there: `parts: sections`; or where it repeats "
     "itself: `parts: symmetry`, which writes a shape grammar, too"
 )
-"""The mend if one part of a mesh touches all others."""
+"""The remedy if one part of a mesh touches all others."""
 
 
 @dataclass(frozen=True)

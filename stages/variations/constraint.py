@@ -58,7 +58,7 @@ def module_of(name: str) -> str:
 
 
 def unknown_in(constraints: Mapping[str, Labels]) -> str | None:
-    """Return what is wrong with the constraints of a config, and the mend; None if nothing is."""
+    """Return what is wrong with the constraints of a config, and the remedy; None if nothing is."""
     known = find_constraints()
     for name, labels in constraints.items():
         if name not in known:

@@ -21,7 +21,7 @@ CHECK_SECONDS = 120.0
 
 
 def check_renderer(renderer: RendererName, key: str) -> None:
-    """Raise ConfigError, with the mend, if a renderer cannot draw on this machine.
+    """Raise ConfigError, with the remedy, if a renderer cannot draw on this machine.
 
     key: config key that asks for it
 

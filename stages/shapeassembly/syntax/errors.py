@@ -7,7 +7,7 @@ class ProgramError(ValueError):
     """A program that cannot be read or executed.
 
     reason: a short phrase that is the same for every program, and is counted.
-    detail: what was wrong here, and the mend.
+    detail: what was wrong here, and the remedy.
     line, column: place in the text, from 1, where there is a text.
     source: the line of the text, shown with a caret.
     """

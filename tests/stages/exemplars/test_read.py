@@ -1,4 +1,4 @@
-"""Readers of every format: parts, names, colours, and refusals with the mend."""
+"""Readers of every format: parts, names, colours, and refusals with the remedy."""
 
 from __future__ import annotations
 
