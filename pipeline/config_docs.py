@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from pipeline.config import DatasetFacts, StrictModel
+from pipeline.paths import write_file
 from pipeline.stage import Stage
 
 HEADING = "\n## Keys\n"
@@ -27,8 +28,7 @@ def write_config_pages(folder: Path, stages: Mapping[str, Stage]) -> list[Path]:
     for name, model in _sections(stages).items():
         page = folder / f"{name}.md"
         head = page.read_text(encoding="utf-8").partition(HEADING)[0] if page.exists() else f"# Section `{name}`\n"
-        page.write_text(f"{head}{HEADING}\n{section_table(name, model)}", encoding="utf-8")
-        pages.append(page)
+        pages.append(write_file(page, f"{head}{HEADING}\n{section_table(name, model)}".encode()))
     return pages
 
 

@@ -141,9 +141,10 @@ def recover(source: str | Path | FloatArray | ByteArray, program: str = "", seed
 
 def render(shape: Shape, path: str | Path, size: tuple[int, int] = (640, 640)) -> None:
     """Write a shaded picture of a shape as PNG; `size` is width and height in pixels."""
+    from pipeline.paths import write_file
     from stages.shape.views.picture import shape_png
 
-    Path(path).write_bytes(shape_png(shape, size=size))
+    write_file(Path(path), shape_png(shape, size=size))
 
 
 def _paths(models: str | Path | Sequence[str | Path]) -> list[Path]:
