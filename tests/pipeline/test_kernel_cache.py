@@ -69,6 +69,8 @@ class Checkout:
 
     def start(self, module: str = "main") -> subprocess.Popen[str]:
         env = os.environ | {"PYTHONPATH": f"{self.folder}:{ROOT}", "XDG_CACHE_HOME": str(self.cache)}
+        # Python takes a .pyc for current when size and second of the source agree, as after a quick edit.
+        env["PYTHONDONTWRITEBYTECODE"] = "1"
         env.pop("NUMBA_CACHE_DIR", None)
         return subprocess.Popen([sys.executable, "-m", f"shop.{module}"], env=env, stdout=subprocess.PIPE, text=True)
 
