@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.errors import ConfigError
 from pipeline.shards import read_shard
 from stages.exemplars.build import observe_models
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.shape.arrays import FloatArray
 from stages.shape.collection.pairs import CONTACTS, pairs_of
@@ -70,7 +70,7 @@ def model_kits(path: Path, up: str) -> Iterator[tuple[str, Kit]]:
     name = path.parent.name if path.stem == "model" else path.stem
     config = KitConfig(name="model", shapes=(ShapeFile(path=path),), up="z" if up == "z" else "y")
     config = config.resolve(STRICTEST)
-    yield name, observe_models(config, [read_model(path, config.parts)]).kit
+    yield name, observe_models(config, [read_parts(path, config.parts)]).kit
 
 
 def box_shapes(path: Path, up: str) -> Iterator[tuple[str, Shape]]:

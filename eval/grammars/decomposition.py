@@ -15,7 +15,7 @@ import trimesh
 from eval.engine.table import Cell, Table
 from pipeline.errors import ConfigError
 from stages.exemplars.build import observe_models
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import STRICTEST, KitConfig, Segmentation, ShapeFile
 from stages.points.area_sampling import SurfacePoints, sample_shape
 from stages.shape.arrays import IntArray
@@ -104,7 +104,7 @@ def _segment_merged(shape: Shape, segmentation: Segmentation) -> Shape:
         config = KitConfig(name="merged", shapes=(ShapeFile(path=path),), parts=segmentation, up=shape.up).resolve(
             STRICTEST
         )
-        kit = observe_models(config, [read_model(path, segmentation)]).kit
+        kit = observe_models(config, [read_parts(path, segmentation)]).kit
     return Shape(kit.types, kit.exemplars[0].whole, kit.up, kit.type_names())
 
 

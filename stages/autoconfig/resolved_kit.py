@@ -12,8 +12,9 @@ from stages.autoconfig.yield_estimate import YieldEstimate, estimate_yield
 from stages.exemplars.build import Observation, observe_parts
 from stages.exemplars.identify import IdentifiedParts, identify_parts
 from stages.exemplars.model import Model
-from stages.exemplars.read import read_model
-from stages.exemplars.settings import STRICTEST, KitConfig, ReadLimits
+from stages.exemplars.read import read_parts
+from stages.exemplars.settings import STRICTEST, KitConfig
+from stages.model_files.limits import ReadLimits
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY
 from stages.variations.requirements.hub_restoration import auto_min_hubs
@@ -56,7 +57,7 @@ class ResolvedKit:
 
 def read_and_resolve(config: KitConfig, limits: ReadLimits, tries: int, require: Sequence[str]) -> ResolvedKit:
     """Read the models of a kit and resolve its `auto` keys, as `resolve_settings` and `use_sections_if_empty` do."""
-    models = [read_model(shape.path, config.parts, limits) for shape in config.shapes]
+    models = [read_parts(shape.path, config.parts, limits) for shape in config.shapes]
     return resolve_models(config, models, limits, tries, require)
 
 
@@ -82,7 +83,7 @@ def use_sections_if_empty(first: ResolvedKit, limits: ReadLimits, tries: int, re
         return first
     config = first.config.model_copy(update={"parts": "sections"})
     try:
-        models = [read_model(model.path, config.parts, limits) for model in first.models]
+        models = [read_parts(model.path, config.parts, limits) for model in first.models]
         identified = identify_parts(models, config)
     except ConfigError:
         return first

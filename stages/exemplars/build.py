@@ -9,14 +9,14 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.exemplars.diagnostics import connected_pieces, kit_warnings, listed_names, refusals
-from stages.exemplars.formats.scene import UniqueNames
 from stages.exemplars.hubs import hub_types, remove_hubs, with_touching_types
 from stages.exemplars.identify import IdentifiedParts, identify_parts
 from stages.exemplars.inferred_dockings import infer_dockings
 from stages.exemplars.model import Model
 from stages.exemplars.observed_grammar import observe_contacts, observe_grammar
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import KitConfig
+from stages.model_files.scene import UniqueNames
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import EMPTY_ASSEMBLY, Assembly, ContactKind, Exemplar, Kit
@@ -45,8 +45,8 @@ class Observation:
 
 
 def read_kit(config: KitConfig) -> Kit:
-    """Return the kit of the model files of `config`. Raises ConfigError, as `build_kit` and `read_model` do."""
-    kit, _ = build_kit(config, [read_model(shape.path, config.parts) for shape in config.shapes])
+    """Return the kit of the model files of `config`. Raises ConfigError, as `build_kit` and `read_parts` do."""
+    kit, _ = build_kit(config, [read_parts(shape.path, config.parts) for shape in config.shapes])
     return kit
 
 

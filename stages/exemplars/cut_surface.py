@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stages.exemplars.formats.scene import ModelScene, Placement, Surface
+from stages.model_files.scene import ModelScene, Placement, Surface
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 from stages.symmetry.pieces import RADIUS_SHARE, SurfacePiece, repeated_pieces

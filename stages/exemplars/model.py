@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import io
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
-
-import numpy as np
+from typing import Literal
 
 from stages.exemplars.settings import Segmentation
+from stages.model_files.packing import pack_scene, unpack_scene
+from stages.model_files.scene import ModelScene, Placement, Surface
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 STATED_IN_CONFIG = "as the config says"
@@ -47,6 +45,7 @@ class Model:
     why: the reason, a sentence.
     warnings: a sentence each.
     up: the axis that points up as the file states it, if its format lets files choose.
+    unit: metres of one unit of the coordinates, if the format or the file says.
     """
 
     path: Path
@@ -55,6 +54,7 @@ class Model:
     why: str
     warnings: tuple[str, ...]
     up: Literal["y", "z"] | None = None
+    unit: float | None = None
 
     @property
     def is_cut(self) -> bool:
@@ -63,54 +63,29 @@ class Model:
 
 
 def pack_model(model: Model) -> bytes:
-    """Return a model without its path as an npz file of plain arrays, which `unpack_model` reads."""
+    """Return a model without its path as bytes, which `unpack_model` reads."""
     meshes = {part.mesh_name: part for part in model.parts}
     index_of = {name: index for index, name in enumerate(meshes)}
-    header = {
-        "parts": [[part.name, index_of[part.mesh_name], part.label] for part in model.parts],
-        "meshes": list(meshes),
-        "segmentation": model.segmentation,
-        "why": model.why,
-        "warnings": model.warnings,
-        "up": model.up,
-    }
-    stream = io.BytesIO()
-    np.savez(
-        stream,
-        header=np.frombuffer(json.dumps(header).encode(), np.uint8),
-        poses=np.array([part.pose for part in model.parts], dtype=np.float64),
-        sizes=np.array([[len(mesh.vertices), len(mesh.faces)] for mesh in meshes.values()], dtype=np.int64),
-        vertices=np.concatenate([mesh.vertices for mesh in meshes.values()]),
-        faces=np.concatenate([mesh.faces for mesh in meshes.values()]),
-        face_colors=np.concatenate([mesh.face_colors for mesh in meshes.values()]),
+    scene = ModelScene(
+        "objects",
+        tuple(Surface(name, mesh.vertices, mesh.faces, mesh.face_colors) for name, mesh in meshes.items()),
+        tuple(Placement(part.name, part.label, index_of[part.mesh_name], part.pose) for part in model.parts),
+        model.warnings,
+        model.up,
+        model.unit,
     )
-    return stream.getvalue()
+    return pack_scene(scene, segmentation=model.segmentation, why=model.why)
 
 
 def unpack_model(path: Path, content: bytes) -> Model:
     """Return the model that `pack_model` has packed, as that of the file `path`.
 
-    Raises ValueError for arrays that are no meshes: compiled code would follow a missing vertex out of bounds.
+    Raises ValueError for arrays that are no meshes.
     """
-    with np.load(io.BytesIO(content), allow_pickle=False) as stored:
-        header: dict[str, Any] = json.loads(stored["header"].tobytes())
-        poses, sizes = stored["poses"], stored["sizes"]
-        vertices, faces, face_colors = stored["vertices"], stored["faces"], stored["face_colors"]
-    last = sizes.cumsum(axis=0)
-    meshes = []
-    for (to_vertex, to_face), (vertex_count, face_count) in zip(last.tolist(), sizes.tolist(), strict=True):
-        own = slice(to_face - face_count, to_face)
-        mesh = vertices[to_vertex - vertex_count : to_vertex], faces[own], face_colors[own]
-        if not len(mesh[1]) or mesh[1].min() < 0 or mesh[1].max() >= len(mesh[0]):
-            raise ValueError("a face has a vertex that does not exist")
-        meshes.append(mesh)
-    dtypes = [array.dtype for array in (poses, vertices, faces, face_colors)]
-    if dtypes != [np.float64, np.float64, np.int32, np.uint8] or not (
-        np.isfinite(poses).all() and np.isfinite(vertices).all()
-    ):
-        raise ValueError("arrays have other types, or numbers that are not finite")
+    scene, stated = unpack_scene(content)
+    meshes = scene.surfaces
     parts = [
-        RawPart(name, header["meshes"][mesh], label, pose, *meshes[mesh])
-        for (name, mesh, label), pose in zip(header["parts"], poses, strict=True)
+        RawPart(part.name, mesh.name, part.label, part.pose, mesh.vertices, mesh.faces, mesh.face_colors)
+        for part, mesh in ((placement, meshes[placement.surface]) for placement in scene.placements)
     ]
-    return Model(path, tuple(parts), header["segmentation"], header["why"], tuple(header["warnings"]), header["up"])
+    return Model(path, tuple(parts), stated["segmentation"], stated["why"], scene.warnings, scene.up, scene.unit)

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.scene import ModelScene, Placement, Surface, UniqueNames
 from stages.exemplars.model import RawPart
+from stages.model_files.scene import ModelScene, Placement, Surface, UniqueNames
 from stages.shape.arrays import FloatArray
 
 STRETCH_TOLERANCE = 1e-5

@@ -9,9 +9,9 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.exemplars.cut_surface import cut_by_sections, cut_by_symmetry, search_size
-from stages.exemplars.formats.scene import ModelScene, Placement, Surface, UniqueNames
 from stages.exemplars.model import STATED_IN_CONFIG
 from stages.exemplars.settings import Segmentation
+from stages.model_files.scene import ModelScene, Placement, Surface, UniqueNames
 from stages.shape.geometry.connected_faces import connected_faces
 
 SOURCES: tuple[Segmentation, ...] = ("nodes", "objects", "materials", "colors", "components")

@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from pipeline.config import ExistingFile, StrictModel
 from pipeline.errors import ConfigError
+from stages.model_files.limits import ReadLimits
 from stages.shape.collection.origin import Credit
 from stages.shape.kit import ContactKind, Strictness
 
@@ -30,19 +31,6 @@ MAX_CONTACT_TOLERANCE = 0.05
 """As a share of the median part's diagonal."""
 
 Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry", "sections"]
-
-
-class ReadLimits(StrictModel):
-    """Limits of reading one model; a model beyond them is refused."""
-
-    cpu_seconds: int = Field(300, ge=1, le=86_400, description="Most CPU seconds of reading one model.")
-    memory_mb: int = Field(4_000, ge=100, description="Most memory of reading one model; unit: MB.")
-    parts: int = Field(20_000, ge=1, description="Most parts of one model.")
-    triangles: int = Field(
-        5_000_000,
-        ge=1,
-        description="Most triangles of one model; those of a mesh that is placed often count once.",
-    )
 
 
 class ContactConfig(StrictModel):

@@ -31,7 +31,7 @@ def run_shard(task: Task) -> Outcome:
     """Read the models, build the kit and write it."""
     from stages.exemplars.build import build_kit
     from stages.exemplars.kit_figure import kit_figure
-    from stages.exemplars.read import read_model
+    from stages.exemplars.read import read_parts
     from stages.shape.kit import ContactKind
     from stages.shape.kit_files import write_kit
 
@@ -42,7 +42,7 @@ def run_shard(task: Task) -> Outcome:
         resolution = json.loads(task.input("autoconfig", f"{config.name}.json").read_bytes())
         resolved = resolution["resolved"]
         config = config.resolve(resolved).model_copy(update={"parts": resolved.get("parts", config.parts)})
-    models = [read_model(shape.path, config.parts, section.limits) for shape in config.shapes]
+    models = [read_parts(shape.path, config.parts, section.limits) for shape in config.shapes]
     kit, observation = build_kit(config, models)
     kinds = [kind for of_exemplar in observation.kinds for kind in of_exemplar]
     with task.output(f"{kit.name}.json") as text, task.output(f"{kit.name}.tar") as arrays:

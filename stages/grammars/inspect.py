@@ -11,7 +11,6 @@ import numpy as np
 from pipeline.errors import ConfigError
 from pipeline.paths import write_file
 from stages.exemplars.model import Model
-from stages.exemplars.settings import ReadLimits
 from stages.grammars.description import describe_grammar
 from stages.grammars.distinct_shapes import RANDOM_RULES, RESIZED_GRID, preview_shapes
 from stages.grammars.export_clouds import write_clouds
@@ -20,6 +19,7 @@ from stages.grammars.picture import grammar_sheet, shapes_sheet
 from stages.grammars.read_surface import read_surface
 from stages.grammars.scans.scanned_grid import ScannedCloud, required_points, suitable_radius
 from stages.grammars.settings import MAX_RADIUS_SHARE, GrammarConfig
+from stages.model_files.limits import ReadLimits
 from stages.symmetry.surface.grid import estimate_grid_size
 
 PREVIEW_SHAPES = 12

@@ -10,13 +10,13 @@ import numpy as np
 
 from pipeline.bounded import ChildFailed, in_child
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.enclosure import Enclosure
-from stages.exemplars.formats.ply import read_ply_points
-from stages.exemplars.formats.scene import GREY
-from stages.exemplars.read import read_model
-from stages.exemplars.settings import ReadLimits
+from stages.exemplars.read import read_parts
 from stages.grammars.extraction.extract import SurfaceMesh, model_surface
 from stages.grammars.scans.scanned_grid import ScannedCloud
+from stages.model_files.enclosure import Enclosure
+from stages.model_files.limits import ReadLimits
+from stages.model_files.ply import read_ply_points
+from stages.model_files.scene import GREY
 
 TEXT_COLUMNS = {".xyz": None, ".xyzn": "normals", ".xyzrgb": "colours"}
 """Further columns of clouds as text, one point a line, after x, y, z; colours from 0 to 1, as Open3D writes them."""
@@ -29,12 +29,12 @@ def read_surface(
 ) -> tuple[SurfaceMesh | ScannedCloud, Literal["y", "z"] | None]:
     """Read a model file as one mesh, or a cloud; also return the up axis that the file states.
 
-    Raises ConfigError as `read_model` and `read_cloud` do.
+    Raises ConfigError as `read_parts` and `read_cloud` do.
     """
     cloud = read_cloud(path, limits)
     if cloud is not None:
         return cloud, None
-    model = read_model(path, "components", limits)
+    model = read_parts(path, "components", limits)
     return model_surface(model), model.up
 
 

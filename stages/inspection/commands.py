@@ -16,7 +16,8 @@ from pipeline.options import INSPECTION
 from stages.autoconfig.settings import AutoconfigConfig
 
 if TYPE_CHECKING:
-    from stages.exemplars.settings import KitConfig, ReadLimits
+    from stages.exemplars.settings import KitConfig
+    from stages.model_files.limits import ReadLimits
 
 DEFAULT_FOLDER = Path("datasets", "inspect")
 
@@ -51,15 +52,16 @@ def inspect(
     ] = None,
 ) -> None:
     """Show what can be made of a mesh, or of several models of one kit, and write a config for it."""
-    from stages.exemplars.read import read_model
-    from stages.exemplars.scene_file import check_exists
-    from stages.exemplars.settings import KitConfig, ReadLimits
+    from stages.exemplars.read import read_parts
+    from stages.exemplars.settings import KitConfig
     from stages.grammars.inspect import may_have_grammar, write_grammar_report
     from stages.grammars.read_surface import is_point_cloud
     from stages.inspection.config_text import dataset_name
     from stages.inspection.files import model_paths, write_report_files
     from stages.inspection.observation import describe_observation, observation_lines
     from stages.inspection.report import inspect_models
+    from stages.model_files.limits import ReadLimits
+    from stages.model_files.scene_file import check_exists
 
     stated_limits = {
         "cpu_seconds": max_cpu_seconds,
@@ -91,7 +93,7 @@ def inspect(
         print(f"{paths[0]}: a point cloud, which has no parts; its repetitions may give a grammar")
         _print_rows(rows)
         return
-    read = [read_model(path, config.parts, limits) for path in paths]
+    read = [read_parts(path, config.parts, limits) for path in paths]
     report = inspect_models(config, read, tries, limits)
     observation = describe_observation(report.observed, report.models, report.config)
     if as_json:
@@ -113,7 +115,7 @@ def _print_rows(rows: Iterable[tuple[str, Path | str]]) -> None:
 
 def _print_table(config: KitConfig, paths: list[Path], limits: ReadLimits, tries: int) -> None:
     """Print a Markdown table, a row for each model as soon as it is inspected."""
-    from stages.exemplars.read import read_model
+    from stages.exemplars.read import read_parts
     from stages.exemplars.settings import ShapeFile
     from stages.inspection.config_text import dataset_name
     from stages.inspection.report import inspect_models
@@ -121,7 +123,7 @@ def _print_table(config: KitConfig, paths: list[Path], limits: ReadLimits, tries
     for number, path in enumerate(paths):
         try:
             alone = config.model_copy(update={"shapes": (ShapeFile(path=path),)})
-            report = inspect_models(alone, [read_model(path, config.parts, limits)], tries, limits)
+            report = inspect_models(alone, [read_parts(path, config.parts, limits)], tries, limits)
         except ConfigError as error:
             print(error, file=sys.stderr)
             continue

@@ -9,10 +9,10 @@ from pathlib import Path
 from pipeline.paths import write_file
 from stages.autoconfig.resolve import REQUIREMENT_KEYS
 from stages.exemplars.kit_figure import kit_figure
-from stages.exemplars.scene_file import READERS
 from stages.inspection.config_text import config_text, dataset_name, proportions_section, variations_section
 from stages.inspection.report import InspectionReport
 from stages.inspection.sample_figure import sample_figure
+from stages.model_files.scene_file import READERS
 from stages.shape.resolved_settings import FALLBACK_STABLE_KEY
 
 

@@ -14,8 +14,9 @@ from stages.autoconfig.resolved_kit import resolve_models
 from stages.autoconfig.yield_estimate import YieldEstimate
 from stages.exemplars.build import Observation
 from stages.exemplars.model import Model
-from stages.exemplars.settings import KitConfig, ReadLimits
+from stages.exemplars.settings import KitConfig
 from stages.inspection.sample_figure import MAX_SHAPES_SHOWN
+from stages.model_files.limits import ReadLimits
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Kit
 from stages.shape.physics.judge import unmet_requirement

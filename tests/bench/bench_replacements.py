@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from stages.exemplars.build import build_kit
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ShapeFile
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Assembly, Kit
@@ -39,7 +39,7 @@ def bench() -> Iterator[Measure]:
         path = REAL_MODELS / name / "model.glb"
         contact = ContactConfig(kinds=("point", "line", "face"))
         config = KitConfig(name="bench", shapes=(ShapeFile(path=path),), contact=contact)
-        kit, _ = build_kit(config.resolve(STRICTEST), [read_model(path)])
+        kit, _ = build_kit(config.resolve(STRICTEST), [read_parts(path)])
         whole = kit.exemplars[0].assembly
         crops = [_crop(kit, whole, size) for size in sorted({min(size, len(whole)) for size in CROP_SIZES})]
         short = name.split("_")[0]

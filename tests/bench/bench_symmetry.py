@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.grammars.extraction.extract import SurfaceMesh, extract_grammar, model_surface
 from stages.shape.arrays import FloatArray
 from stages.symmetry.surface.welding import weld
@@ -54,7 +54,7 @@ def _facade(steps: int) -> tuple[SurfaceMesh, str]:
 
 
 def _subdivided(path: Path) -> tuple[SurfaceMesh, str]:
-    model = read_model(path, "components")
+    model = read_parts(path, "components")
     triangles = model_surface(model).corners
     while len(triangles) < MIN_TRIANGLES:
         triangles = split(triangles)

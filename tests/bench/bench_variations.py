@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stages.exemplars.build import build_kit
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ShapeFile
 from stages.shape.geometry.contact import overlapping_boxes, world_boxes
 from stages.shape.geometry.contact_oracle import ContactOracle
@@ -95,7 +95,7 @@ def _kit(paths: tuple[Path, ...], kinds: tuple[Any, ...]) -> Kit:
     config = KitConfig(
         name="bench", shapes=tuple(ShapeFile(path=path) for path in paths), contact=ContactConfig(kinds=kinds)
     ).resolve(STRICTEST)
-    kit, _ = build_kit(config, [read_model(path) for path in paths])
+    kit, _ = build_kit(config, [read_parts(path) for path in paths])
     return kit
 
 

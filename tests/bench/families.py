@@ -19,7 +19,7 @@ import numpy as np
 from pipeline.paths import write_file
 from stages.autoconfig.trial_search import type_counts
 from stages.exemplars.build import build_kit, read_kit
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.inspection.sample_figure import MAX_SHAPES_SHOWN, sample_figure
 from stages.programs.files import named_values, shape_glb
@@ -94,7 +94,7 @@ def _furniture() -> Family:
         "contact.tolerance": 0.02,
         "disconnected": "largest",
     }
-    kit, _ = build_kit(config.resolve(chosen), side_by_side([read_model(path) for path in paths]))
+    kit, _ = build_kit(config.resolve(chosen), side_by_side([read_parts(path) for path in paths]))
     return kit, SearchConfig(duplicates="graph", min_size=0.5, stretch=StretchConfig(max_factor=4.0))
 
 

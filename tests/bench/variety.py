@@ -25,7 +25,7 @@ from pipeline.paths import write_file
 from pipeline.registry import find_stages
 from stages.autoconfig.trial_search import type_counts
 from stages.exemplars.build import build_kit
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import ExemplarsConfig
 from stages.inspection.sample_figure import MAX_SHAPES_SHOWN, sample_figure
 from stages.shape.geometry.contact_oracle import ContactOracle
@@ -87,7 +87,7 @@ def configured(name: str, grammar: str | None = None) -> tuple[Kit, SearchConfig
     kit_config = next((kit_config for kit_config in kits if kit_config.name == chosen), kits[0])
     if grammar is not None:
         kit_config = kit_config.model_copy(update={"grammar": grammar})
-    kit, _ = build_kit(kit_config, [read_model(shape.path, kit_config.parts) for shape in kit_config.shapes])
+    kit, _ = build_kit(kit_config, [read_parts(shape.path, kit_config.parts) for shape in kit_config.shapes])
     return kit, config.section(VariationsConfig).search
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.read import read_model
-from stages.exemplars.settings import ReadLimits
+from stages.exemplars.read import read_parts
+from stages.model_files.limits import ReadLimits
 from tests.hostile.good import write_good
 from tests.hostile.mutate import mutate
 
@@ -48,7 +48,7 @@ def outcomes(folder: Path, count: int, seed: int) -> Iterator[Outcome]:
     good = write_good(folder)
     contents = {file: file.read_bytes() for file in good}
     for file in good:
-        read_model(file)  # compile kernels before times are measured
+        read_parts(file)  # compile kernels before times are measured
     for number in range(count):
         rng = np.random.default_rng([seed, number])
         origin = good[number % len(good)]
@@ -64,7 +64,7 @@ def outcomes(folder: Path, count: int, seed: int) -> Iterator[Outcome]:
 def _read(path: Path) -> tuple[str, str]:
     started = time.monotonic()
     try:
-        model = read_model(path, "auto" if path.suffix != ".glb" else "nodes", LIMITS)
+        model = read_parts(path, "auto" if path.suffix != ".glb" else "nodes", LIMITS)
         "".join([*(part.name for part in model.parts), *model.warnings]).encode()
         assert all(np.isfinite(part.vertices).all() for part in model.parts)
     except ConfigError as error:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eval.grammars.decomposition import decomposition_table, measure_part_recovery, rand_index, write_merged
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.shape.shape import Shape, kit_shape
 from tests.toy_kits.chains_and_rings import box, kit_of, pose
 
@@ -39,7 +39,7 @@ def test_failed_segmentation_has_a_reason_and_no_values(pile: Shape) -> None:
 
 def test_merged_model_is_one_mesh_of_the_same_surface(pile: Shape, tmp_path: Path) -> None:
     write_merged(pile, tmp_path / "pile.glb")
-    model = read_model(tmp_path / "pile.glb", "nodes")
+    model = read_parts(tmp_path / "pile.glb", "nodes")
     (part,) = model.parts
     np.testing.assert_allclose(np.ptp(part.vertices, axis=0), (2.0, 3.0, 2.0), atol=1e-6)
     assert len(part.faces) == 4 * 12

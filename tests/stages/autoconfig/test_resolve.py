@@ -19,7 +19,7 @@ from stages.autoconfig.yield_estimate import estimate_yield
 from stages.exemplars.build import build_kit
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import STRICTEST, HubConfig, KitConfig
 from stages.inspection.report import inspect_models
 from stages.shape.geometry.contact_oracle import ContactOracle
@@ -101,7 +101,7 @@ class TestSettings:
     def test_kit_with_enough_layouts_keeps_the_strictest_settings(self) -> None:
         paths = sorted((ROOT / "datasets" / "exemplars" / "playground").glob("*.glb"))
         config = KitConfig(name="playground", shapes=tuple(paths))
-        models = [read_model(path) for path in paths]
+        models = [read_parts(path) for path in paths]
         resolution = resolve_settings(config, models, identify_parts(models, config), 2500)
         requirements = {"require.max_copied_share": 0.9, "require.stable": False, "require.labels": ()}
         assert (dict(resolution.values), resolution.settings_tried, resolution.is_sufficient) == (

@@ -17,7 +17,8 @@ from stages.autoconfig.resolved_kit import ResolvedKit, use_sections_if_empty
 from stages.autoconfig.trial_search import TrialResult
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
-from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ReadLimits
+from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig
+from stages.model_files.limits import ReadLimits
 from stages.shape.kit import Kit
 from tests.toy_kits.chains_and_rings import CHAIN, Placed, chain, models_of
 
@@ -51,7 +52,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> list[KitConfig]:
         return models_of(CHAIN, [chain(5)])[0]
 
     monkeypatch.setattr(resolved_kit, "resolve_settings", resolve)
-    monkeypatch.setattr(resolved_kit, "read_model", read)
+    monkeypatch.setattr(resolved_kit, "read_parts", read)
     return configs
 
 
@@ -79,7 +80,7 @@ def test_parts_with_results_or_by_the_author_are_not_cut(searched: list[KitConfi
 
 
 def test_sections_without_repeats_are_not_searched(searched: list[KitConfig], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(resolved_kit, "read_model", lambda *_: models_of(CHAIN, [chain(1)[:2]])[0])
+    monkeypatch.setattr(resolved_kit, "read_parts", lambda *_: models_of(CHAIN, [chain(1)[:2]])[0])
     first = read_first()
     assert cut(first) is first
     assert not searched
@@ -95,7 +96,7 @@ def test_impossible_or_useless_sections_change_nothing(
     def refuse(*_: Any) -> Model:
         raise ConfigError("too much")
 
-    monkeypatch.setattr(resolved_kit, "read_model", refuse)
+    monkeypatch.setattr(resolved_kit, "read_parts", refuse)
     assert cut(first) is first
 
 

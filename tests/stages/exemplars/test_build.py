@@ -13,7 +13,7 @@ from pipeline.errors import ConfigError
 from stages.exemplars.build import build_kit, observe_models
 from stages.exemplars.diagnostics import connected_pieces, hub_parts, mirror_twins
 from stages.exemplars.model import STATED_IN_CONFIG, Model
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import ContactConfig
 from stages.shape.geometry.pose import transform_points
 from stages.shape.kit import Assembly
@@ -266,7 +266,7 @@ def test_model_a_million_units_away_has_the_same_contacts(tmp_path: Path) -> Non
         for k in range(5):
             glb.node(name=f"cube.{k}", mesh=cube, translation=[shift + k, shift, 0.0])
         glb.node(name="on top", mesh=cube, translation=[shift + 0.5, shift + 1.0, 0.0])
-        model_of = read_model(glb.write(tmp_path / f"{shift:g}.glb"))
+        model_of = read_parts(glb.write(tmp_path / f"{shift:g}.glb"))
         kits.append((block_kit(model_of), model_of.warnings))
     (near, quiet), (away, warned) = kits
     assert away.exemplars[0].assembly.edges.tolist() == near.exemplars[0].assembly.edges.tolist()

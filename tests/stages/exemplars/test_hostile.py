@@ -14,8 +14,9 @@ import pytest
 
 from pipeline.errors import ConfigError
 from stages.exemplars.model import pack_model, unpack_model
-from stages.exemplars.read import parse_model, read_model
-from stages.exemplars.settings import ReadLimits, Segmentation
+from stages.exemplars.read import parse_parts, read_parts
+from stages.exemplars.settings import Segmentation
+from stages.model_files.limits import ReadLimits
 from tests.hostile.corpus import LIMITS, outcomes
 from tests.hostile.good import write_good
 from tests.stages.exemplars.model_files import BOX_FACES, Glb, box, textured_dae, textured_glb, write_obj
@@ -96,7 +97,7 @@ def test_fault_is_named_with_its_file_and_its_element(tmp_path: Path, fault: str
     name, content, message = REFUSED[fault]
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ConfigError) as caught:
-        read_model(tmp_path / name, "auto", LIMITS)
+        read_parts(tmp_path / name, "auto", LIMITS)
     assert str(caught.value).startswith(f"{tmp_path / name}: ")
     assert message in str(caught.value)
 
@@ -105,7 +106,7 @@ def test_zip_in_place_of_a_model_is_not_unpacked(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "m.dae", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("m.dae", b" " * 10_000_000)
     with pytest.raises(ConfigError, match="is a zip archive"):
-        read_model(tmp_path / "m.dae", "auto", LIMITS)
+        read_parts(tmp_path / "m.dae", "auto", LIMITS)
 
 
 def test_buffer_that_links_to_itself_is_refused(tmp_path: Path) -> None:
@@ -114,19 +115,19 @@ def test_buffer_that_links_to_itself_is_refused(tmp_path: Path) -> None:
     (tmp_path / "m.gltf").write_text(json.dumps(glb.header), encoding="utf-8")
     (tmp_path / "loop.bin").symlink_to("loop.bin")
     with pytest.raises(ConfigError, match=r"buffer 0 names 'loop.bin', a path outside the folder"):
-        read_model(tmp_path / "m.gltf", "auto", LIMITS)
+        read_parts(tmp_path / "m.gltf", "auto", LIMITS)
 
 
 def test_texture_that_is_a_program_is_ignored(tmp_path: Path) -> None:
     (tmp_path / "t.png").write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\nshowpage\n")
-    model = read_model(textured_glb("t.png").write(tmp_path / "m.glb"), "auto", LIMITS)
+    model = read_parts(textured_glb("t.png").write(tmp_path / "m.glb"), "auto", LIMITS)
     assert len(model.parts) == 2
     assert "image 0 (t.png) cannot be read: it is not one of PNG, JPEG" in model.warnings[0]
 
 
 def test_name_that_is_no_text_is_ignored(tmp_path: Path) -> None:
     (tmp_path / "m.glb").write_bytes(changed_glb(lambda header: header["meshes"][0].update(name=7)))
-    model = read_model(tmp_path / "m.glb", "auto", LIMITS)
+    model = read_parts(tmp_path / "m.glb", "auto", LIMITS)
     assert {part.mesh_name for part in model.parts} == {"mesh0"}
     assert model.warnings[0] == "mesh 0 has a name that is no text; it is ignored"
 
@@ -136,10 +137,10 @@ def test_names_can_be_shown_and_written_anywhere(tmp_path: Path) -> None:
     (tmp_path / "m.glb").write_bytes(
         changed_glb(lambda header: [node.update(name=name) for node, name in zip(header["nodes"], names, strict=False)])
     )
-    names = [part.name for part in read_model(tmp_path / "m.glb", "auto", LIMITS).parts]
+    names = [part.name for part in read_parts(tmp_path / "m.glb", "auto", LIMITS).parts]
     assert names == ["\ufffd", "a\ufffd[31mb\ufffd"]
     write_obj(tmp_path / "m.obj", {"n" * 100_000: box(), "m": box(at=(2, 0, 0))})
-    assert len(read_model(tmp_path / "m.obj", "auto", LIMITS).parts[0].name) == 201
+    assert len(read_parts(tmp_path / "m.obj", "auto", LIMITS).parts[0].name) == 201
 
 
 def test_many_parts_of_one_name_take_no_longer_than_many_names(tmp_path: Path) -> None:
@@ -147,7 +148,7 @@ def test_many_parts_of_one_name_take_no_longer_than_many_names(tmp_path: Path) -
     mesh = glb.mesh(glb.primitive(box(), BOX_FACES), name="wall")
     for place in range(4000):
         glb.node(name="wall", mesh=mesh, translation=[2 * place, 0, 0])
-    model = parse_model(glb.write(tmp_path / "m.glb"), "auto", ReadLimits())
+    model = parse_parts(glb.write(tmp_path / "m.glb"), "auto", ReadLimits())
     assert [part.name for part in model.parts[:3]] == ["wall", "wall#2", "wall#3"]
     assert model.parts[-1].name == "wall#4000"
 
@@ -155,7 +156,7 @@ def test_many_parts_of_one_name_take_no_longer_than_many_names(tmp_path: Path) -
 def test_element_without_properties_takes_no_time(tmp_path: Path) -> None:
     header = "element void 1000000000000\nelement face 1\nproperty list uchar int vertex_indices\n"
     (tmp_path / "m.ply").write_bytes(ply(header, POINTS + "3 0 1 2\n"))
-    assert len(read_model(tmp_path / "m.ply", "objects", LIMITS).parts[0].faces) == 1
+    assert len(read_parts(tmp_path / "m.ply", "objects", LIMITS).parts[0].faces) == 1
 
 
 def test_odd_texture_coordinates_are_ignored(tmp_path: Path) -> None:
@@ -167,7 +168,7 @@ def test_odd_texture_coordinates_are_ignored(tmp_path: Path) -> None:
                 .replace("uchar red", "uchar rot")
             )
             path.write_text(text, encoding="utf-8")
-            (warning,) = read_model(path, "objects", LIMITS).warnings
+            (warning,) = read_parts(path, "objects", LIMITS).warnings
             assert warning.startswith("property texcoord of element face has no two numbers for each corner")
 
 
@@ -176,13 +177,13 @@ def test_newlines_before_a_solid_take_no_time(tmp_path: Path) -> None:
     (tmp_path / "m.stl").write_text(
         "\n" * 200_000 + f"solid a\nfacet normal 0 0 1\n{triangle}endfacet\nendsolid a\n", encoding="utf-8"
     )
-    assert len(read_model(tmp_path / "m.stl", "objects", ReadLimits(cpu_seconds=5)).parts[0].faces) == 1
+    assert len(read_parts(tmp_path / "m.stl", "objects", ReadLimits(cpu_seconds=5)).parts[0].faces) == 1
 
 
 def test_colour_of_two_numbers_is_a_warning(tmp_path: Path) -> None:
     (tmp_path / "m.mtl").write_text("newmtl a\nKd 1 0\n", encoding="utf-8")
     path = write_obj(tmp_path / "m.obj", {"a": box(), "b": box(at=(2, 0, 0))}, "mtllib m.mtl\nusemtl a")
-    assert read_model(path, "auto", LIMITS).warnings == (
+    assert read_parts(path, "auto", LIMITS).warnings == (
         "material colour 'Kd 1 0' is not red, green, blue; its faces are grey",
     )
 
@@ -197,12 +198,12 @@ def test_colour_of_two_numbers_is_a_warning(tmp_path: Path) -> None:
 def test_limits_are_those_of_the_config(tmp_path: Path, limits: dict[str, int], message: str) -> None:
     path = two_boxes().write(tmp_path / "m.glb")
     with pytest.raises(ConfigError, match=message):
-        read_model(path, "auto", ReadLimits(**limits))
+        read_parts(path, "auto", ReadLimits(**limits))
 
 
 def test_model_survives_the_way_out_of_its_process(tmp_path: Path) -> None:
     path = two_boxes().write(tmp_path / "m.glb")
-    here, there = parse_model(path, "auto", ReadLimits()), read_model(path)
+    here, there = parse_parts(path, "auto", ReadLimits()), read_parts(path)
     assert (here.segmentation, here.why, here.warnings, here.up) == (
         there.segmentation,
         there.why,
@@ -218,7 +219,7 @@ def test_model_survives_the_way_out_of_its_process(tmp_path: Path) -> None:
 
 
 def test_faces_beyond_the_vertices_are_refused(tmp_path: Path) -> None:
-    model = parse_model(two_boxes().write(tmp_path / "m.glb"), "auto", ReadLimits())
+    model = parse_parts(two_boxes().write(tmp_path / "m.glb"), "auto", ReadLimits())
     model.parts[0].faces[0, 0] = 8
     with pytest.raises(ValueError, match="a face has a vertex that does not exist"):
         unpack_model(model.path, pack_model(model))
@@ -226,7 +227,7 @@ def test_faces_beyond_the_vertices_are_refused(tmp_path: Path) -> None:
 
 def test_good_files_are_read_without_warnings(tmp_path: Path) -> None:
     for path in write_good(tmp_path):
-        model = read_model(path, "auto", LIMITS)
+        model = read_parts(path, "auto", LIMITS)
         assert len(model.parts) >= 2, path
         assert model.warnings == (), path
 
@@ -250,7 +251,7 @@ def test_files_with_known_faults_are_handled() -> None:
     for path in files:
         source: Segmentation = "objects" if path.suffix in (".obj", ".ply") else "nodes"
         if path.name in read:
-            assert read_model(path, source, LIMITS).parts
+            assert read_parts(path, source, LIMITS).parts
         else:
             with pytest.raises(ConfigError, match=re.escape(f"{path}: ")):
-                read_model(path, source, LIMITS)
+                read_parts(path, source, LIMITS)

@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 
 from pipeline.errors import ConfigError
 from stages.exemplars.model import Model, RawPart
-from stages.exemplars.read import parse_model, read_model
-from stages.exemplars.settings import ReadLimits
+from stages.exemplars.read import parse_parts, read_parts
+from stages.model_files.limits import ReadLimits
 from tests.stages.exemplars.model_files import (
     BOX_FACES,
     Glb,
@@ -69,7 +69,7 @@ def merged() -> Any:
 
 class TestFormats:
     def test_glb_gives_its_nodes(self, tmp_path: Path) -> None:
-        model = read_model(boxes_glb().write(tmp_path / "m.glb"))
+        model = read_parts(boxes_glb().write(tmp_path / "m.glb"))
         check_boxes(model)
         assert [part.name for part in model.parts] == list(BOXES)
         assert model.segmentation == "nodes"
@@ -80,7 +80,7 @@ class TestFormats:
         (tmp_path / "all parts.bin").write_bytes(glb.chunk)
         glb.header["buffers"] = [{"byteLength": len(glb.chunk), "uri": "all%20parts.bin"}]
         (tmp_path / "m.gltf").write_text(json.dumps(glb.header), encoding="utf-8")
-        check_boxes(read_model(tmp_path / "m.gltf"))
+        check_boxes(read_parts(tmp_path / "m.gltf"))
 
     def test_glb_that_trimesh_wrote_gives_its_nodes(self, tmp_path: Path) -> None:
         import trimesh
@@ -89,12 +89,12 @@ class TestFormats:
         for name, corners in BOXES.items():
             scene.add_geometry(trimesh.Trimesh(corners, BOX_FACES, process=False), node_name=name, geom_name=name)
         scene.export(tmp_path / "m.glb")
-        model = read_model(tmp_path / "m.glb")
+        model = read_parts(tmp_path / "m.glb")
         check_boxes(model)
         assert [part.name for part in model.parts] == list(BOXES)
 
     def test_obj_gives_its_objects(self, tmp_path: Path) -> None:
-        model = read_model(write_obj(tmp_path / "m.obj", BOXES))
+        model = read_parts(write_obj(tmp_path / "m.obj", BOXES))
         check_boxes(model)
         assert [part.name for part in model.parts] == list(BOXES)
         assert model.segmentation == "objects"
@@ -102,14 +102,14 @@ class TestFormats:
     @pytest.mark.parametrize("suffix", ["ply", "stl", "off"])
     def test_single_mesh_gives_its_components(self, tmp_path: Path, suffix: str) -> None:
         merged().export(tmp_path / f"m.{suffix}")
-        model = read_model(tmp_path / f"m.{suffix}")
+        model = read_parts(tmp_path / f"m.{suffix}")
         check_boxes(model)
         assert model.segmentation == "components"
         assert "3 connected components" in model.why
 
     def test_ascii_ply_gives_its_components(self, tmp_path: Path) -> None:
         (tmp_path / "m.ply").write_bytes(merged().export(file_type="ply", encoding="ascii"))
-        check_boxes(read_model(tmp_path / "m.ply"))
+        check_boxes(read_parts(tmp_path / "m.ply"))
 
     def test_ascii_stl_gives_its_solids(self, tmp_path: Path) -> None:
         import trimesh
@@ -119,7 +119,7 @@ class TestFormats:
         ]
         named = [text.replace("solid", f"solid {name}", 1) for name, text in zip(BOXES, solids, strict=True)]
         (tmp_path / "m.stl").write_text("\n".join(named), encoding="utf-8")
-        model = read_model(tmp_path / "m.stl")
+        model = read_parts(tmp_path / "m.stl")
         check_boxes(model)
         assert [part.name for part in model.parts] == list(BOXES)
 
@@ -129,7 +129,7 @@ class TestFormats:
 
         meshes = [trimesh.Trimesh(box, BOX_FACES, process=False) for box in BOXES.values()]
         (tmp_path / "m.dae").write_bytes(export_collada(meshes))
-        model = read_model(tmp_path / "m.dae")
+        model = read_parts(tmp_path / "m.dae")
         check_boxes(model)
         assert model.segmentation == "nodes"
         assert [part.name for part in model.parts] == ["node0", "node1", "node2"]
@@ -144,7 +144,7 @@ class TestNodes:
         glb.node(name="empty", translation=[9, 9, 9])
         glb.node(name="trunk", mesh=cube, children=[twig], translation=[10, 0, 0])
         glb.node(name="last", mesh=cube)
-        model = read_model(glb.write(tmp_path / "m.glb"))
+        model = read_parts(glb.write(tmp_path / "m.glb"))
         assert [part.name for part in model.parts] == ["trunk", "leaf", "last"]
         # a quarter turn about y takes z to x
         turn = np.array([[0, 0, 1, 15], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
@@ -160,7 +160,7 @@ class TestNodes:
             glb.node(name=name, mesh=cube)
         glb.node(mesh=cube)
         glb.node(mesh=nameless)
-        model = read_model(glb.write(tmp_path / "m.glb"))
+        model = read_parts(glb.write(tmp_path / "m.glb"))
         assert [part.name for part in model.parts] == ["wall", "wall#2", "wall.001", "beam_12", "cube", "node5"]
         assert [part.label for part in model.parts] == ["cube", "cube", "wall", "beam", "cube", None]
 
@@ -172,7 +172,7 @@ class TestNodes:
         )
         glb.node(name="a", mesh=cube)
         glb.node(name="b", mesh=cube)
-        model = read_model(glb.write(tmp_path / "m.glb"))
+        model = read_parts(glb.write(tmp_path / "m.glb"))
         assert [part.name for part in model.parts] == ["a", "b"]
         part = model.parts[0]
         np.testing.assert_allclose(
@@ -188,7 +188,7 @@ class TestNodes:
             matrix[:2, :2] = 0.75 * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
             matrix[2, 2] = 0.75
             glb.node(mesh=cube, matrix=matrix.T.ravel().tolist())
-        model = read_model(glb.write(tmp_path / "m.glb"))
+        model = read_parts(glb.write(tmp_path / "m.glb"))
         assert {part.mesh_name for part in model.parts} == {"cube@0.75"}
         assert all(part.vertices is model.parts[0].vertices for part in model.parts)
         np.testing.assert_allclose(np.ptp(model.parts[0].vertices, axis=0), [0.75] * 3)
@@ -201,7 +201,7 @@ class TestNodes:
         glb.node(name="plain", mesh=mesh)
         glb.node(name="x", mesh=mesh, scale=[-1, 1, 1])
         glb.node(name="y", mesh=mesh, scale=[1, -1, 1], translation=[5, 0, 0])
-        model = read_model(glb.write(tmp_path / "m.glb"))
+        model = read_parts(glb.write(tmp_path / "m.glb"))
         assert [part.mesh_name for part in model.parts] == ["wedge", "wedge@mirror", "wedge@mirror"]
         assert model.parts[1].vertices is model.parts[2].vertices
         for part, mirror in zip(model.parts, ([1, 1, 1], [-1, 1, 1], [1, -1, 1]), strict=True):
@@ -222,7 +222,7 @@ class TestNodes:
             return
         glb = Glb()
         glb.node(mesh=glb.mesh(glb.primitive(box((1, 2, 3)), BOX_FACES)), matrix=matrix.T.ravel().tolist())
-        part = parse_model(glb.write(tmp_path / "m.glb"), "nodes", ReadLimits()).parts[0]
+        part = parse_parts(glb.write(tmp_path / "m.glb"), "nodes", ReadLimits()).parts[0]
         rotation = part.pose[:3, :3]
         np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)
         assert np.linalg.det(rotation) > 0
@@ -240,7 +240,7 @@ class TestNodes:
         glb.node(name="dotted", mesh=glb.mesh(cube, {**dots, "mode": 1}, name="dotted"))
         glb.node(name="moving", mesh=glb.mesh({**cube, "targets": [{}]}, name="moving"), skin=0)
         glb.node(name="flat", mesh=glb.mesh(cube), scale=[1, 0, 1])
-        model = read_model(glb.write(tmp_path / "m.glb"))
+        model = read_parts(glb.write(tmp_path / "m.glb"))
         assert [part.name for part in model.parts] == ["dotted", "moving"]
         text = " | ".join(model.warnings)
         for word in ("points", "lines", "'dots' has no triangles", "morph", "skin", "'flat' is scaled to nothing"):
@@ -251,7 +251,7 @@ class TestNodes:
         glb = Glb()
         square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype="<f4")[order]
         glb.node(mesh=glb.mesh({"attributes": {"POSITION": glb.accessor(square)}, "mode": mode}))
-        part = read_model(glb.write(tmp_path / "m.glb"), "nodes").parts[0]
+        part = read_parts(glb.write(tmp_path / "m.glb"), "nodes").parts[0]
         corners = part.vertices[part.faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         np.testing.assert_allclose(normals, [[0, 0, 1], [0, 0, 1]])
@@ -269,7 +269,7 @@ class TestNodes:
         glb.node(name="sparse", mesh=glb.mesh(primitive))
         quantised = glb.accessor(np.rint(box() * 32767).astype("<i2"), normalized=True)
         glb.node(name="quantised", mesh=glb.mesh({**primitive, "attributes": {"POSITION": quantised}}), scale=[4, 4, 4])
-        model = read_model(glb.write(tmp_path / "m.glb"))
+        model = read_parts(glb.write(tmp_path / "m.glb"))
         start[6] = (1, 1, 2)
         for part, expected in zip(model.parts, (start, box((4, 4, 4))), strict=True):
             np.testing.assert_allclose(
@@ -283,7 +283,7 @@ class TestColors:
         material = glb.material((1, 0.21586, 0))
         glb.node(mesh=glb.mesh(glb.primitive(box(), BOX_FACES, material=material)))
         glb.node(mesh=glb.mesh(glb.primitive(box(), BOX_FACES)))
-        colored, plain = read_model(glb.write(tmp_path / "m.glb")).parts
+        colored, plain = read_parts(glb.write(tmp_path / "m.glb")).parts
         assert (colored.face_colors == [255, 128, 0]).all()
         assert len(np.unique(plain.face_colors)) == 1
 
@@ -305,7 +305,7 @@ class TestColors:
         position = glb.accessor(np.concatenate([corners + np.array([0, 0, k]) for k in range(4)]).astype("<f4"))
         coordinates = glb.accessor(np.concatenate([uv + shift for shift in shifts]).astype("<f4"))
         glb.node(mesh=glb.mesh({"attributes": {"POSITION": position, "TEXCOORD_0": coordinates}, "material": 0}))
-        part = read_model(glb.write(tmp_path / "m.glb"), "nodes").parts[0]
+        part = read_parts(glb.write(tmp_path / "m.glb"), "nodes").parts[0]
         assert part.face_colors.tolist() == [[200, 0, 0], [0, 200, 0], [0, 0, 200], [90, 90, 90]]
 
     def test_texture_that_is_no_image_is_a_warning(self, tmp_path: Path) -> None:
@@ -318,7 +318,7 @@ class TestColors:
             primitive = glb.primitive(box(), BOX_FACES, material=index)
             primitive["attributes"]["TEXCOORD_0"] = uv
             glb.node(mesh=glb.mesh(primitive))
-        model = read_model(glb.write(tmp_path / "m.glb"))
+        model = read_parts(glb.write(tmp_path / "m.glb"))
         assert len(model.parts) == 2
         assert "gone.png" in model.warnings[0]
         assert "embedded" in model.warnings[1]
@@ -346,7 +346,7 @@ end_header
             body += bytes([size]) + np.array(rest[:size], dtype="<i4").tobytes() + bytes(rest[size:])
         (tmp_path / "binary.ply").write_bytes(head.format("binary_little_endian").encode() + body)
         for name in ("text.ply", "binary.ply"):
-            part = read_model(tmp_path / name, "objects").parts[0]
+            part = read_parts(tmp_path / name, "objects").parts[0]
             assert part.face_colors.tolist() == [[0, 0, 255], [0, 255, 0], [0, 255, 0], [9, 9, 9]]
 
     def test_off_carries_face_and_vertex_colours(self, tmp_path: Path) -> None:
@@ -357,8 +357,8 @@ end_header
         (tmp_path / "v.off").write_text(
             "COFF\n4 2 0\n" + points.format(" 10 20 30 255", " 7 7 7 255") + "3 0 1 2\n3 0 1 3\n", encoding="utf-8"
         )
-        assert read_model(tmp_path / "f.off", "objects").parts[0].face_colors.tolist() == [[255, 0, 0], [0, 128, 255]]
-        assert read_model(tmp_path / "v.off", "objects").parts[0].face_colors.tolist() == [[10, 20, 30], [10, 20, 30]]
+        assert read_parts(tmp_path / "f.off", "objects").parts[0].face_colors.tolist() == [[255, 0, 0], [0, 128, 255]]
+        assert read_parts(tmp_path / "v.off", "objects").parts[0].face_colors.tolist() == [[10, 20, 30], [10, 20, 30]]
 
     @pytest.mark.parametrize(
         ("said", "up", "corner"), [("Y_UP", "y", (1, 2, 3)), ("Z_UP", "z", (1, 2, 3)), ("X_UP", "y", (-2, 1, 3))]
@@ -377,7 +377,7 @@ end_header
         (tmp_path / "m.dae").write_text(
             f"{head}<asset>{re.sub('<up_axis>.*</up_axis>', units, tail, count=1)}", encoding="utf-8"
         )
-        model = read_model(tmp_path / "m.dae")
+        model = read_parts(tmp_path / "m.dae")
         (part,) = model.parts
         world = part.vertices @ part.pose[:3, :3].T + part.pose[:3, 3]
         assert model.up == up
@@ -391,7 +391,7 @@ end_header
         mesh = trimesh.Trimesh(box(), BOX_FACES, process=False)
         mesh.visual.face_colors = [255, 51, 0, 255]
         (tmp_path / "m.dae").write_bytes(export_collada(mesh))
-        assert (read_model(tmp_path / "m.dae", "nodes").parts[0].face_colors == [255, 51, 0]).all()
+        assert (read_parts(tmp_path / "m.dae", "nodes").parts[0].face_colors == [255, 51, 0]).all()
 
 
 class TestWavefront:
@@ -415,7 +415,7 @@ f 1 2 \\
  3
 """
         (tmp_path / "m.obj").write_text(lines, encoding="utf-8")
-        model = read_model(tmp_path / "m.obj", "objects")
+        model = read_parts(tmp_path / "m.obj", "objects")
         assert model.parts[0].face_colors[:2].tolist() == [[255, 0, 0], [1, 2, 3]]
         assert len(model.parts[0].faces) == 3
         assert "'unknown'" in model.warnings[0]
@@ -424,29 +424,29 @@ f 1 2 \\
     def test_text_in_another_encoding_is_read(self, tmp_path: Path, encoding: str) -> None:
         path = write_obj(tmp_path / "m.obj", BOXES)
         path.write_text(path.read_text(encoding="utf-8"), encoding=encoding)
-        assert [part.name for part in read_model(path).parts] == list(BOXES)
+        assert [part.name for part in read_parts(path).parts] == list(BOXES)
 
     def test_two_libraries_on_one_line_are_both_read(self, tmp_path: Path) -> None:
         (tmp_path / "a.mtl").write_text("newmtl a\nKd 1 0 0\n", encoding="utf-8")
         (tmp_path / "b.mtl").write_text("newmtl b\nKd 0 1 0\n", encoding="utf-8")
         write_obj(tmp_path / "m.obj", BOXES, "mtllib a.mtl b.mtl", {"base": "usemtl b", "tower": "usemtl a"})
-        colors = [part.face_colors[0].tolist() for part in read_model(tmp_path / "m.obj").parts]
+        colors = [part.face_colors[0].tolist() for part in read_parts(tmp_path / "m.obj").parts]
         assert colors == [[0, 255, 0], [255, 0, 0], [255, 0, 0]]
 
     def test_missing_library_is_a_warning(self, tmp_path: Path) -> None:
-        model = read_model(write_obj(tmp_path / "m.obj", BOXES, "mtllib gone.mtl"))
+        model = read_parts(write_obj(tmp_path / "m.obj", BOXES, "mtllib gone.mtl"))
         check_boxes(model)
         assert "gone.mtl" in model.warnings[0]
 
     def test_groups_are_the_objects_where_there_is_but_one_object(self, tmp_path: Path) -> None:
         path = write_obj(tmp_path / "m.obj", BOXES)
         path.write_text("o everything\n" + path.read_text(encoding="utf-8").replace("\no ", "\ng "), encoding="utf-8")
-        assert [part.name for part in read_model(path).parts] == list(BOXES)
+        assert [part.name for part in read_parts(path).parts] == list(BOXES)
 
     def test_object_that_is_taken_up_again_is_one_part(self, tmp_path: Path) -> None:
         path = write_obj(tmp_path / "m.obj", BOXES)
         path.write_text(path.read_text(encoding="utf-8") + "o base\nf 1 2 3\n", encoding="utf-8")
-        model = read_model(path)
+        model = read_parts(path)
         assert [part.name for part in model.parts] == list(BOXES)
         assert len(model.parts[0].faces) == 13
 
@@ -457,7 +457,7 @@ f 1 2 \\
         lines = [f"v {x} {y} {z}" for x, y, z in points]
         lines += ["f " + " ".join(str(k + 1) for k in range(12)), "f 13 14 15 16"]
         (tmp_path / "m.obj").write_text("\n".join(lines), encoding="utf-8")
-        part = read_model(tmp_path / "m.obj", "objects").parts[0]
+        part = read_parts(tmp_path / "m.obj", "objects").parts[0]
         corners = part.vertices[part.faces]
         areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 1] / 2
         assert len(areas) == 12
@@ -470,7 +470,7 @@ f 1 2 \\
         count = len(path.read_text(encoding="utf-8").splitlines())
         path.write_text(path.read_text(encoding="utf-8") + line + "\n", encoding="utf-8")
         with pytest.raises(ConfigError, match=f"m.obj, line {count + 1}: '{line}'"):
-            read_model(path)
+            read_parts(path)
 
 
 class TestDae:
@@ -493,7 +493,7 @@ class TestDae:
 
     def test_instances_share_a_mesh_and_nodes_nest(self, tmp_path: Path) -> None:
         (tmp_path / "m.dae").write_text(self.DOCUMENT.replace("IMAGE", "a.png"), encoding="utf-8")
-        model = read_model(tmp_path / "m.dae")
+        model = read_parts(tmp_path / "m.dae")
         assert [part.name for part in model.parts] == ["Tile.001", "Tile.002", "Tile.003"]
         assert [part.label for part in model.parts] == ["Tile"] * 3
         assert [part.mesh_name for part in model.parts] == ["tile", "tile@2", "tile"]
@@ -504,7 +504,7 @@ class TestDae:
         text = self.DOCUMENT.replace("?>", '?><!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]>', 1)
         (tmp_path / "m.dae").write_text(text.replace("IMAGE", "a.png"), encoding="utf-8")
         with pytest.raises(ConfigError, match="entities"):
-            read_model(tmp_path / "m.dae")
+            read_parts(tmp_path / "m.dae")
 
 
 class TestBadFiles:
@@ -513,7 +513,7 @@ class TestBadFiles:
         for length in [1, 3, 11, 13, 19, 21, *range(30, len(content), 97), len(content) - 1]:
             (tmp_path / "m.glb").write_bytes(content[:length])
             with pytest.raises(ConfigError, match=r"m.glb: (truncated|not a glTF)"):
-                read_model(tmp_path / "m.glb")
+                read_parts(tmp_path / "m.glb")
 
     @pytest.mark.parametrize("suffix", ["ply", "stl", "off", "dae"])
     def test_other_formats_that_are_cut_off_are_refused(self, tmp_path: Path, suffix: str) -> None:
@@ -522,13 +522,13 @@ class TestBadFiles:
         for length in range(1, len(content) - 60, len(content) // 23):
             (tmp_path / f"m.{suffix}").write_bytes(content[:length])
             with pytest.raises(ConfigError, match=f"m.{suffix}: (not a whole|holds no triangles)"):
-                read_model(tmp_path / f"m.{suffix}")
+                read_parts(tmp_path / f"m.{suffix}")
 
     def test_cut_off_ascii_stl_is_refused(self, tmp_path: Path) -> None:
         text = merged().export(file_type="stl_ascii")
         (tmp_path / "m.stl").write_text(text[: len(text) // 2], encoding="utf-8")
         with pytest.raises(ConfigError, match="does not end"):
-            read_model(tmp_path / "m.stl")
+            read_parts(tmp_path / "m.stl")
 
     @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
     @given(st.lists(st.tuples(st.integers(0, 10_000), st.integers(0, 255)), min_size=1, max_size=6))
@@ -541,7 +541,7 @@ class TestBadFiles:
         (tmp_path / "m.glb").write_bytes(bytes(content))
         parts: tuple[RawPart, ...] = ()
         with contextlib.suppress(ConfigError):
-            parts = parse_model(tmp_path / "m.glb", "nodes", ReadLimits()).parts
+            parts = parse_parts(tmp_path / "m.glb", "nodes", ReadLimits()).parts
         assert all(np.isfinite(part.vertices).all() for part in parts)
 
     def test_external_buffer_that_is_too_short_is_refused(self, tmp_path: Path) -> None:
@@ -550,10 +550,10 @@ class TestBadFiles:
         glb.header["buffers"] = [{"byteLength": len(glb.chunk), "uri": "m.bin"}]
         (tmp_path / "m.gltf").write_text(json.dumps(glb.header), encoding="utf-8")
         with pytest.raises(ConfigError, match="cut off"):
-            read_model(tmp_path / "m.gltf")
+            read_parts(tmp_path / "m.gltf")
         (tmp_path / "m.bin").unlink()
         with pytest.raises(ConfigError, match=r"'m.bin', which is missing"):
-            read_model(tmp_path / "m.gltf")
+            read_parts(tmp_path / "m.gltf")
 
     def test_mesh_without_triangles_is_refused(self, tmp_path: Path) -> None:
         glb = Glb()
@@ -564,12 +564,12 @@ class TestBadFiles:
         (tmp_path / "m.stl").write_bytes(b"\0" * 84)
         for suffix in ("glb", "obj", "off", "stl"):
             with pytest.raises(ConfigError, match=f"m.{suffix}: holds no triangles"):
-                read_model(tmp_path / f"m.{suffix}")
+                read_parts(tmp_path / f"m.{suffix}")
 
     def test_one_empty_part_is_left_out_with_a_warning(self, tmp_path: Path) -> None:
         glb = boxes_glb()
         glb.node(name="nothing", mesh=glb.mesh(glb.primitive(box(), np.empty((0, 3)))))
-        model = read_model(glb.write(tmp_path / "m.glb"))
+        model = read_parts(glb.write(tmp_path / "m.glb"))
         check_boxes(model)
         assert model.warnings == ("part 'nothing' has no triangles and is left out",)
 
@@ -580,20 +580,20 @@ class TestBadFiles:
         broken[3, 1] = number
         glb.node(name="broken", mesh=glb.mesh(glb.primitive(broken, BOX_FACES)))
         with pytest.raises(ConfigError, match="part 'broken' has 1 vertices that are not finite"):
-            read_model(glb.write(tmp_path / "m.glb"))
+            read_parts(glb.write(tmp_path / "m.glb"))
         with pytest.raises(ConfigError, match="part 'bad' has 1 vertices that are not finite"):
-            read_model(write_obj(tmp_path / "m.obj", {**BOXES, "bad": broken}))
+            read_parts(write_obj(tmp_path / "m.obj", {**BOXES, "bad": broken}))
 
     def test_vertex_that_no_face_uses_may_be_anything(self, tmp_path: Path) -> None:
         glb = Glb()
         glb.node(mesh=glb.mesh(glb.primitive(np.vstack([box(), [[np.nan] * 3]]), BOX_FACES)))
-        assert np.isfinite(read_model(glb.write(tmp_path / "m.glb"), "nodes").parts[0].vertices).all()
+        assert np.isfinite(read_parts(glb.write(tmp_path / "m.glb"), "nodes").parts[0].vertices).all()
 
     def test_face_on_a_missing_vertex_is_refused(self, tmp_path: Path) -> None:
         glb = Glb()
         glb.node(mesh=glb.mesh(glb.primitive(box(), BOX_FACES + 5), name="cube"))
         with pytest.raises(ConfigError, match=r"'cube'.*vertex 12 of 8"):
-            read_model(glb.write(tmp_path / "m.glb"))
+            read_parts(glb.write(tmp_path / "m.glb"))
 
     @pytest.mark.parametrize(
         ("extension", "element"),
@@ -619,14 +619,14 @@ class TestBadFiles:
             glb.header["nodes"][0]["extensions"] = {extension: {}}
         word = {"primitive": "Draco", "view": "meshopt", "node": extension}[element]
         with pytest.raises(ConfigError, match=f"{word}.* export it again with"):
-            read_model(glb.write(tmp_path / "m.glb"))
+            read_parts(glb.write(tmp_path / "m.glb"))
 
     def test_nodes_in_a_ring_are_refused(self, tmp_path: Path) -> None:
         glb = boxes_glb()
         glb.header["nodes"][0]["children"] = [1]
         glb.header["nodes"][1]["children"] = [0]
         with pytest.raises(ConfigError, match="two parents"):
-            read_model(glb.write(tmp_path / "m.glb"))
+            read_parts(glb.write(tmp_path / "m.glb"))
 
     def test_what_is_no_model_file_is_refused_with_the_nearest_right_thing(self, tmp_path: Path) -> None:
         boxes_glb().write(tmp_path / "castle.glb")
@@ -642,14 +642,14 @@ class TestBadFiles:
             "castle": "Shapemill reads .glb, .gltf, .obj",
         }.items():
             with pytest.raises(ConfigError, match=message):
-                read_model(tmp_path / name)
+                read_parts(tmp_path / name)
 
     @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
     def test_file_without_permission_is_refused(self, tmp_path: Path) -> None:
         path = boxes_glb().write(tmp_path / "m.glb")
         path.chmod(0)
         with pytest.raises(ConfigError, match="permission"):
-            read_model(path)
+            read_parts(path)
 
 
 class TestSize:
@@ -661,7 +661,7 @@ class TestSize:
         scaled.header["scenes"] = [{"nodes": [3]}]
         scaled.node(root=False, children=[0, 1, 2], scale=[scale] * 3)
         with pytest.raises(ConfigError, match="scale it in the modelling tool") as caught:
-            read_model(scaled.write(tmp_path / "scaled.glb"))
+            read_parts(scaled.write(tmp_path / "scaled.glb"))
         assert said in str(caught.value)
         assert "scaled.glb: the model is" in str(caught.value)
 
@@ -670,8 +670,8 @@ class TestSize:
         scaled = boxes_glb()
         scaled.header["scenes"] = [{"nodes": [3]}]
         scaled.node(root=False, children=[0, 1, 2], scale=[scale] * 3)
-        plain = read_model(boxes_glb().write(tmp_path / "plain.glb"))
-        for one, other in zip(plain.parts, read_model(scaled.write(tmp_path / "s.glb")).parts, strict=True):
+        plain = read_parts(boxes_glb().write(tmp_path / "plain.glb"))
+        for one, other in zip(plain.parts, read_parts(scaled.write(tmp_path / "s.glb")).parts, strict=True):
             np.testing.assert_allclose(other.vertices, scale * one.vertices, rtol=1e-5, atol=1e-5 * scale)
             np.testing.assert_allclose(other.pose[:3, :3], one.pose[:3, :3], atol=1e-9)
 
@@ -683,8 +683,8 @@ class TestFarFromTheOrigin:
         away = boxes_glb()
         away.header["scenes"] = [{"nodes": [3]}]
         away.node(root=False, children=[0, 1, 2], translation=[1_000_000, -2_000_000, 500_000])
-        home = read_model(at_home.write(tmp_path / "home.glb"))
-        far = read_model(away.write(tmp_path / "far.glb"))
+        home = read_parts(at_home.write(tmp_path / "home.glb"))
+        far = read_parts(away.write(tmp_path / "far.glb"))
         assert home.warnings == ()
         assert "2.291e+06 units from the origin" in far.warnings[0]
         for one, other in zip(home.parts, far.parts, strict=True):
@@ -697,7 +697,7 @@ class TestFarFromTheOrigin:
         shift = np.array([1_000_000, 0, -4_000_000])
         write_obj(tmp_path / "far.obj", {name: corners + shift for name, corners in BOXES.items()})
         write_obj(tmp_path / "home.obj", BOXES)
-        home, far = read_model(tmp_path / "home.obj"), read_model(tmp_path / "far.obj")
+        home, far = read_parts(tmp_path / "home.obj"), read_parts(tmp_path / "far.obj")
         assert "contacts may be lost" in far.warnings[0]
         for one, other in zip(home.parts, far.parts, strict=True):
             np.testing.assert_array_equal(one.vertices, other.vertices)
@@ -794,9 +794,9 @@ class TestEnclosure:
         with opened_files() as opened:
             if writer is gltf_buffer:
                 with pytest.raises(ConfigError, match="a path outside the folder"):
-                    parse_model(path, "auto", ReadLimits())
+                    parse_parts(path, "auto", ReadLimits())
             else:  # it costs the colours and not the model
-                (warning,) = parse_model(path, "auto", ReadLimits()).warnings
+                (warning,) = parse_parts(path, "auto", ReadLimits()).warnings
                 assert "outside the folder" in warning
         assert str(path) in opened
         assert [
@@ -806,15 +806,15 @@ class TestEnclosure:
     def test_files_in_folders_below_are_read(self, tmp_path: Path) -> None:
         (tmp_path / "maps" / "deep").mkdir(parents=True)
         (tmp_path / "maps" / "deep" / "b.bin").write_bytes(boxes_glb().chunk)
-        check_boxes(read_model(gltf_buffer(tmp_path, "maps/./deep/../deep/b.bin")))
+        check_boxes(read_parts(gltf_buffer(tmp_path, "maps/./deep/../deep/b.bin")))
 
     def test_data_uri_needs_no_file(self, tmp_path: Path) -> None:
         import base64
 
         text = base64.b64encode(boxes_glb().chunk).decode()
-        check_boxes(read_model(gltf_buffer(tmp_path, f"data:application/octet-stream;base64,{text}")))
+        check_boxes(read_parts(gltf_buffer(tmp_path, f"data:application/octet-stream;base64,{text}")))
         with pytest.raises(ConfigError, match="not valid base64"):
-            read_model(gltf_buffer(tmp_path, "data:application/octet-stream;base64,###"))
+            read_parts(gltf_buffer(tmp_path, "data:application/octet-stream;base64,###"))
 
 
 @pytest.mark.skipif(not EXEMPLARS.is_dir(), reason="the real exemplars are not here")
@@ -823,7 +823,7 @@ def test_real_exemplars_have_the_parts_of_their_lists_in_order() -> None:
     assert len(folders) >= 29
     for folder in folders:
         described = json.loads((folder / "exemplar.json").read_text(encoding="utf-8"))
-        model = read_model(folder / "model.glb", "nodes")
+        model = read_parts(folder / "model.glb", "nodes")
         if "part_list" in described:
             assert [part.name for part in model.parts] == [part["node"] for part in described["part_list"]], folder.name
             assert [part.label for part in model.parts] == [part["type"] for part in described["part_list"]], (

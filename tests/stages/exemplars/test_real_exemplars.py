@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from stages.exemplars.build import build_kit
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig
 from stages.shape.kit import ContactKind, Kit
 
@@ -37,7 +37,7 @@ def build(folder: Path, mirrored: bool = False, kinds: tuple[ContactKind, ...] =
     path = folder / "model.glb"
     contact = ContactConfig(tolerance=TOLERANCES.get(folder.name[:3], 1e-3), kinds=kinds)
     config = KitConfig(name="real", shapes=(path,), contact=contact, mirror_images_match=mirrored).resolve(STRICTEST)
-    return build_kit(config, [read_model(path)])[0]
+    return build_kit(config, [read_parts(path)])[0]
 
 
 def measured(folder: Path) -> dict[str, Any]:
@@ -100,7 +100,7 @@ def test_printed_tile_of_the_temple_is_the_plain_one_in_other_triangles() -> Non
         for part, index in zip(measured(folder)["part_list"], kit.exemplars[0].assembly.types, strict=True)
     }
     assert types["4162"] == types["4162p0x"]
-    parts = {part.mesh_name: part for part in read_model(folder / "model.glb").parts}
+    parts = {part.mesh_name: part for part in read_parts(folder / "model.glb").parts}
     plain, printed = parts["4162"], parts["4162p0x"]
     np.testing.assert_allclose(np.ptp(plain.vertices, axis=0), np.ptp(printed.vertices, axis=0), atol=1e-5)
     assert len(plain.faces) != len(printed.faces)

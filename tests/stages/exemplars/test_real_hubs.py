@@ -10,7 +10,7 @@ import pytest
 from pipeline.config import Config, load_config
 from pipeline.registry import find_stages
 from stages.exemplars.build import build_kit
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.contact_oracle import ContactOracle
@@ -42,7 +42,7 @@ def test_every_config_that_comes_with_the_project_is_valid(path: Path, monkeypat
 
 
 def kit_of(config: KitConfig) -> Kit:
-    return build_kit(config, [read_model(shape.path, config.parts) for shape in config.shapes])[0]
+    return build_kit(config, [read_parts(shape.path, config.parts) for shape in config.shapes])[0]
 
 
 @needs_models

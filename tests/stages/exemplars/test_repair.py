@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.repair import repair_mesh
 from tests.stages.exemplars.model_files import BOX_FACES, box, signed_volume
 
@@ -201,7 +201,7 @@ def test_repair_twice_is_repair_once() -> None:
 @pytest.mark.skipif(not EXEMPLARS.is_dir(), reason="the real exemplars are not here")
 def test_real_exemplars_keep_their_surfaces() -> None:
     for path in sorted(EXEMPLARS.glob("*/model.glb")):
-        parts = {part.mesh_name: part for part in read_model(path, "nodes").parts}
+        parts = {part.mesh_name: part for part in read_parts(path, "nodes").parts}
         for name, part in parts.items():
             vertices, faces, colors, _ = repair_mesh(part.vertices, part.faces, part.face_colors)
             diagonal = np.linalg.norm(np.ptp(part.vertices, axis=0))

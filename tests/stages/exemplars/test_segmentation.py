@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.scene import ModelScene, Placement, Surface
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.segmentation import count_parts, pick_segmentation, segment_scene
+from stages.model_files.scene import ModelScene, Placement, Surface
 from stages.shape.geometry.connected_faces import connected_faces
 from tests.stages.exemplars.model_files import BOX_FACES, Glb, box, signed_volume, write_obj
 
@@ -43,7 +43,7 @@ class TestAuto:
         two = glb.mesh(glb.primitive(box(), BOX_FACES, material=red), glb.primitive(box(), BOX_FACES, material=blue))
         glb.node(name="a", mesh=two)
         glb.node(name="b", mesh=two, translation=[3, 0, 0])
-        model = read_model(glb.write(tmp_path / "m.glb"))
+        model = read_parts(glb.write(tmp_path / "m.glb"))
         assert (model.segmentation, len(model.parts)) == ("nodes", 2)
         assert model.why == "2 scene nodes"
 
@@ -53,7 +53,7 @@ class TestAuto:
         walls, faces = boxes([box(), box(at=(5, 0, 0))])
         top = glb.primitive(box(at=(0, 1, 0)), BOX_FACES, material=roof)
         glb.node(mesh=glb.mesh(glb.primitive(walls, faces, material=brick), top, name="house"))
-        model = read_model(glb.write(tmp_path / "m.glb"))
+        model = read_parts(glb.write(tmp_path / "m.glb"))
         assert model.segmentation == "materials"
         assert [part.name for part in model.parts] == ["brick", "brick#2", "roof"]
         assert [part.label for part in model.parts] == ["brick", "brick", "roof"]
@@ -64,7 +64,7 @@ class TestAuto:
         glb = Glb()
         vertices, faces = boxes([box(), box(at=(5, 0, 0))])
         glb.node(mesh=glb.mesh(glb.primitive(vertices, faces, material=glb.material((1, 0, 0), "brick"))))
-        model = read_model(glb.write(tmp_path / "m.glb"))
+        model = read_parts(glb.write(tmp_path / "m.glb"))
         assert model.segmentation == "components"
         assert [part.name for part in model.parts] == ["component-000", "component-001"]
 
@@ -82,7 +82,7 @@ class TestAuto:
         assert "70 colours, which are shading" in why
 
     def test_one_solid_is_one_part_and_says_so(self, tmp_path: Path) -> None:
-        model = read_model(write_obj(tmp_path / "m.obj", {"only": box()}))
+        model = read_parts(write_obj(tmp_path / "m.obj", {"only": box()}))
         assert (model.segmentation, len(model.parts)) == ("objects", 1)
         assert "nothing tells parts apart" in model.why
 
@@ -91,9 +91,9 @@ class TestSources:
     def test_source_that_the_model_lacks_is_refused_with_those_it_has(self, tmp_path: Path) -> None:
         path = write_obj(tmp_path / "m.obj", {"a": box(), "b": box(at=(2, 0, 0))})
         with pytest.raises(ConfigError, match=r"has no colors.* objects \(2\), components \(2\)"):
-            read_model(path, "colors")
+            read_parts(path, "colors")
         with pytest.raises(ConfigError, match="has no nodes"):
-            read_model(path, "nodes")
+            read_parts(path, "nodes")
 
     def test_pieces_of_instances_stay_shared(self, tmp_path: Path) -> None:
         glb = Glb()
@@ -101,7 +101,7 @@ class TestSources:
         mesh = glb.mesh(glb.primitive(vertices, faces), name="pair")
         glb.node(name="left", mesh=mesh)
         glb.node(name="right", mesh=mesh, translation=[0, 9, 0])
-        parts = read_model(glb.write(tmp_path / "m.glb"), "components").parts
+        parts = read_parts(glb.write(tmp_path / "m.glb"), "components").parts
         assert [part.name for part in parts] == [
             f"{node}/component-{k:03d}" for node in ("left", "right") for k in range(2)
         ]
@@ -116,7 +116,7 @@ class TestSources:
         ]
         lines += [f"f {a} {b} {c}" for a, b, c in faces + 1]
         (tmp_path / "m.obj").write_text("\n".join(lines), encoding="utf-8")
-        model = read_model(tmp_path / "m.obj")
+        model = read_parts(tmp_path / "m.obj")
         assert model.segmentation == "colors"
         assert [part.name for part in model.parts] == ["#ff0000", "#0000ff"]
         assert (model.parts[1].face_colors == BLUE).all()
@@ -150,7 +150,7 @@ class TestComponents:
 
         vertices, faces = boxes(grid(2))
         trimesh.Trimesh(vertices, faces, process=False).export(tmp_path / "m.stl")
-        model = read_model(tmp_path / "m.stl")
+        model = read_parts(tmp_path / "m.stl")
         assert len(model.parts) == 8
         assert [signed_volume(part.vertices, part.faces) for part in model.parts] == pytest.approx([1.0] * 8)
 

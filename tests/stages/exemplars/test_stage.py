@@ -17,7 +17,7 @@ from pipeline.run import run_stage
 from pipeline.status import status_lines
 from stages.autoconfig.stage import STAGE as AUTOCONFIG
 from stages.exemplars.build import build_kit
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import ExemplarsConfig
 from stages.exemplars.stage import STAGE
 from stages.shape.kit_files import kit_json, load_kit
@@ -80,7 +80,7 @@ def test_files_hold_the_kit_of_its_shapes(made: tuple[Path, Config]) -> None:
     folder, config = made
     root = folder / "out" / ".work" / "toy" / "exemplars"
     settings = config.section(ExemplarsConfig).kits[0]
-    kit, _ = build_kit(settings, [read_model(shape.path) for shape in settings.shapes])
+    kit, _ = build_kit(settings, [read_parts(shape.path) for shape in settings.shapes])
     assert kit_json(load_kit(root / "row.json", root / "row.tar")) == kit_json(kit)
     assert kit.grammar.neighbourhoods == {0: {((0, 1),): 4, ((0, 2),): 4}}
 

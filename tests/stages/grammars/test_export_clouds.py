@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ConfigError
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.grammars.description import describe_grammar
 from stages.grammars.export_clouds import cloud_of_text, ply_bytes
 from stages.grammars.extraction.extract import ExtractedGrammar, extract_grammar
@@ -121,7 +121,7 @@ class TestFiles:
         path = tmp_path / "scan.ply"
         path.write_bytes(ply_bytes(ScannedCloud(cloud.points, cloud.colors, cloud.points)))
         with pytest.raises(ConfigError, match="if it is a point cloud, which has no parts, make a grammar of it"):
-            read_model(path)
+            read_parts(path)
 
 
 def test_command_writes_shapes_as_clouds(tmp_path: Path, found: ExtractedGrammar) -> None:

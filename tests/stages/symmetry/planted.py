@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from stages.exemplars.formats.scene import ModelScene, Placement, Surface
+from stages.model_files.scene import ModelScene, Placement, Surface
 
 Ticks = list[float]
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stages.exemplars.read import parse_model
+from stages.exemplars.read import parse_parts
 from stages.exemplars.segmentation import segment_scene
-from stages.exemplars.settings import ReadLimits
+from stages.model_files.limits import ReadLimits
 from stages.symmetry.sections.parallel_cuts import find_parallel_cuts
 from stages.symmetry.sections.slabs import slab_pieces
 from tests.stages.symmetry.planted import area as surface_area
@@ -93,5 +93,5 @@ class TestSegmentation:
 @pytest.mark.skipif(not CRANE.is_file(), reason="no real exemplars next to this folder")
 def test_a_real_mast_is_one_bay_twenty_one_times() -> None:
     """A shift that is slightly wrong hardly shows from bay to bay, but adds up until no bays are equal."""
-    crane = parse_model(CRANE, "sections", ReadLimits())
+    crane = parse_parts(CRANE, "sections", ReadLimits())
     assert max(Counter(part.mesh_name for part in crane.parts).values()) == 21

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shipped_kits.solids import Solid, rotation
-from stages.exemplars.formats.colors import linear_from_srgb
+from stages.model_files.colors import linear_from_srgb
 from stages.shape.arrays import FloatArray
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from stages.exemplars.build import build_kit
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.contact_oracle import ContactOracle
@@ -42,7 +42,7 @@ def histogram(kit: Kit, variant: Variant) -> tuple[int, ...]:
 def shipped_kit(folder: Path) -> Kit:
     shapes = tuple(sorted(folder.glob("*.glb")))
     kit, _ = build_kit(
-        KitConfig(name=folder.name, shapes=shapes).resolve(STRICTEST), [read_model(shape) for shape in shapes]
+        KitConfig(name=folder.name, shapes=shapes).resolve(STRICTEST), [read_parts(shape) for shape in shapes]
     )
     return kit
 

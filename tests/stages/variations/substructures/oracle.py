@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from stages.exemplars.build import build_kit
-from stages.exemplars.read import read_model
+from stages.exemplars.read import read_parts
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ShapeFile
 from stages.variations.substructures.docking_sites import docking_graph
 from stages.variations.substructures.operations import find_operations
@@ -192,7 +192,7 @@ def _shape_graphs(paths: Sequence[Path]) -> list[OrderedGraph]:
     for path in paths:
         contact = ContactConfig(kinds=("point", "line", "face"))
         config = KitConfig(name="oracle", shapes=(ShapeFile(path=path),), contact=contact)
-        kit, _ = build_kit(config.resolve(STRICTEST), [read_model(path)])
+        kit, _ = build_kit(config.resolve(STRICTEST), [read_parts(path)])
         whole = kit.exemplars[0].assembly
         graphs.append(docking_graph(kit, whole, np.zeros_like(whole.edges)))
     return graphs

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.colors import color_bytes, decode_image, face_paint, sample_texture
-from stages.exemplars.formats.enclosure import Enclosure, Outside
-from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, ModelScene, Placement, Surface, type_label
+from stages.model_files.colors import color_bytes, decode_image, face_paint, sample_texture
+from stages.model_files.enclosure import Enclosure, Outside
+from stages.model_files.polygons import triangulate
+from stages.model_files.scene import GREY, ModelScene, Placement, Surface, type_label
 from stages.shape.arrays import ByteArray
 
 _MAP_OPTIONS = {"-mm": 2, "-o": 3, "-s": 3, "-t": 3}

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.colors import (
+from stages.model_files.colors import (
     decode_image,
     face_paint,
     linear_from_srgb,
@@ -21,9 +21,18 @@ from stages.exemplars.formats.colors import (
     srgb_from_linear,
     unit_colors,
 )
-from stages.exemplars.formats.enclosure import Enclosure, Outside
-from stages.exemplars.formats.gltf_file import COMPRESSED, GltfFile
-from stages.exemplars.formats.scene import GREY, INVALID, Malformed, ModelScene, Placement, Surface, type_label
+from stages.model_files.enclosure import Enclosure, Outside
+from stages.model_files.gltf_file import COMPRESSED, GltfFile
+from stages.model_files.scene import (
+    GREY,
+    INVALID,
+    Malformed,
+    ModelScene,
+    Placement,
+    SceneNode,
+    Surface,
+    type_label,
+)
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 _MODE_TRIANGLES, _MODE_STRIP, _MODE_FAN = 4, 5, 6
@@ -50,14 +59,15 @@ class _Reader:
         self.header = file.header
         self.warnings: list[str] = []
         self.images: dict[int, ByteArray | None] = {}
+        self.tree: list[SceneNode] = []
 
     def scene(self) -> ModelScene:
         nodes = list(self.walk())
-        used = sorted({self.header["nodes"][index]["mesh"] for index, _ in nodes})
+        used = sorted({self.header["nodes"][index]["mesh"] for index, _, _ in nodes})
         surfaces = [self.surface(index) for index in used]
         surface_of = {mesh: index for index, mesh in enumerate(used)}
         placements = []
-        for index, pose in nodes:
+        for index, pose, row in nodes:
             self.file.enclosure.at = f"node {index}"
             node = self.header["nodes"][index]
             mesh_name = self.name("mesh", node["mesh"])
@@ -66,11 +76,18 @@ class _Reader:
             if "skin" in node:
                 self.warnings.append(f"node {name!r} has a skin; it is left out and the mesh is taken unposed")
             label = type_label(name) if type_label(name) != name else mesh_name or node_name
-            placements.append(Placement(name, label, surface_of[node["mesh"]], pose))
-        return ModelScene("nodes", tuple(surfaces), tuple(placements), tuple(dict.fromkeys(self.warnings)))
+            placements.append(Placement(name, label, surface_of[node["mesh"]], pose, row))
+        return ModelScene(
+            "nodes",
+            tuple(surfaces),
+            tuple(placements),
+            tuple(dict.fromkeys(self.warnings)),
+            unit=1.0,
+            nodes=tuple(self.tree),
+        )
 
-    def walk(self) -> Iterator[tuple[int, FloatArray]]:
-        """Yield index and world matrix of each node with a mesh, depth first, children in file order."""
+    def walk(self) -> Iterator[tuple[int, FloatArray, int]]:
+        """Yield index, world matrix and row in the tree of each node with a mesh, depth first, in file order."""
         nodes = self.header.get("nodes", [])
         scenes = self.header.get("scenes", [])
         if len(scenes) > 1:
@@ -80,10 +97,10 @@ class _Reader:
         else:
             children = {child for node in nodes for child in node.get("children", [])}
             roots = [index for index in range(len(nodes)) if index not in children]
-        stack = [(root, np.eye(4)) for root in reversed(roots)]
+        stack = [(root, np.eye(4), -1) for root in reversed(roots)]
         seen: set[int] = set()
         while stack:
-            index, parent = stack.pop()
+            index, parent, parent_row = stack.pop()
             if index in seen:
                 raise Malformed(f"node {index} has two parents in the node tree")
             seen.add(index)
@@ -99,9 +116,11 @@ class _Reader:
                     f"{self.file.path}: node {node.get('name', index)!r} is instanced on the GPU "
                     "(EXT_mesh_gpu_instancing), which is not read; export it again with one node for each instance"
                 )
+            row = len(self.tree)
+            self.tree.append(SceneNode(self.name("node", index) or f"node{index}", parent_row))
             if "mesh" in node:
-                yield index, pose
-            stack.extend((child, pose) for child in reversed(node.get("children", [])))
+                yield index, pose, row
+            stack.extend((child, pose, row) for child in reversed(node.get("children", [])))
 
     def name(self, kind: Literal["node", "mesh", "material"], index: int) -> str | None:
         """Return the name of a node, mesh or material, if it has one."""

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.colors import color_bytes, face_paint
-from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, INVALID, Malformed, ModelScene, Placement, Surface
+from stages.model_files.colors import color_bytes, face_paint
+from stages.model_files.polygons import triangulate
+from stages.model_files.scene import GREY, INVALID, Malformed, ModelScene, Placement, Surface
 from stages.shape.arrays import ByteArray
 
 

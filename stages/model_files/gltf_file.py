@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.enclosure import Enclosure
-from stages.exemplars.formats.scene import Malformed
+from stages.model_files.enclosure import Enclosure
+from stages.model_files.scene import Malformed
 
 COMPRESSED = "export it again without compression"
 

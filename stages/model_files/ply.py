@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.colors import color_bytes, decode_image, face_paint, sample_texture, unit_colors
-from stages.exemplars.formats.enclosure import Enclosure, Outside
-from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, INVALID, Malformed, ModelScene, Placement, Surface
+from stages.model_files.colors import color_bytes, decode_image, face_paint, sample_texture, unit_colors
+from stages.model_files.enclosure import Enclosure, Outside
+from stages.model_files.polygons import triangulate
+from stages.model_files.scene import GREY, INVALID, Malformed, ModelScene, Placement, Surface
 from stages.shape.arrays import ByteArray, FloatArray
 
 _TYPES = {

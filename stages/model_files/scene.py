@@ -62,13 +62,27 @@ class Placement:
     """A named surface in the world.
 
     label: the file's label for the type of the part, if it has one.
+    surface: index into the surfaces of the scene.
     pose: float64 (4, 4), any affine map with an inverse.
+    node: index into the nodes of the scene, for a format with a node tree.
     """
 
     name: str
     label: str | None
     surface: int
     pose: FloatArray
+    node: int | None = None
+
+
+@dataclass(frozen=True)
+class SceneNode:
+    """A node of the node tree.
+
+    parent: index of the node that it hangs below, -1 for a root.
+    """
+
+    name: str
+    parent: int
 
 
 @dataclass(frozen=True)
@@ -76,7 +90,10 @@ class ModelScene:
     """The surfaces of a file and their placements, in the order of the file.
 
     kind: whether placements are nodes of a scene graph or named objects of one mesh.
+    warnings: what was left out, replaced or guessed, a sentence each.
     up: the axis that points up as the file states it, if its format lets files choose.
+    unit: metres of one unit of the coordinates, if the format or the file says; DAE files are converted to metres.
+    nodes: the node tree, parents before their children; empty for formats without one.
     """
 
     kind: Literal["nodes", "objects"]
@@ -84,6 +101,8 @@ class ModelScene:
     placements: tuple[Placement, ...]
     warnings: tuple[str, ...] = ()
     up: Literal["y", "z"] | None = None
+    unit: float | None = None
+    nodes: tuple[SceneNode, ...] = ()
 
 
 def type_label(name: str) -> str:

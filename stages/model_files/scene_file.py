@@ -5,22 +5,22 @@ from __future__ import annotations
 import contextlib
 import difflib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.dae import read_dae
-from stages.exemplars.formats.enclosure import Enclosure
-from stages.exemplars.formats.gltf import read_gltf
-from stages.exemplars.formats.off import read_off
-from stages.exemplars.formats.ply import read_ply
-from stages.exemplars.formats.scene import ModelScene, Surface, plain_name, plain_text
-from stages.exemplars.formats.stl import read_stl
-from stages.exemplars.formats.wavefront import read_wavefront
-from stages.exemplars.settings import ReadLimits
+from stages.model_files.dae import read_dae
+from stages.model_files.enclosure import Enclosure
+from stages.model_files.gltf import read_gltf
+from stages.model_files.limits import ReadLimits
+from stages.model_files.off import read_off
+from stages.model_files.ply import read_ply
+from stages.model_files.scene import ModelScene, Placement, SceneNode, Surface, plain_name, plain_text
+from stages.model_files.stl import read_stl
+from stages.model_files.wavefront import read_wavefront
 
 READERS: dict[str, Callable[[Path, Enclosure], ModelScene]] = {
     ".glb": read_gltf,
@@ -95,7 +95,7 @@ def check_size(path: Path, scene: ModelScene, limits: ReadLimits) -> None:
             )
 
 
-def first_warnings(warnings: list[str]) -> tuple[str, ...]:
+def first_warnings(warnings: Sequence[str]) -> tuple[str, ...]:
     """Return the first warnings, each one printable line, and how many more there are."""
     shown = tuple(map(plain_text, warnings[:MAX_WARNINGS_SHOWN]))
     more = len(warnings) - len(shown)
@@ -140,13 +140,37 @@ def _solid_placements(path: Path, scene: ModelScene) -> ModelScene:
             "which has no parts, make a grammar of it: grammars.models"
         )
     used = sorted({placement.surface for placement in placements})
-    return ModelScene(
-        kind=scene.kind,
+    number_of = {surface: number for number, surface in enumerate(used)}
+    nodes, row_of = _used_nodes(scene.nodes, placements)
+    return replace(
+        scene,
         surfaces=tuple(surfaces[index] for index in used),
-        placements=tuple(replace(placement, surface=used.index(placement.surface)) for placement in placements),
+        placements=tuple(
+            replace(
+                placement,
+                surface=number_of[placement.surface],
+                node=None if placement.node is None else row_of[placement.node],
+            )
+            for placement in placements
+        ),
         warnings=tuple(warnings),
-        up=scene.up,
+        nodes=nodes,
     )
+
+
+def _used_nodes(
+    nodes: tuple[SceneNode, ...], placements: list[Placement]
+) -> tuple[tuple[SceneNode, ...], dict[int, int]]:
+    """Return the nodes at and above the placements, with plain names, and the new row of each."""
+    used: set[int] = set()
+    for placement in placements:
+        row = -1 if placement.node is None else placement.node
+        while row >= 0 and row not in used:
+            used.add(row)
+            row = nodes[row].parent
+    row_of = {row: number for number, row in enumerate(sorted(used))}
+    kept = [nodes[row] for row in sorted(used)]
+    return tuple(SceneNode(plain_name(node.name), row_of.get(node.parent, -1)) for node in kept), row_of
 
 
 def _plainly_named(surface: Surface) -> Surface:

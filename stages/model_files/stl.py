@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.scene import GREY, Malformed, ModelScene, Placement, Surface
+from stages.model_files.scene import GREY, Malformed, ModelScene, Placement, Surface
 from stages.shape.arrays import FloatArray
 
 _HEAD_BYTES, _TRIANGLE_BYTES = 84, 50

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.colors import color_bytes, decode_image, face_paint, sample_texture, unit_colors
-from stages.exemplars.formats.enclosure import Enclosure, Outside
-from stages.exemplars.formats.markup import check_markup
-from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, INVALID, ModelScene, Placement, Surface, type_label
+from stages.model_files.colors import color_bytes, decode_image, face_paint, sample_texture, unit_colors
+from stages.model_files.enclosure import Enclosure, Outside
+from stages.model_files.markup import check_markup
+from stages.model_files.polygons import triangulate
+from stages.model_files.scene import GREY, INVALID, ModelScene, Placement, SceneNode, Surface, type_label
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 _MAX_DEPTH = 200
@@ -58,7 +58,7 @@ class _Reader:
         self.document = document
         self.warnings: list[str] = []
         self.images: dict[str, ByteArray | None] = {}
-        self.walked = 0
+        self.tree: list[SceneNode] = []
 
     def scene(self) -> ModelScene:
         surfaces: list[Surface] = []
@@ -68,7 +68,7 @@ class _Reader:
             message = re.sub(r" `?<.*>`?", "", error.msg)  # without a name it may show a Python object
             self.warnings.append(f"left out: {message}")
         roots = [] if self.document.scene is None else self.document.scene.nodes
-        for node, pose, geometries in self.walk(roots, np.eye(4), 0):
+        for node, pose, geometries, row in self.walk(roots, np.eye(4), -1, 0):
             key = tuple(
                 (placed.geometry.id, *((bound.symbol, getattr(bound.target, "id", None)) for bound in placed.materials))
                 for placed in geometries
@@ -77,11 +77,11 @@ class _Reader:
                 surface_of[key] = len(surfaces)
                 surfaces.append(self.surface(geometries))
             name = getattr(node, "name", None) or node.id or surfaces[surface_of[key]].name
-            placements.append(Placement(name, type_label(name), surface_of[key], pose))
+            placements.append(Placement(name, type_label(name), surface_of[key], pose, row))
         up = getattr(self.document.assetInfo, "upaxis", None)
         placed = self.in_metres(surfaces, placements, X_TO_Y if up == "X_UP" else np.eye(4))
         warnings = tuple(dict.fromkeys(self.warnings))
-        return ModelScene("nodes", *placed, warnings, "z" if up == "Z_UP" else "y")
+        return ModelScene("nodes", *placed, warnings, "z" if up == "Z_UP" else "y", 1.0, tuple(self.tree))
 
     def in_metres(
         self, surfaces: list[Surface], placements: list[Placement], turn: FloatArray
@@ -98,8 +98,10 @@ class _Reader:
         )
         return tuple(scaled), tuple(moved)
 
-    def walk(self, nodes: Any, parent: FloatArray, depth: int) -> Iterator[tuple[Any, FloatArray, list[Any]]]:
-        """Yield nodes that place geometry, with their world matrix and what they place."""
+    def walk(
+        self, nodes: Any, parent: FloatArray, parent_row: int, depth: int
+    ) -> Iterator[tuple[Any, FloatArray, list[Any], int]]:
+        """Yield nodes that place geometry, with world matrix, what they place, and their row in the tree."""
         from collada.scene import ControllerNode, GeometryNode, Node
 
         if depth > _MAX_DEPTH:
@@ -107,8 +109,9 @@ class _Reader:
         for node in nodes:
             if not isinstance(node, Node):
                 continue
-            self.walked += 1
-            if self.walked > _MAX_NODES:
+            row = len(self.tree)
+            self.tree.append(SceneNode(getattr(node, "name", None) or node.id or f"node{row}", parent_row))
+            if row >= _MAX_NODES:
                 raise ConfigError(
                     f"{self.path}: places more than {_MAX_NODES:,} nodes, by placing nodes again; export it simpler"
                 )
@@ -118,8 +121,8 @@ class _Reader:
                 self.warnings.append(f"node {node.id!r} has a skin or a morph and is left out")
             geometries = [child for child in node.children if isinstance(child, GeometryNode)]
             if geometries:
-                yield node, pose, geometries
-            yield from self.walk(node.children, pose, depth + 1)
+                yield node, pose, geometries, row
+            yield from self.walk(node.children, pose, row, depth + 1)
 
     def surface(self, geometries: list[Any]) -> Surface:
         names: list[str] = []

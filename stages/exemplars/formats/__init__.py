@@ -1,1 +1,0 @@
-"""Model files -> scenes: one reader a format, and what they share."""

@@ -1,0 +1,50 @@
+"""Read model files, each in a child process with limits: every part of the project that takes a mesh reads it here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from pipeline.bounded import ChildFailed, in_child
+from pipeline.errors import ConfigError
+from stages.model_files.limits import ReadLimits
+from stages.model_files.packing import pack_scene, unpack_scene
+from stages.model_files.scene import ModelScene
+from stages.model_files.scene_file import check_size, first_warnings, read_scene
+
+
+def read_model(path: Path, limits: ReadLimits | None = None) -> ModelScene:
+    """Return the scene of a model file: GLB, glTF, OBJ with MTL, PLY, STL, OFF or DAE.
+
+    Its placements are the nodes or objects of the file, each with its surface, world matrix and name, in file order.
+    No placement lacks triangles, and all coordinates are finite. Opens nothing outside the folder of `path`. Raises
+    ConfigError, with the file, the element and the remedy, for a file without triangles, whatever it did to the child
+    process, and for one that takes more than `limits`.
+    """
+    limits = limits or ReadLimits()
+
+    def read() -> bytes:
+        scene = read_scene(path)
+        check_size(path, scene, limits)
+        return pack_scene(replace(scene, warnings=first_warnings(scene.warnings)))
+
+    content = read_bounded(path, read, limits)
+    try:
+        return unpack_scene(content)[0]
+    except ValueError:
+        raise ConfigError(f"{path}: cannot be read: its parts are no meshes; export it again") from None
+
+
+def read_bounded(path: Path, read: Callable[[], bytes], limits: ReadLimits) -> bytes:
+    """Return what `read` makes of the file `path`, in a child process with limits.
+
+    Raises ConfigError, with the remedy, whatever happens to the child process.
+    """
+    try:
+        return in_child(read, cpu_seconds=limits.cpu_seconds, memory_mb=limits.memory_mb, refusal=ConfigError)
+    except ChildFailed as error:
+        raise ConfigError(
+            f"{path}: cannot be read: {error}; export it again, simpler if it is large, or raise exemplars.limits in "
+            "the config"
+        ) from None
