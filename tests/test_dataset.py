@@ -18,9 +18,9 @@ import yaml
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_files import load_kit
 from stages.shape.sample import read_samples
-from stages.strings.alphabet import make_alphabet
-from stages.strings.grammar_check import check_string
+from stages.strings.tokens import make_alphabet
 from tests.command import shapemill
+from tests.stages.strings.grammar_check import check_string
 from tests.stated import stated
 
 STAGES = ("exemplars", "variations", "validity", "strings", "points", "sketches", "package")

@@ -22,8 +22,8 @@ from stages.shape.kit import Assembly, Kit
 from stages.string_sampling.instantiation.guidance import WITHOUT_GUIDE, Guide, guide_of
 from stages.string_sampling.instantiation.instantiate import Instantiator
 from stages.string_sampling.instantiation.state import STANDARD_METHOD, SolverMethod
-from stages.strings.alphabet import Alphabet
 from stages.strings.decoder import Decoded, decode
+from stages.strings.tokens import Alphabet
 from stages.training.edge_categories.trained import TrainedEdgeCategories
 from stages.variations.settings import VariationsConfig
 

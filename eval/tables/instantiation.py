@@ -47,8 +47,8 @@ def _compute(run: DatasetRun, options: InstantiationOptions) -> TableResult:
     from stages.shape.graphs.canonical import graph_digest
     from stages.shape.shape import kit_shape
     from stages.string_sampling.repair import repair_strings
-    from stages.strings.alphabet import make_alphabet
     from stages.strings.decoder import decode
+    from stages.strings.tokens import make_alphabet
     from stages.training.string_vae.latent_sampling import sample
 
     outcomes: list[tuple[str, Sequence[InstantiationAttempt]]] = []

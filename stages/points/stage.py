@@ -8,8 +8,7 @@ import numpy as np
 
 from pipeline.shards import array_bytes, json_bytes
 from pipeline.stage import Outcome, Plan, Stage, Task
-from stages.points.cloud import sample_cloud
-from stages.points.frame import normalization
+from stages.points.cloud import normalization, sample_cloud
 from stages.points.settings import PointsConfig
 from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipeline.errors import ShardFailed
+from stages.programs.curves.part import Part
 from stages.programs.draws import Share, draw
-from stages.programs.effect import has_effect
 from stages.programs.intersection import intersecting_labels
 from stages.programs.parameters import Value
 from stages.programs.program import BuildError, Program, shape_from_parts
+from stages.programs.repair import repair
+from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.judge import unmet_requirement
 from stages.shape.physics.settings import Requirements
@@ -25,6 +27,9 @@ MIN_DRAWS_PER_BATCH, MAX_DRAWS_PER_BATCH = 32, 8192
 
 ValueIndex = tuple[str, int]
 """A parameter and the index of one of its values."""
+
+MAX_SAME_POSITION_DISTANCE = 1e-6
+"""In the program's units."""
 
 
 def all_value_indices(program: Program) -> list[ValueIndex]:
@@ -144,3 +149,35 @@ class Sampler:
 def _reasons(refused: Counter[tuple[str, str]], failure: str) -> str:
     counts = ", ".join(f"{count} {reason}" for (_, reason), count in sorted(refused.items()))
     return f"{counts}; {failure}" if failure else counts
+
+
+def has_effect(program: Program, values: Values, name: str, parts: Sequence[Part]) -> bool:
+    """Whether a shape changes with parameter `name` alone, both to its next lower and to its next higher valid value.
+
+    values: valid and canonical, of the shape made of `parts`. Parameters that come into view may change to satisfy the
+    constraints. A parameter without another valid value has no effect.
+    """
+    parameter = program.schema.by_name[name]
+    _, visible = program.schema.canonical(values)
+    index = parameter.class_of(values[name])
+    tried = False
+    for others in (parameter.values[:index][::-1], parameter.values[index + 1 :]):
+        for other in others:
+            changed = repair(program, {**values, name: other}, visible)
+            if changed is not None:
+                if same_geometry(parts, program.parts(changed)):
+                    return False
+                tried = True
+                break
+    return tried
+
+
+def same_geometry(parts: Sequence[Part], others: Sequence[Part]) -> bool:
+    """Whether two shapes have the same parts in the same order and positions."""
+    return len(parts) == len(others) and all(
+        a.label == b.label
+        and a.mesh.vertices.shape == b.mesh.vertices.shape
+        and a.mesh.quads.shape == b.mesh.quads.shape
+        and bool(np.abs(a.mesh.vertices - b.mesh.vertices).max(initial=0.0) <= MAX_SAME_POSITION_DISTANCE)
+        for a, b in zip(parts, others, strict=True)
+    )

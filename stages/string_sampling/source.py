@@ -18,10 +18,10 @@ from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
 from stages.string_sampling.settings import SourceConfig
-from stages.strings.alphabet import make_alphabet
 from stages.strings.compiled_grammar import compile_grammar, patterns_json
 from stages.strings.decoder import decode
 from stages.strings.settings import Edges
+from stages.strings.tokens import make_alphabet
 
 if TYPE_CHECKING:
     from stages.training.string_vae.trained import TrainedStringVae

@@ -22,9 +22,9 @@ from stages.string_sampling.instantiation.state import SolverMethod
 from stages.string_sampling.rounds import pool_graphs
 from stages.string_sampling.settings import SourceConfig, StringSamplingConfig
 from stages.string_sampling.source import ModelSource, read_source
-from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.kit_strings import KitStrings
+from stages.strings.tokens import make_alphabet
 
 NO_STRING, DUPLICATE, FAULTY = "no valid string", "duplicate", "not valid by its meshes"
 NEW, TRAIN, EXEMPLAR = "new", "train", "exemplar"

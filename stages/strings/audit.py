@@ -14,12 +14,11 @@ from stages.shape.collection.discovery import languages
 from stages.shape.collection.packaged import PackagedSample
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_files import load_kit
-from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import Decoded, decode
 from stages.strings.encoder import canonical_string
 from stages.strings.kit_strings import KitStrings
 from stages.strings.settings import Edges, StringsConfig
-from stages.strings.tokens import StringError
+from stages.strings.tokens import StringError, make_alphabet
 
 
 def string_faults(sample: PackagedSample) -> Iterator[str]:

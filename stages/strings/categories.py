@@ -27,9 +27,9 @@ import numpy.typing as npt
 from stages.shape.arrays import BoolArray, FloatArray, IntArray, TypeArray
 from stages.shape.geometry.pose import invert, pose_vectors, relative_poses
 from stages.shape.kit import Assembly, Kit
-from stages.strings.alphabet import Alphabet, make_alphabet
 from stages.strings.decoder import Decoded, decode
 from stages.strings.encoder import Encoded
+from stages.strings.tokens import Alphabet, make_alphabet
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree

@@ -12,11 +12,10 @@ from pipeline.shards import read_shard
 from pipeline.stage import Outcome, Task
 from stages.shape.collection.assignment import SPLITS
 from stages.shape.kit_input import input_kits
-from stages.strings.alphabet import make_alphabet
 from stages.strings.members import CORPUS
 from stages.strings.settings import EDGE_DESCRIPTIONS, Edges, StringsConfig
 from stages.strings.statistics import StringStatistics, summarize
-from stages.strings.tokens import number_value
+from stages.strings.tokens import make_alphabet, number_value
 
 __all__ = ["CORPUS", "compose_corpus"]
 

@@ -8,9 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from stages.shape.arrays import IntArray, TypeArray
-from stages.shape.graphs.canonical import graph_digest
-from stages.strings.alphabet import Alphabet
-from stages.strings.tokens import StringError, Token, TokenKind, number_value, split_tokens
+from stages.strings.tokens import Alphabet, StringError, Token, TokenKind, number_value, split_tokens
 
 
 @dataclass(frozen=True)
@@ -106,14 +104,6 @@ def decode(string: str, alphabet: Alphabet) -> Decoded:
         number, (_, start) = min(numbers.items(), key=lambda item: item[1][1])
         raise _error(string, texts, start, f"cycle number {number} occurs only once")
     return _graph(string, types, ends, texts, token_nodes, token_edges)
-
-
-def equivalent(first: str, second: str, alphabet: Alphabet) -> bool:
-    """Return whether two strings encode isomorphic shape graphs. Raises StringError for an invalid one."""
-    graphs = [decode(string, alphabet) for string in (first, second)]
-    if len({(len(graph.edges), *sorted(graph.types.tolist())) for graph in graphs}) > 1:
-        return False
-    return len({graph_digest(graph.types, graph.edges) for graph in graphs}) == 1
 
 
 def _graph(

@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from stages.shape.arrays import IntArray, TypeArray
 from stages.shape.graphs.canonical import canonical_order
-from stages.strings.alphabet import Alphabet
-from stages.strings.tokens import number_text
+from stages.strings.tokens import Alphabet, number_text
 
 Indices = npt.NDArray[np.int64]
 

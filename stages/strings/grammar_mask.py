@@ -1,9 +1,10 @@
 """The grammar mask: tokens that can follow a prefix so that a string of the tiling grammar can still result.
 
 A token is refused if no string with the new prefix is well-formed (`stages.strings.decoder`) and admitted
-(`stages.strings.grammar_check`), as far as each node tells by itself: its neighbours fit a pattern of its type, and one
-of its subtrees can hold the other end of each open cycle. A token of an admitted string is refused only for want of
-room: everything open must be closed within the tokens left, cycles by numbers and nodes by subtrees without cycles.
+(`stages.shape.graphs.neighbourhoods`), as far as each node tells by itself: its neighbours fit a pattern of its type,
+and one of its subtrees can hold the other end of each open cycle. A token of an admitted string is refused only for
+want of room: everything open must be closed within the tokens left, cycles by numbers and nodes by subtrees without
+cycles.
 
 Without open cycles every allowed prefix can be completed. Several open cycles may each be closable, but not together;
 then no token may be left, and the caller must backtrack.

@@ -16,10 +16,10 @@ from stages.shape.geometry.docking import DockingTable
 from stages.shape.geometry.pose import relative_poses
 from stages.shape.graphs.canonical import canonical_order
 from stages.shape.kit import Assembly, ContactKind, Kit
-from stages.strings.alphabet import Alphabet, make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.encoder import Encoded, canonical_string, random_strings
 from stages.strings.settings import Edges
+from stages.strings.tokens import Alphabet, make_alphabet
 
 _KIND_RANK: dict[ContactKind | None, int] = {"face": 0, "line": 1, "point": 2, None: 2}
 

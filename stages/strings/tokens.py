@@ -1,10 +1,12 @@
-"""The tokens of a string, and the error that points at one of them."""
+"""The tokens of a string, the alphabet of a kit, and the error that points at a token."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from string import ascii_lowercase, ascii_uppercase
 from typing import Literal
 
 TokenKind = Literal["node", "cycle", "open", "close"]
@@ -12,6 +14,26 @@ TokenKind = Literal["node", "cycle", "open", "close"]
 _TOKEN = re.compile(r"%\([0-9]{1,6}\)|%[0-9][0-9]|\[[^\[\]]*\]|.", re.DOTALL)
 _CONTEXT_CHARACTERS = 60
 """Characters that an error shows on each side of its position."""
+
+LETTERS = ascii_uppercase + ascii_lowercase
+
+
+@dataclass(frozen=True)
+class Alphabet:
+    """The tokens of a kit's types, by type index."""
+
+    tokens: tuple[str, ...]
+    names: tuple[str, ...]
+    """Of the types."""
+
+    @cached_property
+    def types(self) -> dict[str, int]:
+        """The type index of each token."""
+        return {token: index for index, token in enumerate(self.tokens)}
+
+    def vocabulary(self) -> dict[str, str]:
+        """Return the type name of each token."""
+        return dict(zip(self.tokens, self.names, strict=True))
 
 
 @dataclass(frozen=True)
@@ -64,3 +86,21 @@ def number_value(token: str) -> int | None:
     if len(token) == 1:
         return int(token) if token in "0123456789" else None
     return int(token.strip("%()")) if token[0] == "%" else None
+
+
+def make_alphabet(names: Sequence[str]) -> Alphabet:
+    """Make the alphabet of a kit whose types have `names`, in order.
+
+    The tokens are A to Z, then a to z. With more types, every token is its name in brackets, `[tower_wall]`, with `_`
+    for characters other than letters, digits, `_`, `-` and `.`, and a number after names that would be equal.
+    """
+    if len(names) <= len(LETTERS):
+        return Alphabet(tuple(LETTERS[: len(names)]), tuple(names))
+    tokens: dict[str, None] = {}
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9_.-]", "_", name)
+        token, number = f"[{plain}]", 2
+        while token in tokens:
+            token, number = f"[{plain}_{number}]", number + 1
+        tokens[token] = None
+    return Alphabet(tuple(tokens), tuple(names))

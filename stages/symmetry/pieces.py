@@ -8,12 +8,11 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
-from stages.symmetry.matching.equality import soups_match
 from stages.symmetry.matching.repetitions import PART_COST, Repetition, find_repetitions
 from stages.symmetry.rows import chunks_along, find_row
 from stages.symmetry.surface.clip import fragments
 from stages.symmetry.surface.grid import SurfaceGrid, surface_grid
-from stages.symmetry.surface.soup import NEIGHBOUR_CELLS, Soup, carve, connected_soups, join_soups
+from stages.symmetry.surface.soup import NEIGHBOUR_CELLS, Soup, carve, connected_soups, join_soups, soups_match
 
 RADIUS_SHARE = 0.016
 """Radius of similarity, as a share of the longest side of the model's box (symmetry §5)."""

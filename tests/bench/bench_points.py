@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stages.points.area_sampling import sample_surface
-from stages.points.cloud import sample_cloud
-from stages.points.farthest import farthest_points
+from stages.points.cloud import farthest_points, sample_cloud
 from stages.programs.files import random_shapes
 from stages.programs.program import build_shape, find_program
 from tests.bench.measure import Measure, rate

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from stages.shape.graphs.canonical import docking_digest, graph_digest
-from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.encoder import canonical_string, encode
+from stages.strings.tokens import make_alphabet
 from tests.bench.measure import Measure, rate
 
 TYPE_COUNT, GRAPHS_PER_CALL = 13, 20

@@ -6,7 +6,8 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
+from typing import Literal, overload
 
 import numpy as np
 
@@ -20,19 +21,74 @@ from stages.grammars.extraction.terminals import Terminal, unshared_terminal
 from stages.grammars.grammar import Grid, Production, ShapeGrammar, site_name
 from stages.grammars.scans.ridge_frames import ridge_frames
 from stages.grammars.scans.scanned_grid import ScannedCloud, scanned_grid
-from stages.grammars.terminal_meshes import TerminalMeshes, centred_part
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
+from stages.shape.kit import PartMesh
 from stages.symmetry.matching.candidate_transforms import candidate_transforms
 from stages.symmetry.surface.corner_frames import CornerFrames, corner_frames
 from stages.symmetry.surface.grid import SurfaceGrid, has_area, surface_grid
-from stages.symmetry.surface.welding import weld
+from stages.symmetry.surface.soup import Soup, join_soups
+from stages.symmetry.surface.welding import WeldedSurface, weld
 
 MAX_TRANSFORMS = 24
 MAX_CELL_TESTS = 8_000_000
 """Cells tested in all, once per transform: large grids are searched with fewer transforms."""
 WELD_CELLS = 1e-6
 """Corners of pieces that are closer, in cells, are one vertex."""
+
+
+class TerminalMeshes(Sequence[PartMesh]):
+    """A mesh for each terminal, around the middle of its box.
+
+    A mesh is made whenever it is read: hundreds that each hold most of a large surface take gigabytes.
+    """
+
+    def __init__(
+        self,
+        corners: FloatArray,
+        pieces: Soup,
+        colors: ByteArray,
+        terminals: Sequence[tuple[str, Terminal]],
+        tolerance: float,
+    ) -> None:
+        """Prepare the meshes of a surface.
+
+        corners: float64 (f, 3, 3), triangles of the surface
+        pieces: pieces of triangles that seams have cut
+        colors: uint8 (f, 3), of the triangles
+        terminals: each with its name
+        tolerance: distance up to which corners are one vertex
+        """
+        every = join_soups(Soup(corners, np.arange(len(corners), dtype=np.int32)), pieces)
+        self._surface = WeldedSurface(every.corners, tolerance)
+        self._faces, self._first, self._colors = every.faces, len(corners), colors
+        self._terminals = tuple(terminals)
+
+    def __len__(self) -> int:
+        return len(self._terminals)
+
+    @overload
+    def __getitem__(self, index: int) -> PartMesh: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[PartMesh]: ...
+    def __getitem__(self, index: int | slice) -> PartMesh | Sequence[PartMesh]:
+        if isinstance(index, slice):
+            return [self[number] for number in range(*index.indices(len(self)))]
+        name, terminal = self._terminals[index]
+        whole, pieces = terminal.whole.indices, self._first + terminal.pieces
+        faces, vertices = self._surface.around(whole, terminal.cut.corners, pieces)
+        colors = self._colors[np.concatenate([whole, terminal.cut.faces, self._faces[pieces]])]
+        return centred_part(self.middles[index], name, faces, vertices, colors)
+
+    @cached_property
+    def middles(self) -> FloatArray:
+        """Where the middle of each mesh's box is in the exemplar, float64 (m, 3)."""
+        boxes = [
+            self._surface.box(terminal.whole.indices, terminal.cut.corners, self._first + terminal.pieces)
+            for _, terminal in self._terminals
+        ]
+        middles: FloatArray = np.array(boxes).reshape(-1, 2, 3).mean(axis=1)
+        return middles
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,3 +230,10 @@ def _grid_and_frames(surface: SurfaceMesh | ScannedCloud, name: str, radius: flo
         raise ConfigError(f"{name}: no triangle has any area; export the model again, with its surfaces")
     grid = surface_grid(corners, radius)
     return grid, corner_frames(grid.corners, grid.tolerance)
+
+
+def centred_part(middle: FloatArray, name: str, faces: IntArray, vertices: FloatArray, colors: ByteArray) -> PartMesh:
+    """Return a mesh with its origin at `middle` (3,), without triangles of fewer than three vertices."""
+    one, two, three = faces.T
+    real = (one != two) & (two != three) & (three != one)
+    return PartMesh(name, vertices - middle, faces[real], colors[real])

@@ -1,4 +1,4 @@
-"""Open-addressing hash tables of 64-bit keys, for compiled code. A key is never 0: 0 marks a free slot."""
+"""Hash tables for compiled code: open addressing with 64-bit keys, 0 for a free slot; and cells of a hash grid."""
 
 from __future__ import annotations
 
@@ -7,6 +7,10 @@ import numpy as np
 
 MISSING_KEY = -9
 """What `look_up` returns for a key that the table does not hold."""
+
+OWN_CELL = 13
+"""The number of the neighbouring cell that is the cell of the point itself."""
+_PRIMES = (73856093, 19349663, 83492791)
 
 
 @numba.njit(cache=True, inline="always")
@@ -59,3 +63,14 @@ def _put(table, key):
     while table[slot] != 0:
         slot = (slot + np.uint64(1)) & np.uint64(len(table) - 1)
     table[slot] = key
+
+
+@numba.njit(cache=True)
+def cell_hash(point, turn, side):
+    """Return the hash of a cell of width `side` at or next to a point, by its first three coordinates.
+
+    turn: 0 to 26, from the cell before the point's in every direction to the one behind; OWN_CELL is the point's own
+    """
+    x, y, z = np.int64(point[0] // side), np.int64(point[1] // side), np.int64(point[2] // side)
+    x, y, z = x + turn // 9 - 1, y + turn // 3 % 3 - 1, z + turn % 3 - 1
+    return x * _PRIMES[0] ^ y * _PRIMES[1] ^ z * _PRIMES[2]

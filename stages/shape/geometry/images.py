@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.geometry.grid_hash import OWN_CELL, cell_hash
+from stages.shape.geometry.hash_tables import OWN_CELL, cell_hash
 
 
 @numba.njit(cache=True)

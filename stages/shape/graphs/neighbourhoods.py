@@ -51,38 +51,5 @@ def admits(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
     return all(pair in together for pair in combinations(sorted(types), 2))
 
 
-def admits_superset(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
-    """Return whether a part of type `part_type` may have these `neighbours`, possibly with others.
-
-    This is what a graph that leaves out contacts can show.
-    """
-    if part_type in grammar.hubs:
-        return True
-    counts = {other: count for other, count in neighbours if other not in grammar.hubs}
-    total = sum(counts.values())
-    observed = grammar.neighbourhoods.get(part_type, {})
-    if grammar.strictness == "multiset":
-        return any(
-            all(dict(multiset).get(other, 0) >= count for other, count in counts.items()) for multiset in observed
-        )
-    if grammar.strictness == "count_and_set":
-        # each observed type is there at least once, so that many places are left
-        return any(
-            counts.keys() <= dict(multiset).keys()
-            and sum(max(counts.get(other, 0), 1) for other, _ in multiset) <= _size(multiset)
-            for multiset in observed
-        )
-    if not counts.keys() <= {other for multiset in observed for other, _ in multiset}:
-        return False
-    if grammar.strictness in SLOT_LEVELS:
-        return True
-    if not any(total <= _size(multiset) for multiset in observed):
-        return False
-    if grammar.strictness == "count_and_types":
-        return True
-    together = {pair for multiset in observed for pair in combinations([other for other, _ in multiset], 2)}
-    return all(pair in together for pair in combinations(sorted(counts), 2))
-
-
 def _size(multiset: Multiset) -> int:
     return sum(count for _, count in multiset)

@@ -12,8 +12,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.geometry.pose_kernels import squared_distance
-from stages.string_sampling.instantiation.transforms import compose
+from stages.shape.geometry.pose_kernels import compose, squared_distance
 from stages.strings.categories import CategorySpace
 from stages.strings.decoder import Decoded
 

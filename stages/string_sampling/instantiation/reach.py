@@ -12,8 +12,7 @@ import numba
 import numpy as np
 
 from stages.shape.geometry.hash_tables import mix
-from stages.shape.geometry.pose_kernels import same_rotation, squared_distance
-from stages.string_sampling.instantiation.transforms import compose
+from stages.shape.geometry.pose_kernels import compose, same_rotation, squared_distance
 
 MAX_CHAIN_LENGTH = 24
 """Longer chains are assumed to reach any pose."""

@@ -28,6 +28,7 @@ import numpy as np
 
 from stages.shape.geometry.contact_lookup import NO_CONTACT, UNKNOWN_CONTACT, call_oracle, contact_key, quantize_pose
 from stages.shape.geometry.hash_tables import look_up
+from stages.shape.geometry.pose_kernels import compose, relative_transform
 from stages.string_sampling.instantiation.guidance import Guide, drop_frames, propagate_frames, score_by_category
 from stages.string_sampling.instantiation.placements import DockedPlacements
 from stages.string_sampling.instantiation.reach import MAX_CHAIN_LENGTH, ChainReach, can_reach
@@ -40,7 +41,6 @@ from stages.string_sampling.instantiation.state import (
     GraphTables,
     SolverMethod,
 )
-from stages.string_sampling.instantiation.transforms import compose, relative_transform
 from stages.strings.grammar_arrays import CompiledGrammar
 from stages.variations.growth.state import KnownContacts
 from stages.variations.kernels.outcomes import Outcome

@@ -9,7 +9,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.geometry.grid_hash import OWN_CELL, cell_hash
+from stages.shape.geometry.hash_tables import OWN_CELL, cell_hash
 
 MAX_NORMAL_DISTANCE = 0.3
 """Unit normals that are farther apart belong to different sides."""

@@ -11,10 +11,9 @@ import torch
 from torch import Tensor
 
 from stages.shape.arrays import BoolArray, Float32Array
-from stages.strings.alphabet import Alphabet
 from stages.strings.categories import CategorySpace, token_edges
 from stages.strings.decoder import decode
-from stages.strings.tokens import number_value
+from stages.strings.tokens import Alphabet, number_value
 from stages.training.bucketing import bucket_batches
 
 PAD_CODE = 0

@@ -9,8 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from stages.strings.alphabet import Alphabet
-from stages.strings.tokens import StringError, number_text, number_value, split_tokens
+from stages.strings.tokens import Alphabet, StringError, number_text, number_value, split_tokens
 
 END_TOKEN = 0
 """The token that ends a string, and that precedes its first token."""

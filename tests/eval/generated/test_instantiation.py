@@ -19,10 +19,10 @@ from stages.shape.kit import Assembly
 from stages.string_sampling.instantiation.guidance import guide_of
 from stages.string_sampling.instantiation.instantiate import Instantiator
 from stages.string_sampling.instantiation.state import STANDARD_METHOD
-from stages.strings.alphabet import make_alphabet
 from stages.strings.categories import CategorySpace
 from stages.strings.decoder import decode
 from stages.strings.kit_strings import KitStrings
+from stages.strings.tokens import make_alphabet
 from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 

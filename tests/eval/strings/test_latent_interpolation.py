@@ -10,10 +10,10 @@ from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.canonical import graph_digest
 from stages.string_sampling.instantiation.instantiate import Instantiator
 from stages.string_sampling.instantiation.state import STANDARD_METHOD
-from stages.strings.alphabet import make_alphabet
 from stages.strings.compiled_grammar import compile_grammar, patterns_json
 from stages.strings.decoder import decode
 from stages.strings.kit_strings import KitStrings
+from stages.strings.tokens import make_alphabet
 from stages.training.string_vae.settings import StringVaeConfig
 from stages.training.string_vae.trained import TrainedStringVae
 from stages.training.string_vae.training import new_model

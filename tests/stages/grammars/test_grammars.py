@@ -19,11 +19,11 @@ from stages.grammars.derived_shape import (
     surface_digest,
 )
 from stages.grammars.description import describe_grammar
+from stages.grammars.distinct_shapes import random_derivation
 from stages.grammars.editing import apply_option, editing_options
 from stages.grammars.extraction.extract import ExtractedGrammar
 from stages.grammars.files import load_grammar, write_grammar
 from stages.grammars.grammar import ShapeGrammar
-from stages.grammars.random_derivations import random_derivation
 from tests.stages.symmetry.planted import area, wall
 
 

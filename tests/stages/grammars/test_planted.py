@@ -12,9 +12,9 @@ from stages.grammars.collisions import Collisions
 from stages.grammars.derivation import Derivation, ResizedGrid
 from stages.grammars.derivation_text import format_derivation
 from stages.grammars.derived_shape import placed_terminals, shape_of_text, surface_digest
+from stages.grammars.distinct_shapes import DerivationCollides, random_derivation, random_resized_grid
 from stages.grammars.extraction.extract import ExtractedGrammar, SurfaceMesh, extract_grammar
 from stages.grammars.grammar import ShapeGrammar
-from stages.grammars.random_derivations import DerivationCollides, random_derivation, random_resized_grid
 from stages.shape.arrays import FloatArray
 from tests.stages.symmetry.planted import (
     blind_corners,

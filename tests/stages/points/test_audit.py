@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from stages.points.audit import AUDIT
-from stages.points.cloud import sample_cloud
-from stages.points.frame import NormalizeMode, normalization
+from stages.points.cloud import NormalizeMode, normalization, sample_cloud
 from stages.points.settings import SampledSurface
 from stages.points.visibility import seen_from_outside
 from stages.shape.collection.packaged import PackagedSample

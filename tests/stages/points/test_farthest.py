@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stages.points.farthest import farthest_points
+from stages.points.cloud import farthest_points
 
 
 def brute_force(points: np.ndarray, n: int, start: int) -> list[int]:

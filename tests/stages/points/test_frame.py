@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.points.frame import normalization, shape_bounds
+from stages.points.cloud import normalization
+from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
 

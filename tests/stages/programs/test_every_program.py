@@ -9,10 +9,9 @@ import pytest
 
 from stages.programs.curves import Part, QuadMesh, box, mesh_defects
 from stages.programs.draws import Share
-from stages.programs.effect import same_geometry
 from stages.programs.intersection import meshes_intersect
 from stages.programs.program import Program, find_program, program_names
-from stages.programs.sampling import Sampler, all_value_indices
+from stages.programs.sampling import Sampler, all_value_indices, same_geometry
 from stages.programs.schema import Values
 from stages.shape.geometry.mesh_pairs import build_tree, near_pairs
 

@@ -12,11 +12,10 @@ from pipeline.errors import ShardFailed
 from stages.programs.conditions import Condition
 from stages.programs.curves import Part, box, ellipsoid
 from stages.programs.draws import Share, draw
-from stages.programs.effect import has_effect, same_geometry
 from stages.programs.intersection import meshes_intersect
 from stages.programs.program import Constraint, Program
 from stages.programs.repair import repair
-from stages.programs.sampling import Sampler, all_value_indices, structure_digest
+from stages.programs.sampling import Sampler, all_value_indices, has_effect, same_geometry, structure_digest
 from stages.programs.schema import Values
 from tests.stages.programs.block import PROGRAM as BLOCK
 from tests.stages.programs.stool import PROGRAM

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from stages.programs.effect import has_effect
 from stages.programs.program import find_program, shape_from_text
-from stages.programs.sampling import all_value_indices, structure_digest
+from stages.programs.sampling import all_value_indices, has_effect, structure_digest
 from stages.shape.sample import Sample, read_samples
 from tests.command import shapemill
 from tests.stages.programs.stool import PROGRAM as STOOL_PROGRAM

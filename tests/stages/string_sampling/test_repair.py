@@ -11,8 +11,8 @@ from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.string_sampling.instantiation.instantiate import Instantiator
 from stages.string_sampling.instantiation.state import STANDARD_METHOD
 from stages.string_sampling.repair import first_impossible_token, repair_strings
-from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
+from stages.strings.tokens import make_alphabet
 from stages.training.string_vae.latent_sampling import LatentSearchResult, sample
 from stages.training.string_vae.trained import TrainedStringVae, load_string_vae
 from tests.stages.string_sampling.trained_model import publish_model

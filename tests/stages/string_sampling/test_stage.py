@@ -17,9 +17,9 @@ from stages.exemplars.language import dataset_kits
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Kit
 from stages.shape.sample import Sample, read_samples
-from stages.strings.alphabet import make_alphabet
 from stages.strings.compiled_grammar import compile_grammar, patterns_json
 from stages.strings.decoder import decode
+from stages.strings.tokens import make_alphabet
 from tests.command import shapemill
 from tests.pipeline.conftest import made
 from tests.stages.string_sampling.trained_model import publish_model

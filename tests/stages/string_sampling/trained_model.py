@@ -10,8 +10,8 @@ import torch
 
 from pipeline.shards import json_bytes
 from stages.shape.kit import Kit
-from stages.strings.alphabet import make_alphabet
 from stages.strings.compiled_grammar import compile_grammar, patterns_json
+from stages.strings.tokens import make_alphabet
 from stages.training.checkpoint import checkpoint_bytes
 from stages.training.string_vae.settings import StringVaeConfig
 from stages.training.string_vae.training import new_model

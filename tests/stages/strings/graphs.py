@@ -6,7 +6,7 @@ import networkx as nx
 import numpy as np
 from hypothesis import strategies as st
 
-from stages.strings.alphabet import Alphabet, make_alphabet
+from stages.strings.tokens import Alphabet, make_alphabet
 
 Graph = tuple[np.ndarray, np.ndarray]
 

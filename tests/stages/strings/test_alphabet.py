@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from stages.strings.alphabet import make_alphabet
+from stages.strings.tokens import make_alphabet
 
 
 def test_the_first_52_types_are_letters_upper_case_first() -> None:

@@ -6,10 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.encoder import Encoded, canonical_string, encode, random_strings
-from stages.strings.tokens import split_tokens
+from stages.strings.tokens import make_alphabet, split_tokens
 from tests.stages.strings.graphs import ALPHABET, Graph, arrays, connected_graphs, isomorphic, renamed
 
 

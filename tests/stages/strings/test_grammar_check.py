@@ -3,10 +3,9 @@ from __future__ import annotations
 import pytest
 
 from stages.shape.kit import Grammar
-from stages.strings.alphabet import make_alphabet
-from stages.strings.grammar_check import check_string
 from stages.strings.settings import Edges
-from stages.strings.tokens import StringError
+from stages.strings.tokens import StringError, make_alphabet
+from tests.stages.strings.grammar_check import check_string
 
 ALPHABET = make_alphabet(["tower", "gate", "flag", "wall"])
 TOWER, GATE, FLAG, WALL = range(4)

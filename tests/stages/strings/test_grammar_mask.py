@@ -11,17 +11,16 @@ from hypothesis import strategies as st
 
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS, admits
 from stages.shape.kit import Docking, Grammar, Strictness
-from stages.strings.alphabet import make_alphabet
 from stages.strings.compiled_grammar import compile_grammar, compile_patterns, patterns_json
 from stages.strings.completion import tokens_to_complete
 from stages.strings.decoder import decode
 from stages.strings.encoder import encode
 from stages.strings.grammar_arrays import NO_COMPLETION
-from stages.strings.grammar_check import check_string
 from stages.strings.grammar_mask import NO_TOKEN, GrammarMask, follows_grammar, masks_along
 from stages.strings.mask_state import END_TOKEN
-from stages.strings.tokens import StringError
+from stages.strings.tokens import StringError, make_alphabet
 from stages.training.string_vae.vocabulary import Vocabulary
+from tests.stages.strings.grammar_check import check_string
 from tests.stages.training import toy_training
 
 ALL_LEVELS: tuple[Strictness, ...] = (*STRICTNESS, *SLOT_LEVELS)

@@ -21,12 +21,12 @@ from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Grammar, Kit, PartType
 from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, read_samples, write_sample
-from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.members import MEMBERS
 from stages.strings.settings import EDGE_DESCRIPTIONS, Edges, StringsConfig
 from stages.strings.stage import STAGE
 from stages.strings.statistics import measure_string
+from stages.strings.tokens import make_alphabet
 from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
 from tests.stages.strings.graphs import arrays
 

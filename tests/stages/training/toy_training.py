@@ -21,9 +21,9 @@ from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Grammar, Kit, Multiset, PartType
 from stages.shape.kit_files import write_kit
 from stages.sketches.settings import SketchesConfig
-from stages.strings.alphabet import Alphabet, make_alphabet
 from stages.strings.encoder import canonical_string, random_strings
 from stages.strings.settings import StringsConfig
+from stages.strings.tokens import Alphabet, make_alphabet
 from stages.training.settings import TrainingConfig
 from stages.training.stage import STAGE
 from tests.stages.shape.collection.absent import named_inputs

@@ -20,12 +20,12 @@ from stages.shape.physics.judge import Judge
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample
 from stages.shape.shape import kit_shape
-from stages.strings.alphabet import make_alphabet
 from stages.strings.encoder import canonical_string
-from stages.strings.grammar_check import check_string
+from stages.strings.tokens import make_alphabet
 from stages.variations.search.search import Search
 from stages.variations.search.variant import Variant
 from stages.variations.settings import SearchConfig
+from tests.stages.strings.grammar_check import check_string
 from tests.toy_kits.program_chairs import write_chairs
 
 pytestmark = pytest.mark.slow

@@ -12,10 +12,10 @@ import pytest
 from stages.programs.conditions import Condition
 from stages.programs.curves import QuadMesh, mesh_defects
 from stages.programs.draws import draw
-from stages.programs.effect import has_effect, same_geometry
 from stages.programs.library.chair import PROGRAM
 from stages.programs.parameters import Parameter, Value
 from stages.programs.repair import repair
+from stages.programs.sampling import has_effect, same_geometry
 from stages.programs.sheets import values_showing
 from stages.shape.kit import PartMesh
 

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stages.shape.graphs.neighbourhoods import STRICTNESS, admits, admits_superset
+from stages.shape.graphs.neighbourhoods import STRICTNESS, admits
 from stages.shape.kit import Grammar, Multiset, Strictness
+from tests.stages.strings.grammar_check import admits_superset
 
 A, B, C, D = range(4)
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 
-from stages.strings.grammar_check import check_string
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
 from stages.training.loop import TrainState, train
 from stages.training.string_vae.batches import batches, open_until
@@ -16,6 +15,7 @@ from stages.training.string_vae.model import shifted
 from stages.training.string_vae.trained import load_string_vae
 from stages.training.string_vae.training import StringVaeTask, annealed, new_model, triplet_loss
 from stages.training.string_vae.vocabulary import END_TOKEN
+from tests.stages.strings.grammar_check import check_string
 from tests.stages.training import toy_training
 from tests.stages.training.string_vae.models import (
     MAX_TOKENS,

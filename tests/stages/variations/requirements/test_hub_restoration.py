@@ -16,11 +16,10 @@ from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
-from stages.strings.alphabet import make_alphabet
 from stages.strings.encoder import canonical_string
-from stages.strings.grammar_check import check_string
-from stages.strings.tokens import StringError
+from stages.strings.tokens import StringError, make_alphabet
 from stages.variations.requirements.hub_restoration import HubRestorer
+from tests.stages.strings.grammar_check import check_string
 from tests.toy_kits.chains_and_rings import CHAIN, Placed, box, chain, kit_of, models_of, pose
 
 MESHES = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import combinations
 
-from stages.shape.graphs.neighbourhoods import admits, admits_superset
-from stages.shape.kit import Grammar
-from stages.strings.alphabet import Alphabet
+from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
+from stages.shape.kit import Grammar, Multiset
 from stages.strings.decoder import Decoded, decode
 from stages.strings.settings import Edges
-from stages.strings.tokens import StringError
+from stages.strings.tokens import Alphabet, StringError
 
 
 def check_string(string: str, alphabet: Alphabet, grammar: Grammar, edges: Edges = "all") -> Decoded:
@@ -47,6 +47,43 @@ def check_string(string: str, alphabet: Alphabet, grammar: Grammar, edges: Edges
                 seen = ", ".join(f"{count} {alphabet.tokens[kind]}" for kind, count in multiset) or "no neighbour"
                 raise StringError(string, token.index, f"{token.text} {_verdict(grammar)} with {seen} around it")
     return decoded
+
+
+def admits_superset(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
+    """Return whether a part of type `part_type` may have these `neighbours`, possibly with others.
+
+    This is what a graph that leaves out contacts can show.
+    """
+    if part_type in grammar.hubs:
+        return True
+    counts = {other: count for other, count in neighbours if other not in grammar.hubs}
+    total = sum(counts.values())
+    observed = grammar.neighbourhoods.get(part_type, {})
+    if grammar.strictness == "multiset":
+        return any(
+            all(dict(multiset).get(other, 0) >= count for other, count in counts.items()) for multiset in observed
+        )
+    if grammar.strictness == "count_and_set":
+        # each observed type is there at least once, so that many places are left
+        return any(
+            counts.keys() <= dict(multiset).keys()
+            and sum(max(counts.get(other, 0), 1) for other, _ in multiset) <= _size(multiset)
+            for multiset in observed
+        )
+    if not counts.keys() <= {other for multiset in observed for other, _ in multiset}:
+        return False
+    if grammar.strictness in SLOT_LEVELS:
+        return True
+    if not any(total <= _size(multiset) for multiset in observed):
+        return False
+    if grammar.strictness == "count_and_types":
+        return True
+    together = {pair for multiset in observed for pair in combinations([other for other, _ in multiset], 2)}
+    return all(pair in together for pair in combinations(sorted(counts), 2))
+
+
+def _size(multiset: Multiset) -> int:
+    return sum(count for _, count in multiset)
 
 
 def _verdict(grammar: Grammar) -> str:
