@@ -35,7 +35,7 @@ from pipeline.options import (
     StallOption,
     WorkersOption,
     load_dataset,
-    run_stages,
+    run_or_exit,
 )
 from pipeline.package_groups import missing_group
 from pipeline.registry import find_stages, folders_with
@@ -70,8 +70,8 @@ def run(
         raise ConfigError(f"there is no stage {stage}; {hint}")
     _, loaded, paths = load_dataset(context, config, out, seed)
     names = [stage] if stage else [name for name in stages if not stages[name].publishes_incomplete]
-    how = {"part": part, "retries": retries, "only": only, "stall_minutes": stall_timeout, "cluster": cluster}
-    run_stages(names, stages, loaded, paths, workers, **how)
+    options = {"part": part, "retries": retries, "only": only, "stall_minutes": stall_timeout, "cluster": cluster}
+    run_or_exit(names, stages, loaded, paths, workers, **options)
 
 
 @DATASET_COMMANDS.command(rich_help_panel=DATASETS)

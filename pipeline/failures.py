@@ -12,6 +12,7 @@ from pipeline.shards import json_bytes
 from pipeline.task import Job, Report
 
 _DEATHS_BEFORE_ISOLATION = 3
+_WORKER_DIED = "its worker process died (out of memory, or a crash in a native library)"
 
 
 class Failures:
@@ -30,17 +31,18 @@ class Failures:
         self._failed: Counter[str] = Counter()
         self._died: Counter[str] = Counter()
 
-    def death(self, job: Job, cause: str, ready: deque[Job]) -> None:
+    def death(self, job: Job, ready: deque[Job]) -> None:
         """Handle a shard that killed its worker: retry it twice, then in isolation, then quarantine it."""
         self._died[job.shard.name] += 1
         deaths = self._died[job.shard.name]
-        self._log.note(f"{job.shard.name}: {cause}, time {deaths}")
+        self._log.note(f"{job.shard.name}: {_WORKER_DIED}, time {deaths}")
         if deaths < _DEATHS_BEFORE_ISOLATION:
             ready.append(job)
         elif deaths == _DEATHS_BEFORE_ISOLATION:
             self.isolated.append(job)
         else:
-            self._quarantine(job, Report(job.shard.name, "failed", f"{cause}, {deaths} times, the last in isolation"))
+            message = f"{_WORKER_DIED}, {deaths} times, the last in isolation"
+            self._quarantine(job, Report(job.shard.name, "failed", message))
 
     def failure(self, job: Job, report: Report, ready: deque[Job]) -> None:
         """Handle a failed shard: retry it, then quarantine it. Raises Fatal for what would fail every shard."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -63,6 +63,7 @@ class Inventory:
         self._paths = paths
         self._states: dict[str, StageInventory] = {}
         self._code_digests: dict[tuple[str, ...], dict[str, str]] = {}
+        self._modules: dict[str, str] = {}
 
     def stage(self, name: str) -> StageInventory:
         """Return the inventory of stage `name`."""
@@ -129,16 +130,24 @@ class Inventory:
             code=self._code(state.stage, shard),
         )
 
+    def note_code(self, names: Iterable[str]) -> None:
+        """Read the code of some stages now: workers are kept from stage to stage, and stop where it changes later."""
+        for name in names:
+            self._code_of(self._stages[name].module)
+
     def complete(self, name: str) -> bool:
         """Whether stage `name` and every stage it reads is done."""
         return all(not self.stage(read).missing for read in upstream(self._stages, name))
 
     def _code(self, stage: Stage, shard: Shard) -> dict[str, str]:
-        """Return the digests of a shard's code, from the first call: a run has one state of the code."""
-        key = (stage.module, *shard.code)
-        if key not in self._code_digests:
-            self._code_digests[key] = transitive_imports(entry_points(stage.module, shard.code))
-        return self._code_digests[key]
+        return self._code_of(stage.module, *shard.code)
+
+    def _code_of(self, *modules: str) -> dict[str, str]:
+        """Return the digests of a stage's code, each as it first was: a run, and its workers, have one state of it."""
+        if modules not in self._code_digests:
+            now = transitive_imports(entry_points(modules[0], modules[1:]))
+            self._code_digests[modules] = {name: self._modules.setdefault(name, digest) for name, digest in now.items()}
+        return self._code_digests[modules]
 
     def _input_fingerprint(self, name: str, known: Mapping[str, str], shard: Shard, wanted: str) -> str:
         stage, _, other = wanted.partition("/")

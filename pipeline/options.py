@@ -52,19 +52,19 @@ def load_dataset(
     return stages, loaded, DatasetPaths(out, loaded.name)
 
 
-def run_stages(
-    names: Iterable[str], stages: Mapping[str, Stage], config: Config, paths: DatasetPaths, workers: int, **how: Any
+def run_or_exit(
+    names: Iterable[str], stages: Mapping[str, Stage], config: Config, paths: DatasetPaths, workers: int, **options: Any
 ) -> None:
-    """Run stages in order, with `how` for `run_stage`; exit with 1 after the first in which a shard failed."""
-    from pipeline.run import run_stage
+    """Run stages in order, with `options` for `run_stages`; exit with 1 where a shard failed."""
+    from pipeline.run import run_stages
     from pipeline.termination import exit_on_signals
 
     with exit_on_signals():
-        for name in names:
-            result = run_stage(name, stages, config, paths, workers, **how)
-            if result.failed:
-                print(f"{name}: failed: {', '.join(result.failed)}; remove the cause, then run again", file=sys.stderr)
-                raise typer.Exit(1)
+        results = run_stages(names, stages, config, paths, workers, **options)
+    for name, result in results.items():
+        if result.failed:
+            print(f"{name}: failed: {', '.join(result.failed)}; remove the cause, then run again", file=sys.stderr)
+            raise typer.Exit(1)
 
 
 def print_corrupted(stages: Mapping[str, Stage], config: Config, paths: DatasetPaths) -> bool:

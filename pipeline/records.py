@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import stat
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -24,7 +25,7 @@ class ShardRecord:
     files: `{file: {"sha256", "bytes"}}` of the files that it wrote
     rejects: number of refused items by reason
     seconds: clock time that the shard took
-    peak_bytes: largest memory that its worker had held until then
+    peak_bytes: largest memory that its worker held while making it
     summary: facts of the stage, as JSON
     """
 
@@ -54,8 +55,15 @@ class ShardRecord:
 
     def is_whole(self, paths: StagePaths) -> bool:
         """Whether all its files exist with the recorded size; `Task.input` and `make verify` check their bytes."""
-        sizes = {paths.root / name: file["bytes"] for name, file in self.files.items()}
-        return all(path.is_file() and path.stat().st_size == size for path, size in sizes.items())
+        return all(_size_of_file(paths.root / name) == file["bytes"] for name, file in self.files.items())
+
+
+def _size_of_file(path: Path) -> int | None:
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return None
+    return found.st_size if stat.S_ISREG(found.st_mode) else None
 
 
 def read_record(path: Path) -> ShardRecord | None:
@@ -63,8 +71,7 @@ def read_record(path: Path) -> ShardRecord | None:
     written = read_json(path)
     try:
         checksum = written.pop("checksum")
-        record = ShardRecord(**written)
-        return record if record.checksum() == checksum else None
+        return ShardRecord(**written) if hashlib.sha256(json_bytes(written)).hexdigest() == checksum else None
     except (ValueError, TypeError, KeyError, AttributeError):
         return None
 

@@ -1,16 +1,15 @@
-"""Running a stage: make every planned shard without a matching record, until the plan is complete."""
+"""Running stages: make every planned shard without a matching record, until each plan is complete."""
 
 from __future__ import annotations
 
 import fcntl
 import time
 from collections import deque
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
-from pipeline.cluster import ClusterWorkers
 from pipeline.config import Config
 from pipeline.disk_space import byte_size, check_space
 from pipeline.errors import ConfigError, Fatal
@@ -28,7 +27,10 @@ from pipeline.slices import WHOLE, Slice, locked
 from pipeline.stage import Shard, Stage
 from pipeline.stall_timeout import DEFAULT_STALL_MINUTES, StallWatch
 from pipeline.task import Job, Report
-from pipeline.workers import WORKER_DIED, Workers
+
+if TYPE_CHECKING:
+    from pipeline.cluster import ClusterWorkers
+    from pipeline.workers import Workers
 
 _POLL_SECONDS = 0.5
 """Between two looks at the progress of running shards."""
@@ -48,42 +50,111 @@ class RunResult:
     left: int = 0
 
 
+@dataclass(frozen=True)
+class RunOptions:
+    """How a run makes shards.
+
+    part: slice of the plan to make
+    retries: number of retries of a shard that raises, before it is quarantined
+    only: make only the shards named so or `<only>-<anything>`, and those of the stage that they read
+    stall_minutes: minutes without progress after which a shard fails and its worker is killed; 0: never
+    cluster: address of a scheduler whose workers make the shards
+    """
+
+    part: Slice = WHOLE
+    retries: int = 2
+    only: str = ""
+    stall_minutes: float = DEFAULT_STALL_MINUTES
+    cluster: str = ""
+
+
 def run_stage(
-    name: str,
+    name: str, stages: Mapping[str, Stage], config: Config, paths: DatasetPaths, workers: int, **options: Any
+) -> RunResult:
+    """Run one stage, as `run_stages`."""
+    return run_stages([name], stages, config, paths, workers, **options)[name]
+
+
+def run_stages(
+    names: Iterable[str],
     stages: Mapping[str, Stage],
     config: Config,
     paths: DatasetPaths,
     workers: int,
-    part: Slice = WHOLE,
-    retries: int = 2,
-    wait: bool = False,
-    only: str = "",
-    stall_minutes: float = DEFAULT_STALL_MINUTES,
-    cluster: str = "",
-) -> RunResult:
-    """Make all shards of stage `name` that have no matching record; its upstream stages must be finished.
+    **options: Any,
+) -> dict[str, RunResult]:
+    """Make all shards of stages, in order, that have no matching record; their upstream stages must be finished.
 
-    workers: number of workers on this machine
-    part: slice of the plan to make
-    retries: number of retries of a shard that raises, before it is quarantined
-    wait: whether to wait for another run of the stage
-    only: make only the shards named so or `<only>-<anything>`, and those of the stage that they read
-    stall_minutes: minutes without progress after which a shard fails and its worker is killed; 0: never
-    cluster: address of a scheduler whose workers make the shards
+    workers: number of workers on this machine; they start with the first shard and are kept from stage to stage
+    options: fields of RunOptions
 
-    A shard that has killed its worker three times is tried in isolation, then quarantined. The rest goes on. A
-    corrupted input, of whatever stage, is rebuilt first.
+    Ends after the first stage in which a shard failed. A shard that has killed its worker three times is tried in
+    isolation, then quarantined. The rest goes on. A corrupted input, of whatever stage, is rebuilt first.
 
     Raises ConfigError when nothing can start (an upstream stage is unfinished, the disk is too small, another run
     works here), and Fatal when everything had to stop. Complete files and their records stay for the next run.
     """
-    own = paths.stage(name)
-    own.make()
-    log = EventLog(name, paths.log)
+    names, results = list(names), dict[str, RunResult]()
+    shared = _Shared(stages, paths, Inventory(config, stages, paths), workers, RunOptions(**options).cluster)
+    shared.inventory.note_code(names)
     try:
-        with locked(own, part, wait) as lock:
-            run = _Run(name, stages, config, paths, workers, part, retries, log, only, stall_minutes, cluster)
-            return run.make(lock)
+        for name in names:
+            results[name] = _run_stage(name, shared, RunOptions(**options))
+            if results[name].failed:
+                break
+    except BaseException:
+        shared.stop_workers(kill=True)
+        raise
+    shared.stop_workers(kill=False)
+    return results
+
+
+class _Shared:
+    """What the stages of a run share: plans and records, and the workers, which start with the first shard."""
+
+    def __init__(
+        self, stages: Mapping[str, Stage], paths: DatasetPaths, inventory: Inventory, count: int, cluster: str
+    ) -> None:
+        self.stages = stages
+        self.paths = paths
+        self.inventory = inventory
+        self._count = count
+        self._cluster = cluster
+        self._workers: Workers | ClusterWorkers | None = None
+
+    @property
+    def workers(self) -> Workers | ClusterWorkers:
+        if self._workers is None:
+            self._workers = _cluster_workers(self._cluster) if self._cluster else _workers(self._count, self.paths)
+        return self._workers
+
+    def stop_workers(self, kill: bool) -> None:
+        """End all workers: at once, or after their current jobs."""
+        if self._workers is not None:
+            self._workers.stop(kill)
+
+
+# Imported with the first shard: a run that finds nothing to make needs neither.
+def _workers(count: int, paths: DatasetPaths) -> Workers:
+    from pipeline.workers import Workers
+
+    return Workers(count, paths.worker_output)
+
+
+def _cluster_workers(address: str) -> ClusterWorkers:
+    from pipeline.cluster import ClusterWorkers
+
+    return ClusterWorkers(address)
+
+
+def _run_stage(name: str, shared: _Shared, options: RunOptions, wait: bool = False) -> RunResult:
+    """Run one stage; `wait`: for another run of the stage, which would else be an error."""
+    own = shared.paths.stage(name)
+    own.make()
+    log = EventLog(name, shared.paths.log)
+    try:
+        with locked(own, options.part, wait) as lock:
+            return _Run(name, shared, options, log).make(lock)
     except OSError as error:
         if fatal_cause(error) is None:
             raise
@@ -93,36 +164,20 @@ def run_stage(
 
 
 class _Run:
-    def __init__(
-        self,
-        name: str,
-        stages: Mapping[str, Stage],
-        config: Config,
-        paths: DatasetPaths,
-        workers: int,
-        part: Slice,
-        retries: int,
-        log: EventLog,
-        only: str,
-        stall_minutes: float,
-        cluster: str,
-    ) -> None:
+    def __init__(self, name: str, shared: _Shared, options: RunOptions, log: EventLog) -> None:
         self._name = name
-        self._stages = stages
-        self._paths = paths
-        self._workers = workers
-        self._part = part
-        self._retries = retries
+        self._shared = shared
+        self._options = options
         self._log = log
-        self._only = only
-        self._cluster = cluster
-        self._inventory = Inventory(config, stages, paths)
+        self._stages = shared.stages
+        self._paths = shared.paths
+        self._inventory = shared.inventory
         self._result = RunResult()
         self._made: set[str] = set()
         self._corrupted: dict[str, str] = {}
         self._rebuilt: set[str] = set()
-        self._failures = Failures(paths.stage(name), log, retries, self._result.failed)
-        self._stall_watch = StallWatch(stall_minutes, paths.stage(name))
+        self._failures = Failures(shared.paths.stage(name), log, options.retries, self._result.failed)
+        self._stall_watch = StallWatch(options.stall_minutes, shared.paths.stage(name))
         self._shown = 0.0
 
     def make(self, lock: BinaryIO) -> RunResult:
@@ -159,10 +214,13 @@ class _Run:
                 self._log.say(f"{self._name}: {byte_size(freed)} of intermediate files pruned")
 
     def _check_upstream(self) -> None:
-        if not self._stages[self._name].uses_input(self._inventory.config, self._only):
+        if not self._stages[self._name].uses_input(self._inventory.config, self._options.only):
             return
-        for read in upstream(self._stages, self._name):
-            missing = [] if read == self._name else self._inventory.stage(read).missing
+        above = [read for read in upstream(self._stages, self._name) if read != self._name]
+        if any(self._inventory.stage(read).missing for read in above):
+            self._inventory.reread()  # other runs, of other slices, may have made them
+        for read in above:
+            missing = self._inventory.stage(read).missing
             if missing:
                 planned = len(self._inventory.stage(read).shards)
                 raise ConfigError(
@@ -184,21 +242,21 @@ class _Run:
         self._delete(state, state.paths.progress, "*")
 
     def _delete(self, state: StageInventory, folder: Path, pattern: str) -> None:
-        mine = {shard.name for index, shard in enumerate(state.shards) if index in self._part}
+        mine = {shard.name for index, shard in enumerate(state.shards) if index in self._options.part}
         for path in folder.glob(pattern):
-            if self._part == WHOLE or path.name.lstrip(".").partition(".")[0] in mine:
+            if self._options.part == WHOLE or path.name.lstrip(".").partition(".")[0] in mine:
                 remove(path)
 
     def _mine(self, state: StageInventory) -> list[Shard]:
-        wanted = self._wanted(state) - set(state.records) - set(self._result.failed)
-        return [shard for index, shard in enumerate(state.shards) if index in self._part and shard.name in wanted]
+        wanted, part = self._wanted(state) - set(state.records) - set(self._result.failed), self._options.part
+        return [shard for index, shard in enumerate(state.shards) if index in part and shard.name in wanted]
 
     def _wanted(self, state: StageInventory) -> set[str]:
         """Return the requested shards and those that they read. Raises ConfigError without any."""
-        names = [shard.name for shard in state.shards]
-        wanted = {name for name in names if not self._only or f"{name}-".startswith(f"{self._only}-")}
+        names, only = [shard.name for shard in state.shards], self._options.only
+        wanted = {name for name in names if not only or f"{name}-".startswith(f"{only}-")}
         if not wanted and names:
-            raise ConfigError(f"{self._name} has no shards {self._only} or {self._only}-...; it has {', '.join(names)}")
+            raise ConfigError(f"{self._name} has no shards {only} or {only}-...; it has {', '.join(names)}")
         for shard in reversed(state.shards):  # a shard's inputs are planned before it
             if shard.name in wanted:
                 own = (source.partition("/") for source in shard.inputs)
@@ -206,7 +264,6 @@ class _Run:
         return wanted
 
     def _make_missing(self) -> None:
-        workers = ClusterWorkers(self._cluster) if self._cluster else Workers(self._workers, self._paths.worker_output)
         state = self._inventory.stage(self._name)
         try:
             while True:
@@ -214,17 +271,15 @@ class _Run:
                 ready = deque(self._inventory.job(self._name, shard) for shard in mine)
                 if not ready:
                     break
-                self._make(workers, ready, state)
+                self._make(self._shared.workers, ready, state)
                 if self._corrupted:
-                    workers.stop(kill=False)
                     self._mend()
                     state = self._inventory.stage(self._name)
                 else:
                     self._inventory.refresh(self._name)
                 self._check_plan(state)
-            workers.stop(kill=False)
         except BaseException as error:
-            workers.stop(kill=True)
+            self._shared.stop_workers(kill=True)
             self._log.note(f"stopped: {type(error).__name__}: {error}")
             raise
         finally:
@@ -260,13 +315,7 @@ class _Run:
         self._inventory.reread()
         for read in upstream(self._stages, self._name):
             if read != self._name and self._inventory.stage(read).missing:
-                run_stage(
-                    *(read, self._stages, self._inventory.config, self._paths, self._workers),
-                    retries=self._retries,
-                    wait=True,
-                    stall_minutes=self._stall_watch.seconds / 60,
-                    cluster=self._cluster,
-                )
+                _run_stage(read, self._shared, replace(self._options, part=WHOLE, only=""), wait=True)
                 self._inventory.reread()
         self._check_upstream()
 
@@ -290,7 +339,7 @@ class _Run:
 
     def _handle_report(self, job: Job, report: Report | None, ready: deque[Job]) -> None:
         if report is None:
-            self._failures.death(job, WORKER_DIED, ready)
+            self._failures.death(job, ready)
         elif report.status == "done":
             self._result.made += 1
             self._made.add(job.shard.name)

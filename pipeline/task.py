@@ -79,6 +79,7 @@ class Report:
 
 def make_shard(job: Job) -> Report:
     """Make and commit one shard. Never raises: an exception becomes the status of the report."""
+    _forget_peak_memory()
     task, start = _ShardTask(job), time.process_time()
     try:
         with compilation_noted_in(job.paths.stage(job.stage).compilation_note(job.shard.name)):
@@ -103,12 +104,18 @@ def make_shard(job: Job) -> Report:
         return Report(job.shard.name, "failed", message, trace)
 
 
+def _forget_peak_memory() -> None:
+    """Let the kernel measure this process's peak memory from now on; its earlier shards may have needed more."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
+
+
 def _check_code(job: Job) -> None:
     """Raise Fatal where the code changed since the run began: workers import late."""
     now = transitive_imports(job.starts)
     edited = sorted(module for module, _ in set(now.items()) ^ set(job.code.items()))
     if edited:
-        raise Fatal(f"the code was edited while stage {job.stage} ran ({', '.join(dict.fromkeys(edited))})")
+        raise Fatal(f"the code of stage {job.stage} was edited during the run ({', '.join(dict.fromkeys(edited))})")
 
 
 class _ShardTask:

@@ -23,8 +23,6 @@ from pipeline.shared_memory import semaphores_needed
 from pipeline.task import Job, Report, make_shard
 from pipeline.termination import die_with_parent
 
-WORKER_DIED = "its worker process died (out of memory, or a crash in a native library)"
-
 _SHARDS_PER_PROCESS = 64
 """A fresh process then takes over: native libraries leak."""
 

@@ -195,17 +195,6 @@ def requested_counts(config: GrammarConfig) -> dict[str, int]:
     return {RANDOM_RULES: config.random_shapes, RESIZED_GRID: config.resized_grids}
 
 
-def shortfall_message(config: GrammarConfig, count: int) -> str:
-    """Return what to say of a grammar that gives fewer shapes than requested, in one sentence."""
-    requested = config.requested_shapes
-    return (
-        f"{config.name}: {count:,} of {requested:,} requested shapes; all others that its grammar gives collide with "
-        f"themselves, or look like the exemplar or one of these (min_difference {config.min_difference:g}). Set "
-        f"grammars.models[{config.name}].radius smaller, which finds more sites, or min_difference smaller, or take "
-        "the model by its parts: exemplars.kits"
-    )
-
-
 def random_derivation(
     grammar: ShapeGrammar, collisions: Collisions, max_pieces: int, rng: np.random.Generator
 ) -> Derivation:

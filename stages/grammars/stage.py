@@ -97,8 +97,6 @@ def run_drawing(task: Task) -> Outcome:
     Writes a file for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line. Raises ShardFailed if
     there are no shapes.
     """
-    from stages.grammars.distinct_shapes import shortfall_message
-
     config = task.config.section(GrammarsConfig)
     rows: list[dict[str, Any]] = []
     for model in config.models:
@@ -143,6 +141,17 @@ def _sampled_rows(task: Task, config: GrammarConfig, first: int) -> list[dict[st
     return rows
 
 
+def shortfall_message(config: GrammarConfig, count: int) -> str:
+    """Return what to say of a grammar that gives fewer shapes than requested, in one sentence."""
+    requested = config.requested_shapes
+    return (
+        f"{config.name}: {count:,} of {requested:,} requested shapes; all others that its grammar gives collide with "
+        f"themselves, or look like the exemplar or one of these (min_difference {config.min_difference:g}). Set "
+        f"grammars.models[{config.name}].radius smaller, which finds more sites, or min_difference smaller, or take "
+        "the model by its parts: exemplars.kits"
+    )
+
+
 def run_collection(task: Task) -> Outcome:
     """Write the samples of one shard."""
     return write_listed_samples(task, "grammars", drawing_name(task.config.name))
@@ -150,8 +159,6 @@ def run_collection(task: Task) -> Outcome:
 
 def report(plan: Plan) -> Sequence[str]:
     """Return lines on each grammar, its shapes, reasons of rejection, and warnings."""
-    from stages.grammars.distinct_shapes import shortfall_message
-
     lines = []
     for name in grammar_shards(plan.config):
         summary = plan.summary("grammars", name)

@@ -14,7 +14,6 @@ from stages.package.layout import CARD, CHECKSUMS, CLASSES, CROISSANT, MANIFEST,
 from stages.package.manifest import config_sections
 from stages.package.member_descriptions import describe_members
 from stages.package.merge import merge_shard
-from stages.package.preview import draw_preview
 from stages.package.schema import record_schema
 from stages.package.settings import PackageConfig
 from stages.package.versions import code_version, library_versions
@@ -108,6 +107,8 @@ def run_shard(task: Task) -> Outcome:
     if task.shard.name == DATASET_SHARD:
         return compose_dataset(task)
     if task.shard.name == PREVIEW_SHARD:
+        from stages.package.preview import draw_preview
+
         return draw_preview(task)
     return merge_shard(task)
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from pipeline.shards import array_bytes, json_bytes
 from pipeline.stage import Outcome, Plan, Stage, Task
-from stages.points.cloud import normalization, sample_cloud
 from stages.points.settings import PointsConfig
 from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
@@ -17,6 +16,8 @@ from stages.shape.sample import Sample
 
 def run_shard(task: Task) -> Outcome:
     """Make the members of each sample that `members.py` declares."""
+    from stages.points.cloud import normalization, sample_cloud
+
     config = task.config.section(PointsConfig)
 
     def cloud_members(collection: Collection, sample: Sample) -> Mapping[str, bytes]:

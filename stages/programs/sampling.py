@@ -18,7 +18,6 @@ from stages.programs.program import BuildError, Program, shape_from_parts
 from stages.programs.repair import repair
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
-from stages.shape.physics.judge import unmet_requirement
 from stages.shape.physics.settings import Requirements
 
 MAX_DRAWS_PER_SHAPE = 2000
@@ -123,6 +122,8 @@ class Sampler:
 
     def _refusal(self, values: dict[str, Value], fixed: str | None) -> str | None:
         """Why `values` make no sample, or None; cheap tests first. fixed: a parameter that must take effect."""
+        from stages.shape.physics.judge import unmet_requirement
+
         violated = self.program.violated(values)
         if violated:
             return f"violates {violated[0].name}"

@@ -31,7 +31,6 @@ from stages.shape.collection.assignment import (
 from stages.shape.collection.origin import missing_licenses
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_input import input_kit
-from stages.shape.physics.judge import unmet_requirement
 from stages.shape.resolved_settings import FALLBACK_STABLE_KEY
 from stages.variations.fallback import resolved_fallback
 from stages.variations.settings import VariationsConfig
@@ -117,6 +116,8 @@ def run_shard(task: Task) -> Outcome:
 
 def run_search(task: Task) -> Outcome:
     """Write `.txt`: the texts of shapes that hold together and meet the requirements, one a line."""
+    from stages.shape.physics.judge import unmet_requirement
+
     config = _task_config(task)
     kit = input_kit(task, task.shard.params["kit"])
     exemplars = [exemplar.whole for exemplar in kit.exemplars]

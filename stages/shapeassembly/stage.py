@@ -19,7 +19,6 @@ from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.shape.collection.assignment import planned_collection, write_listed_samples, write_listings
 from stages.shape.collection.classes import Classes
 from stages.shape.collection.origin import missing_licenses
-from stages.shapeassembly.acceptance import accepted_rows
 from stages.shapeassembly.extraction.shards import extraction_shards, run_extraction
 from stages.shapeassembly.language import ProgramDecoder, assignment_name
 from stages.shapeassembly.origins import program_origins
@@ -70,6 +69,8 @@ def run_assignment(task: Task) -> Outcome:
         `.labels.json`: the part labels of each category, sorted
     Raises ShardFailed for no program, or too many labels.
     """
+    from stages.shapeassembly.acceptance import accepted_rows
+
     config = task.config.section(ShapeAssemblyConfig)
     rejected: Counter[str] = Counter()
     rows = list(accepted_rows(task, config, rejected))

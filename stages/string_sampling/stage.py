@@ -23,7 +23,6 @@ from stages.shape.sample import read_samples, write_sample
 from stages.string_sampling.rounds import ModelRounds, model_rounds, read_pool, run_pool
 from stages.string_sampling.settings import StringSamplingConfig
 from stages.string_sampling.source import run_source
-from stages.string_sampling.worker import run_worker
 from stages.variations.settings import VariationsConfig
 
 BYTES_PER_SAMPLE = 40_000
@@ -43,7 +42,16 @@ def plan(plan: Plan) -> list[Shard]:
 
 def run_shard(task: Task) -> Outcome:
     """Make one shard of the plan."""
-    return _JOBS[task.shard.params["job"]](task)
+    from stages.string_sampling.worker import run_worker
+
+    jobs = {
+        "source": run_source,
+        "worker": run_worker,
+        "pool": run_pool,
+        "assignment": run_assignment,
+        "collection": run_collection,
+    }
+    return jobs[task.shard.params["job"]](task)
 
 
 def report(plan: Plan) -> Sequence[str]:
@@ -206,14 +214,6 @@ def run_collection(task: Task) -> Outcome:
             counts[str(sample.lineage["novelty"])] += 1
     return Outcome(len(mine), {"split": params["split"], "samples": len(mine), "novelty": dict(sorted(counts.items()))})
 
-
-_JOBS = {
-    "source": run_source,
-    "worker": run_worker,
-    "pool": run_pool,
-    "assignment": run_assignment,
-    "collection": run_collection,
-}
 
 STAGE = Stage(
     name="string_sampling",

@@ -17,7 +17,7 @@ from pipeline.options import (
     StallOption,
     WorkersOption,
     load_dataset,
-    run_stages,
+    run_or_exit,
 )
 from pipeline.stall_timeout import DEFAULT_STALL_MINUTES
 
@@ -43,5 +43,5 @@ def train(
     stages, loaded, paths = load_dataset(context, config, out, seed)
     if stages["training"].uses_input(loaded, only):
         samples = [name for name in upstream(stages, "training") if name != "training"]
-        run_stages(samples, stages, loaded, paths, workers, stall_minutes=stall_timeout, cluster=cluster)
-    run_stages(["training"], stages, loaded, paths, workers, only=only, stall_minutes=stall_timeout, cluster=cluster)
+        run_or_exit(samples, stages, loaded, paths, workers, stall_minutes=stall_timeout, cluster=cluster)
+    run_or_exit(["training"], stages, loaded, paths, workers, only=only, stall_minutes=stall_timeout, cluster=cluster)

@@ -13,7 +13,6 @@ from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.pairs import CONTACTS, JOINTS, pair_bytes
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.geometry.pose import rounded
-from stages.shape.physics.judge import judge_of, physical_fields
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample
 
@@ -26,6 +25,8 @@ def run_shard(task: Task) -> Outcome:
 
     A sample without extent or weight is rejected. The summary counts the rooted and the stable samples.
     """
+    from stages.shape.physics.judge import judge_of, physical_fields
+
     config = task.config.section(PhysicsConfig)
     counts: Counter[str] = Counter()
 

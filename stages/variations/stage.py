@@ -12,19 +12,14 @@ from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.collection.assignment import planned_collection
 from stages.variations.constraint import unknown_in
 from stages.variations.fallback import resolved_fallback
 from stages.variations.report.measures import described, growth
-from stages.variations.search.pool_shard import run_pool
 from stages.variations.search.rounds import last_pool, search_shards
-from stages.variations.search.search_shard import run_search
-from stages.variations.selection.assignment import assignment_shard, run_assignment
-from stages.variations.selection.collection import collection_shards_of, run_collection
 from stages.variations.settings import VariationsConfig
 
 BYTES_PER_VARIANT = 60_000
-
-_JOBS = {"search": run_search, "pool": run_pool, "assignment": run_assignment, "collection": run_collection}
 
 
 def plan(plan: Plan) -> list[Shard]:
@@ -43,13 +38,38 @@ def plan(plan: Plan) -> list[Shard]:
         ended = ended and kit_ended
     if not ended:
         return search
-    assignment = assignment_shard(plan, search)
-    return [*search, assignment, *collection_shards_of(plan, assignment)]
+    assignment = _assignment_shard(plan, search)
+    return [*search, assignment, *_collection_shards(plan, assignment)]
+
+
+def _assignment_shard(plan: Plan, search: list[Shard]) -> Shard:
+    """Return the shard that assigns variants to splits, planned once the search of every kit has ended."""
+    kits = [kit.name for kit in plan.config.section(ExemplarsConfig).kits]
+    inputs = (*(f"exemplars/{kit}" for kit in kits), *(f"variations/{shard.name}" for shard in search))
+    ends = {kit: last_pool(plan, kit) for kit in kits}
+    searched = {kit: {key: end[key] for key in ("curve", "crossings", "advice")} for kit, end in ends.items()}
+    params = {"job": "assignment", "kits": kits, "searched": searched}
+    return Shard(f"{plan.config.name}-assignment", params, inputs)
+
+
+def _collection_shards(plan: Plan, assignment: Shard) -> list[Shard]:
+    """Return the shards of the collection, `<dataset>-<split>-<index>`; none before the assignment is made."""
+    summary = plan.summary("variations", assignment.name)
+    if summary is None:
+        return []
+    searches = tuple(shard for shard in assignment.inputs if not shard.endswith("-pool"))
+    return planned_collection(plan, summary["shards"], (*searches, f"variations/{assignment.name}"))
 
 
 def run_shard(task: Task) -> Outcome:
     """Run a search, pool, assignment or collection shard."""
-    return _JOBS[task.shard.params["job"]](task)
+    from stages.variations.search.pool_shard import run_pool
+    from stages.variations.search.search_shard import run_search
+    from stages.variations.selection.assignment import run_assignment
+    from stages.variations.selection.collection import run_collection
+
+    jobs = {"search": run_search, "pool": run_pool, "assignment": run_assignment, "collection": run_collection}
+    return jobs[task.shard.params["job"]](task)
 
 
 def report(plan: Plan) -> Sequence[str]:

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from pipeline.code import _read, entry_points, transitive_imports
-from pipeline.config import Config
+from pipeline.config import Config, StrictModel
 from pipeline.errors import Fatal
 from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
-from pipeline.run import RunResult, run_stage
+from pipeline.run import RunResult, run_stage, run_stages
 
 STONE_STAGE = '''
 """Millstones."""
@@ -167,9 +167,39 @@ def test_edit_rebuilds_what_imports_it_and_the_log_names_it(edit: Write, tmp_pat
 
 
 def test_edit_while_a_stage_runs_stops_it_before_a_shard_is_committed(edit: Write, tmp_path: Path) -> None:
-    with pytest.raises(Fatal, match=r"the code was edited while stage stone ran \(barn\.stone\.grit\)"):
+    with pytest.raises(Fatal, match=r"the code of stage stone was edited during the run \(barn\.stone\.grit\)"):
         grind(tmp_path, sharpens=True)
     assert not list((tmp_path / ".work/toys/stone").glob("*.txt"))
+
+
+WALL_STAGE = """
+from pipeline.config import StrictModel
+from pipeline.stage import Outcome, Shard, Stage
+
+def run_shard(task):
+    from barn.{reads} import GRIT
+    from pathlib import Path
+    Path(__file__).parents[1].joinpath("late.py").write_text("GRIT = 8", encoding="utf-8")
+    with task.output("stones.txt") as stream:
+        stream.write(b"stone" * GRIT)
+    return Outcome(1)
+
+STAGE = Stage("{name}", __name__, StrictModel, {inputs}, lambda _: [Shard("stones")], run_shard, lambda _: 0)
+"""
+
+
+def test_edit_of_a_later_stage_stops_the_run_whose_workers_may_hold_the_old_code(write: Write, tmp_path: Path) -> None:
+    write("barn/early.py", "GRIT = 2")
+    write("barn/late.py", "GRIT = 2")
+    write("barn/base/stage.py", WALL_STAGE.format(name="base", reads="early", inputs=()))
+    write("barn/wall/stage.py", WALL_STAGE.format(name="wall", reads="late", inputs=("base",)))
+    stages, paths = find_stages("barn"), DatasetPaths(tmp_path, "toys")
+    config = Config("toys", "1.0.0", 0, dict.fromkeys(stages, StrictModel()), tmp_path)
+    with pytest.raises(Fatal, match=r"the code of stage wall was edited during the run \(barn\.late\)"):
+        run_stages(stages, stages, config, paths, 1)
+    assert (tmp_path / ".work/toys/base/stones.txt").is_file()
+    assert run_stages(stages, stages, config, paths, 1)["wall"].made == 1
+    assert (tmp_path / ".work/toys/wall/stones.txt").read_bytes() == b"stone" * 8
 
 
 def test_engine_code_counts_only_where_it_makes_bytes() -> None:

@@ -9,7 +9,7 @@ from pipeline.cli import main
 from pipeline.config import Config, load_config
 from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
-from pipeline.run import RunResult, run_stage
+from pipeline.run import RunResult, run_stages
 from pipeline.slices import WHOLE, Slice
 
 PACKAGE = "tests.pipeline.toy_stages"
@@ -27,7 +27,7 @@ def run_toy_stages(
     """Run `stages` (all of them, if none is named) in order, in this process and its workers."""
     loaded = load(config)
     places = DatasetPaths(out, loaded.name)
-    return {name: run_stage(name, STAGES, loaded, places, workers, part, **how) for name in stages or STAGES}
+    return run_stages(stages or STAGES, STAGES, loaded, places, workers, part=part, **how)
 
 
 if __name__ == "__main__":

@@ -8,15 +8,13 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from pipeline.shards import array_bytes, json_bytes
-from pipeline.stage import Outcome, Plan, Shard, Task
-from stages.exemplars.settings import ExemplarsConfig
+from pipeline.stage import Outcome, Task
 from stages.shape.collection.assignment import SPLITS, assign_shards, assign_splits
 from stages.shape.kit_input import input_kit
 from stages.variations.novelty.kit_overlap import kit_overlap
 from stages.variations.novelty.low_diversity import low_diversity
 from stages.variations.report.measures import EDIT_SAMPLE_SIZE, edit_measures, pool_measures
 from stages.variations.search.pool import PoolIndex
-from stages.variations.search.rounds import last_pool
 from stages.variations.selection.ancestry import Ancestry, read_ancestry
 from stages.variations.selection.farthest_first import select_diverse
 from stages.variations.selection.partition import (
@@ -27,16 +25,6 @@ from stages.variations.selection.partition import (
     split_candidates,
 )
 from stages.variations.settings import VariationsConfig
-
-
-def assignment_shard(plan: Plan, search: list[Shard]) -> Shard:
-    """Return the shard that assigns variants to splits, planned once the search of every kit has ended."""
-    kits = [kit.name for kit in plan.config.section(ExemplarsConfig).kits]
-    inputs = (*(f"exemplars/{kit}" for kit in kits), *(f"variations/{shard.name}" for shard in search))
-    ends = {kit: last_pool(plan, kit) for kit in kits}
-    searched = {kit: {key: end[key] for key in ("curve", "crossings", "advice")} for kit, end in ends.items()}
-    params = {"job": "assignment", "kits": kits, "searched": searched}
-    return Shard(f"{plan.config.name}-assignment", params, inputs)
 
 
 def run_assignment(task: Task) -> Outcome:

@@ -9,24 +9,15 @@ from typing import Any
 import numpy as np
 
 from pipeline.shards import ShardWriter
-from pipeline.stage import Outcome, Plan, Shard, Task
+from pipeline.stage import Outcome, Task
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.collection.assignment import SPLITS, planned_collection
+from stages.shape.collection.assignment import SPLITS
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.sample import Sample, write_sample
 from stages.variations.requirements.hub_restoration import HubRestorer, hub_restorer
 from stages.variations.search.pool import FoundVariants
 from stages.variations.selection.assignment import sample_key
 from stages.variations.selection.orientation import OrientationFix
-
-
-def collection_shards_of(plan: Plan, assignment: Shard) -> list[Shard]:
-    """Return the shards of the collection, `<dataset>-<split>-<index>`; none before the assignment is made."""
-    summary = plan.summary("variations", assignment.name)
-    if summary is None:
-        return []
-    searches = tuple(shard for shard in assignment.inputs if not shard.endswith("-pool"))
-    return planned_collection(plan, summary["shards"], (*searches, f"variations/{assignment.name}"))
 
 
 def run_collection(task: Task) -> Outcome:

@@ -11,9 +11,10 @@ from pipeline.randomness import decision_rng
 from stages.grammars import collisions, terminal_samples
 from stages.grammars.derivation_text import parse_derivation
 from stages.grammars.derived_shape import placed_terminals
-from stages.grammars.distinct_shapes import METHODS, DistinctShapes, shortfall_message
+from stages.grammars.distinct_shapes import METHODS, DistinctShapes
 from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.settings import GrammarConfig
+from stages.grammars.stage import shortfall_message
 from stages.grammars.terminal_samples import TerminalSamples
 from stages.grammars.voxel_signature import KnownShapes, difference
 
