@@ -90,7 +90,7 @@ def measure_recall(name: str, kit: Kit) -> GrammarRecall:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "merged.glb"
         write_merged(shape, path)
-        surface, _ = read_surface(path)
+        surface, _, _ = read_surface(path)
     extraction = extract_grammar(surface, name, RADIUS_SHARE, kit.up, np.random.default_rng(0))
     seconds = time.process_time() - start
     sample = _Sample(shape, extraction.grid)

@@ -24,7 +24,7 @@ PICTURE_WIDTH = 200
 def extractions(path: Path, radii: Sequence[float], up: Literal["y", "z"]) -> dict[float, ExtractedGrammar]:
     """Extract the grammar of the mesh or cloud in a file for each radius, as a share of the longest side."""
     name = path.parent.name if path.stem == "model" else path.stem
-    surface, _ = read_surface(path)
+    surface, _, _ = read_surface(path)
     return {radius: extract_grammar(surface, name, radius, up, decision_rng(0, "radii", name)) for radius in radii}
 
 

@@ -80,9 +80,11 @@ def write_grammar_report(
     Yields names of files and facts with their paths or sentences. No config is written where few shapes differ visibly
     from the model.
     """
-    surface, _ = read_surface(path, limits)
+    surface, _, warnings = read_surface(path, limits)
     config = GrammarConfig(name=name, model=path.resolve(), up="z" if up == "z" else "y")
     if isinstance(surface, ScannedCloud):
+        if warnings:
+            yield "columns", "; ".join(warnings)
         radius = suitable_radius(surface, config.radius)
         if radius > MAX_RADIUS_SHARE:
             raise ConfigError(

@@ -24,7 +24,8 @@ class GrammarConfig(StrictModel):
     )
     model: ExistingFile = Field(
         description="Model file (GLB, glTF, OBJ, PLY, STL, OFF, DAE), relative to the working directory, read as one "
-        "mesh; or a point cloud (PLY without faces; XYZ, XYZN, XYZRGB as text), with or without normals."
+        "mesh; or a point cloud (PLY without faces, PCD, PTS, PTX, NPY, NPZ, or a table as text), with or without "
+        "normals."
     )
     # not part of the stage's fingerprint: a corrected licence changes the card and no shape
     credit: Credit = Field(default_factory=Credit, exclude=True, description="Author and licence of the model.")

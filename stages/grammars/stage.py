@@ -64,7 +64,7 @@ def run_extraction(task: Task) -> Outcome:
 
     names = grammar_shards(task.config)
     config = task.config.section(GrammarsConfig).models[names.index(task.shard.name)]
-    surface, file_up = read_surface(config.model)
+    surface, file_up, warnings = read_surface(config.model)
     up = config.up if config.up != "auto" else file_up or "y"
     extracted = extract_grammar(surface, config.name, config.radius, up, task.rng("sets"), config.upright)
     grammar = extracted.grammar
@@ -87,6 +87,7 @@ def run_extraction(task: Task) -> Outcome:
             "docked_pieces": len(extracted.docked_pieces),
             "productions": len(grammar.productions),
             "grids": [list(grid.counts) for grid in grammar.grids],
+            "warnings": warnings,
         },
     )
 
@@ -168,6 +169,7 @@ def report(plan: Plan) -> Sequence[str]:
                 f"{name}: {summary['made_of']}, {summary['transforms']} symmetries, {summary['docked_pieces']} docked "
                 f"pieces at {summary['sites']} classes of sites, {summary['productions']} productions; grids: {grids}"
             )
+            lines += [f"warning: {name}: {sentence}" for sentence in summary["warnings"]]
     drawing = drawing_name(plan.config.name)
     sampled = plan.summary("grammars", drawing) if lines else None
     if sampled is not None:

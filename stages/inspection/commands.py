@@ -28,7 +28,7 @@ COMMANDS = typer.Typer()
 def inspect(
     models: Annotated[
         list[str],
-        typer.Argument(metavar="MODEL", help="GLB, glTF, OBJ, PLY, STL, OFF or DAE; or a point cloud, PLY or XYZ"),
+        typer.Argument(metavar="MODEL", help="GLB, glTF, OBJ, PLY, STL, OFF or DAE; or a cloud or table of points"),
     ],
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object, for programs")] = False,
     as_table: Annotated[bool, typer.Option("--table", help="print a Markdown row for each model by itself")] = False,

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ConfigError
+from stages.cloud_files.read import read_cloud
 from stages.exemplars.read import read_parts
 from stages.grammars.description import describe_grammar
 from stages.grammars.export_clouds import cloud_of_text, ply_bytes
 from stages.grammars.extraction.extract import ExtractedGrammar, extract_grammar
 from stages.grammars.files import write_grammar
-from stages.grammars.read_surface import is_point_cloud, read_cloud, read_surface
+from stages.grammars.read_surface import is_point_cloud, read_surface
 from stages.grammars.scans.scanned_grid import ScannedCloud
 from stages.shape.arrays import FloatArray
 from tests.cloud_similarity import MATCHED_SHARE, cloud_similarity
@@ -106,7 +107,7 @@ class TestFiles:
         [
             ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty int x\nend_header\n1\n2\n", "no property y"),
             ("b.ply", b"ply\nformat ascii 1.0\nelement vertex 9\nproperty int x\nend_header\n1\n", "cut off"),
-            ("c.xyz", b"1 2 3\nfour 5 6\n", "no table of numbers"),
+            ("c.xyz", b"1 2 3\nfour 5 6\n", "line 2: 'four' is no number"),
             ("d.xyzn", b"1 2 3\n4 5 6\n", "3 numbers a line"),
         ],
         ids=["lacking", "cut off", "words", "narrow"],

@@ -1,0 +1,1 @@
+"""Point clouds from files: tables of numbers as people write them, arrays, PCD, PTX and PLY."""
