@@ -30,11 +30,13 @@ class RecoveryInput:
     name: results are filed under it
     points: float64 (n, 3), None for a drawing
     ink: bool (side, side), fitted to a square; None for a cloud
+    warnings: what its reader took for what, and left out
     """
 
     name: str
     points: FloatArray | None = None
     ink: BoolArray | None = None
+    warnings: tuple[str, ...] = ()
 
 
 def checked_cloud(points: Any, name: str = "the cloud") -> FloatArray:

@@ -64,7 +64,8 @@ def recover_input(
         ]
         initials = [initials[int(np.argmin(distances))]]
     fit = best_fit(initials[0], source, up, turned, budget, seed)
-    return recovery_result(fit, kind, outliers, program_named=bool(program))
+    result = recovery_result(fit, kind, outliers, program_named=bool(program))
+    return replace(result, warnings=(*source.warnings, *result.warnings))
 
 
 def _without_outliers(source: RecoveryInput) -> tuple[RecoveryInput, int]:

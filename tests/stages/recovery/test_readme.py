@@ -10,7 +10,7 @@ import pytest
 
 import stages.recovery
 from stages.programs.program import find_program
-from stages.recovery.reading import CLOUD_SUFFIXES, IMAGE_SUFFIXES
+from stages.recovery.reading import INPUT_SUFFIXES
 from stages.recovery.recover import recover
 from stages.recovery.result import RecoveryResult
 from stages.training.recovery.surface import sample_points
@@ -43,6 +43,6 @@ def test_table_of_results_has_every_key_of_the_json() -> None:
 
 
 def test_table_of_inputs_has_every_format() -> None:
-    named = {name.lower() for name in re.findall(r"\b[A-Za-z]{3,4}\b", README.partition("## What comes out")[0])}
+    named = {name.lower() for name in re.findall(r"\b[A-Za-z]{3,6}\b", README.partition("## What comes out")[0])}
     aliases = {"jpg": "jpeg", "tif": "tiff"}
-    assert {aliases.get(suffix[1:], suffix[1:]) for suffix in CLOUD_SUFFIXES + IMAGE_SUFFIXES} <= named
+    assert {aliases.get(suffix[1:], suffix[1:]) for suffix in INPUT_SUFFIXES} <= named
