@@ -133,8 +133,7 @@ def _report(future: Future[Report | None]) -> Report | None:
     from distributed import KilledWorker
 
     try:
-        report: Report | None = future.result(timeout=_ANSWER_SECONDS)
-        return report
+        return future.result(timeout=_ANSWER_SECONDS)
     except (CancelledError, KilledWorker, OSError):
         return None
     except Exception as error:  # anything before the shard begins, such as a missing module

@@ -120,8 +120,7 @@ def nearest_in_train(pairs: Sequence[tuple[FloatArray, FloatArray]], train: Sequ
 
 def _centred(cloud: FloatArray) -> FloatArray:
     points = np.asarray(cloud, dtype=np.float64)
-    centred: FloatArray = points - points.mean(axis=0)
-    return centred
+    return points - points.mean(axis=0)
 
 
 def aligned_distance(first: FloatArray, second: FloatArray, steps: int) -> float:

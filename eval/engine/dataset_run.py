@@ -54,8 +54,7 @@ class DatasetRun:
     def manifest(self) -> Mapping[str, Any]:
         """The manifest of the finished dataset; empty without one."""
         path = self.folder / MANIFEST
-        manifest: dict[str, Any] = json.loads(path.read_bytes()) if path.is_file() else {}
-        return manifest
+        return json.loads(path.read_bytes()) if path.is_file() else {}
 
     @property
     def samples(self) -> int:

@@ -100,8 +100,7 @@ def _figures(
 
 
 def _subset(clouds: FloatArray, count: int) -> FloatArray:
-    chosen: FloatArray = clouds[np.sort(np.random.default_rng(0).permutation(len(clouds))[:count])]
-    return chosen
+    return clouds[np.sort(np.random.default_rng(0).permutation(len(clouds))[:count])]
 
 
 def _nearest_by_emd(

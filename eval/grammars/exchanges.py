@@ -59,8 +59,7 @@ def _areas(kit: Kit, assembly: Assembly) -> FloatArray:
     """Return the share of the surface of each part, float64 (n,)."""
     corners = [kit.types[kind].vertices[kit.types[kind].faces] for kind in assembly.types.tolist()]
     areas = np.array([triangle_areas(part).sum() for part in corners])
-    shares: FloatArray = areas / areas.sum()
-    return shares
+    return areas / areas.sum()
 
 
 def _elementary(kit: Kit, assembly: Assembly, swaps: RegionSwaps, transform: int) -> Iterator[BoolArray]:

@@ -208,8 +208,7 @@ def model_rng(seed: int, trained: TrainedModel[TrainedStringVae], decision: str)
 
 
 def _codes(model: TrainedStringVae, string: str) -> list[int]:
-    codes: list[int] = model.vocabulary.codes(string).tolist()
-    return codes
+    return model.vocabulary.codes(string).tolist()
 
 
 def _graph(model: TrainedStringVae, string: str) -> str:

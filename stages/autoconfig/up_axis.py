@@ -144,12 +144,10 @@ def _turns(identified: IdentifiedParts) -> list[int]:
                 angles = rotation_angle(images)
                 if angles.min() >= MIN_TURN_RADIANS:
                     counts += np.abs(_axis(images[angles.argmin(), :3, :3])) > MIN_AXIS_COSINE
-    turns: list[int] = counts.tolist()
-    return turns
+    return counts.tolist()
 
 
 def _axis(rotation: FloatArray) -> FloatArray:
     """Return the axis of a rotation (3, 3): its eigenvector of eigenvalue 1."""
     values, vectors = np.linalg.eigh((rotation + rotation.T) / 2)
-    axis: FloatArray = vectors[:, int(np.argmax(values))]
-    return axis
+    return vectors[:, int(np.argmax(values))]

@@ -89,8 +89,7 @@ def _coherent(vertices: FloatArray, faces: IntArray) -> IntArray:
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(vertices, faces))
     meshes.meshing_re_orient_faces_coherently()
-    oriented: IntArray = meshes.current_mesh().face_matrix().astype(np.int32)
-    return oriented
+    return meshes.current_mesh().face_matrix().astype(np.int32)
 
 
 def _distinct_corners(vertices: FloatArray, faces: IntArray) -> np.ndarray:
@@ -155,7 +154,6 @@ def _heights(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return the height of each face over its longest side."""
     corners = vertices[faces]
     sides = np.roll(corners, -1, axis=1) - corners
-    heights: FloatArray = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / (
+    return np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / (
         np.linalg.norm(sides, axis=2).max(axis=1, initial=1e-300)
     )
-    return heights

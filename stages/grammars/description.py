@@ -109,8 +109,7 @@ def _grid(grid: Grid) -> dict[str, Any]:
 def _middle(extracted: ExtractedGrammar, number: int) -> np.ndarray:
     grid = extracted.grid
     cells = grid.cells[extracted.docked_pieces[number].border]
-    middle: np.ndarray = grid.origin + (cells.mean(axis=0) + 0.5) * grid.cell_size
-    return middle
+    return grid.origin + (cells.mean(axis=0) + 0.5) * grid.cell_size
 
 
 def _tree(derivation: Derivation) -> list[Any]:

@@ -65,8 +65,7 @@ def unpack_scene(content: bytes) -> tuple[ModelScene, dict[str, Any]]:
 
     def following(name: str, count: int) -> np.ndarray:
         at[name] += count
-        rows: np.ndarray = arrays[name][at[name] - count : at[name]]
-        return rows
+        return arrays[name][at[name] - count : at[name]]
 
     surfaces = []
     for (name, materials, has_material, has_paint), (vertex_count, face_count) in zip(

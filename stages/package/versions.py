@@ -53,5 +53,4 @@ def library_versions() -> dict[str, str]:
 
 
 def _project() -> dict[str, Any]:
-    project: dict[str, Any] = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]
-    return project
+    return tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]

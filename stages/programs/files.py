@@ -69,5 +69,4 @@ def shape_glb(program: Program, values: Values) -> bytes:
         visual = trimesh.visual.TextureVisuals(material=material)
         part = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False, visual=visual)
         scene.add_geometry(part, node_name=name, geom_name=name, transform=pose)
-    glb: bytes = scene.export(file_type="glb")
-    return glb
+    return scene.export(file_type="glb")

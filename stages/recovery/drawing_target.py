@@ -95,5 +95,4 @@ def _without_jitter(view: SketchView) -> SketchView:
 def _squared_distances(ink: BoolArray) -> FloatArray:
     from scipy.ndimage import distance_transform_edt
 
-    squared: FloatArray = (distance_transform_edt(~ink) / DRAWING_SIDE_PIXELS) ** 2
-    return squared
+    return (distance_transform_edt(~ink) / DRAWING_SIDE_PIXELS) ** 2

@@ -66,8 +66,7 @@ class PartMesh:
         """Area-weighted centroid of the surface, float64 (3,); every symmetry of the part preserves it."""
         corners = self.vertices[self.faces]
         areas = triangle_areas(corners)
-        centroid: FloatArray = (corners.mean(axis=1) * areas[:, None]).sum(axis=0) / areas.sum()
-        return centroid
+        return (corners.mean(axis=1) * areas[:, None]).sum(axis=0) / areas.sum()
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,8 +46,7 @@ class Shape:
     @cached_property
     def part_labels(self) -> TypeArray:
         """Index of each part's label in `labels`, int16 (n,)."""
-        labels: TypeArray = self.label_of[self.assembly.types]
-        return labels
+        return self.label_of[self.assembly.types]
 
     @cached_property
     def part_classes(self) -> TypeArray:

@@ -179,8 +179,7 @@ class CategorySpace:
 
     def _allowed(self, decoded: Decoded, edges: IntArray) -> BoolArray:
         here, there = np.append(decoded.types + 1, 0)[edges].T
-        allowed: BoolArray = self.masks[here, there]
-        return allowed
+        return self.masks[here, there]
 
     def categories_between(self, parent: int | None, label: int) -> range:
         """Return the categories of a part of a label with a parent of some type, or as the first of a string."""

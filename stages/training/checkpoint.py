@@ -34,8 +34,7 @@ def checkpoint_bytes(tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -
     from safetensors.torch import save
 
     text = json.dumps({**header, "version": HEADER_VERSION}, sort_keys=True, ensure_ascii=False, allow_nan=False)
-    content: bytes = save({name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}, {_KEY: text})
-    return content
+    return save({name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}, {_KEY: text})
 
 
 def load_checkpoint(path: Path, expected: Mapping[str, Any]) -> tuple[dict[str, Tensor], dict[str, Any]]:

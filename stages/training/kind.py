@@ -36,5 +36,4 @@ def kind_module(name: str) -> str:
 
 def find_kind(name: str) -> Kind:
     """Return the kind of a name, that of its folder."""
-    kind: Kind = importlib.import_module(kind_module(name)).KIND
-    return kind
+    return importlib.import_module(kind_module(name)).KIND

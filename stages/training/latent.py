@@ -60,10 +60,7 @@ class LatentGaussian(nn.Module):
         standard deviation.
         """
         noise = temperature * rng.standard_normal((count, len(self.center)))
-        points: LatentPoints = (self.center.cpu().numpy() + noise @ self.covariance_root.cpu().numpy().T).astype(
-            np.float32
-        )
-        return points
+        return (self.center.cpu().numpy() + noise @ self.covariance_root.cpu().numpy().T).astype(np.float32)
 
 
 def reparameterize(mean: Tensor, log_variance: Tensor, noise: Generator) -> tuple[Tensor, Tensor]:

@@ -61,8 +61,7 @@ class TrainingTask(ABC):
     @property
     def device(self) -> torch.device:
         """The device of the parameters."""
-        device: torch.device = next(self.module.parameters()).device
-        return device
+        return next(self.module.parameters()).device
 
     def epoch(self, samples: Any, rng: np.random.Generator | None) -> Iterator[Any]:
         """Yield all samples once, in batches: in random order, or in their own order without `rng`.

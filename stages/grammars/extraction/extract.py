@@ -87,8 +87,7 @@ class TerminalMeshes(Sequence[PartMesh]):
             self._surface.box(terminal.whole.indices, terminal.cut.corners, self._first + terminal.pieces)
             for _, terminal in self._terminals
         ]
-        middles: FloatArray = np.array(boxes).reshape(-1, 2, 3).mean(axis=1)
-        return middles
+        return np.array(boxes).reshape(-1, 2, 3).mean(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +101,7 @@ class SurfaceMesh:
     @property
     def corners(self) -> FloatArray:
         """Corners of each triangle, float64 (f, 3, 3)."""
-        corners: FloatArray = self.vertices[self.faces]
-        return corners
+        return self.vertices[self.faces]
 
 
 @dataclass(frozen=True, eq=False)

@@ -86,8 +86,7 @@ def follow(rail: Curve, axis: Axis = "z") -> Deformation:
         x, y = rail_axes(stations.points, stations.tangents, positions, False, None)
         at = inverse[len(rail.positions) :]
         across, up = vertices[:, [(index + 1) % 3]], vertices[:, [(index + 2) % 3]]
-        followed: FloatArray = stations.points[at] + across * x[at] + up * y[at]
-        return followed
+        return stations.points[at] + across * x[at] + up * y[at]
 
     return laid
 
@@ -96,5 +95,4 @@ def _share(vertices: FloatArray, index: int) -> FloatArray:
     """Relative position of each vertex between the ends of the mesh along an axis, 0 to 1, (v,)."""
     along = vertices[:, index]
     low, high = along.min(), along.max()
-    share: FloatArray = (along - low) / (high - low if high > low else 1.0)
-    return share
+    return (along - low) / (high - low if high > low else 1.0)

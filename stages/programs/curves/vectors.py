@@ -9,8 +9,7 @@ from stages.shape.arrays import FloatArray
 
 def dots(a: FloatArray, b: FloatArray) -> FloatArray:
     """Dot product of each row of `a` (n, 3) with the same row of `b` (n, 3), float64 (n,)."""
-    product: FloatArray = np.einsum("ij,ij->i", a, b)
-    return product
+    return np.einsum("ij,ij->i", a, b)
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -24,5 +23,4 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def unit(rows: FloatArray) -> FloatArray:
     """Each row (n, 3) scaled to length 1; no row may be zero."""
-    scaled: FloatArray = rows / np.sqrt(dots(rows, rows))[:, None]
-    return scaled
+    return rows / np.sqrt(dots(rows, rows))[:, None]

@@ -65,8 +65,7 @@ class _Frame:
         """The leg's middle at `heights`, any shape (...), as x and z, (..., 2)."""
         down = 1.0 - heights / self.table.under
         out = self.foot * down - 4.0 * self.waist * down * (1.0 - down)
-        middle: FloatArray = self.top + out[..., None] * self.direction
-        return middle
+        return self.top + out[..., None] * self.direction
 
 
 def _rail(table: TableDimensions, frame: _Frame, name: str, axis: int) -> Part:

@@ -133,8 +133,7 @@ def _cover(wall: Wall, heights: FloatArray) -> FloatArray:
             cover.pop()
         cover.append(point)
     at, radii = np.array(cover).T
-    reach: FloatArray = np.interp(heights, at, radii)
-    return reach
+    return np.interp(heights, at, radii)
 
 
 def _turns_left(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:

@@ -62,15 +62,13 @@ def _directions(shape: float) -> FloatArray:
 def _reach(radians: FloatArray, exponent: float) -> FloatArray:
     """The radius of a superellipse of half-width 1 in directions."""
     powers = np.abs(np.cos(radians)) ** exponent + np.abs(np.sin(radians)) ** exponent
-    radii: FloatArray = powers ** (-1.0 / exponent)
-    return radii
+    return powers ** (-1.0 / exponent)
 
 
 def _superellipse(radians: FloatArray, exponent: float) -> FloatArray:
     """Points of a superellipse in directions (n,), float64 (n, 2)."""
     rays = np.stack([np.cos(radians), np.sin(radians)], axis=1)
-    points: FloatArray = _reach(radians, exponent)[:, None] * rays
-    return points
+    return _reach(radians, exponent)[:, None] * rays
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +90,7 @@ class Wall:
         steps = np.diff(self.inner, axis=0)
         steps /= np.hypot(steps[:, 0], steps[:, 1])[:, None]
         turning = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
-        unit: FloatArray = turning / np.hypot(turning[:, 0], turning[:, 1])[:, None]
-        return unit
+        return turning / np.hypot(turning[:, 0], turning[:, 1])[:, None]
 
     @cached_property
     def _offset(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
@@ -152,14 +149,12 @@ class Wall:
         middle, half = (outside + inside) / 2.0, (outside - inside) / 2.0
         along = self.tangents[-1] * self.thickness / 2.0
         angles = np.radians([[45.0], [90.0], [135.0]])
-        rounded: FloatArray = middle + np.cos(angles) * half + np.sin(angles) * along
-        return rounded
+        return middle + np.cos(angles) * half + np.sin(angles) * along
 
     def seat(self) -> FloatArray:
         """The highest point of the rim, where a lid is placed, float64 (2,)."""
         rim = np.concatenate([self.outer[-1:], self._rim(), self.inner[-1:]])
-        highest: FloatArray = rim[rim[:, 1].argmax()]
-        return highest
+        return rim[rim[:, 1].argmax()]
 
     def opening(self, depth: float) -> float:
         """The smallest inner radius within `depth` of the rim."""
@@ -179,5 +174,4 @@ class Wall:
     def radius(self, height: FloatArray) -> FloatArray:
         """Outer radius at heights; constant below the foot and above the rim."""
         rising = np.maximum.accumulate(self.outer[:, 1])
-        radii: FloatArray = np.interp(height, rising, self.outer[:, 0])
-        return radii
+        return np.interp(height, rising, self.outer[:, 0])

@@ -16,5 +16,4 @@ def connected_components(count: int, pairs: np.ndarray) -> IntArray:
     from scipy.sparse.csgraph import connected_components as components_of
 
     graph = coo_array((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    components: IntArray = components_of(graph, directed=False)[1]
-    return components
+    return components_of(graph, directed=False)[1]

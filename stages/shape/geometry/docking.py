@@ -17,8 +17,7 @@ SAME_IMAGE = 0.01
 def symmetric_images(a: PartType, b: PartType, pose: FloatArray) -> FloatArray:
     """Return all relative poses (k, 4, 4) of `b` against `a` equal to `pose` up to symmetries of either part."""
     left = a.symmetries @ pose
-    images: FloatArray = (left[:, None] @ b.symmetries[None]).reshape(-1, 4, 4)
-    return images
+    return (left[:, None] @ b.symmetries[None]).reshape(-1, 4, 4)
 
 
 class DockingTable:

@@ -356,8 +356,7 @@ def _canonical(orientation: _Orientation, places: State) -> State:
     if not places:
         return places
     images = np.sort(orientation.images[:, list(places)], axis=1)
-    first: State = min(map(tuple, images[(images >= 0).all(axis=1)].tolist()), default=places)
-    return first
+    return min(map(tuple, images[(images >= 0).all(axis=1)].tolist()), default=places)
 
 
 def _turned(turn: FloatArray, pose: FloatArray) -> FloatArray:

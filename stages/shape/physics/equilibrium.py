@@ -196,8 +196,7 @@ def _cone(normals: FloatArray, friction: float, azimuth: float, directions: int)
     steep = np.cross(normals, level)
     angles = 2 * np.pi * np.arange(directions) / directions
     rubbing = np.cos(angles)[None, :, None] * level[:, None] + np.sin(angles)[None, :, None] * steep[:, None]
-    edges: FloatArray = normals[:, None] + friction * rubbing
-    return edges
+    return normals[:, None] + friction * rubbing
 
 
 def _wrenches(

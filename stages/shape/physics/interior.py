@@ -164,12 +164,10 @@ class _System:
         )
 
     def _act(self, x: FloatArray, f: FloatArray) -> FloatArray:
-        acting: FloatArray = _act(self._wrenches, self._place, x, self._count) + self._dense @ f
-        return acting
+        return _act(self._wrenches, self._place, x, self._count) + self._dense @ f
 
     def _lift(self, y: FloatArray) -> FloatArray:
-        lifted: FloatArray = _lift(self._wrenches, self._place, y)
-        return lifted
+        return _lift(self._wrenches, self._place, y)
 
     def _solve(self, right: FloatArray) -> FloatArray:
         """Solve the normal equations by conjugate gradients, preconditioned by the factors.
@@ -197,8 +195,7 @@ class _System:
         from scipy.linalg import cho_solve_banded
 
         plain = cho_solve_banded(self._band, right, check_finite=False)
-        near: FloatArray = plain - self._spread @ np.linalg.solve(self._small, self._dense.T @ plain)
-        return near
+        return plain - self._spread @ np.linalg.solve(self._small, self._dense.T @ plain)
 
 
 def _longest(*moves: tuple[FloatArray, FloatArray]) -> float:

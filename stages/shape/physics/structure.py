@@ -56,8 +56,7 @@ def mirror_score(placed: PlacedParts) -> float:
 def _long_axis(placed: PlacedParts) -> FloatArray:
     """Return the level axis along which the points of the shape spread most."""
     flat = np.concatenate(placed.points)[:, :2] - (placed.weights @ placed.centroids)[:2]
-    axis: FloatArray = np.linalg.eigh(flat.T @ flat)[1][:, 1]
-    return axis
+    return np.linalg.eigh(flat.T @ flat)[1][:, 1]
 
 
 def _spreads(placed: PlacedParts) -> FloatArray:

@@ -29,8 +29,7 @@ def corner_normals(vertices: FloatArray, faces: IntArray, welded: np.ndarray, no
     normals: unit normals of the faces, float64 (f, 3), zero for faces without area.
     """
     min_cosine = math.cos(math.radians(CREASE_ANGLE_DEGREES))
-    corners: Float32Array = _corner_normals(vertices, faces, welded, normals, min_cosine)
-    return corners
+    return _corner_normals(vertices, faces, welded, normals, min_cosine)
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -33,8 +33,7 @@ def ink_strokes(
     for kind, line in widths.items():
         table[kind] = line
     lines = _fade(ends, strokes.kinds, table, FADING, width, height, crowding)
-    ink: FloatArray = _draw(ends, lines, width, height)
-    return ink
+    return _draw(ends, lines, width, height)
 
 
 @numba.njit(cache=True, error_model="numpy")

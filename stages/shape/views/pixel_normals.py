@@ -20,10 +20,7 @@ def smooth_normals(seen: Visible) -> Float32Array:
     scene = seen.scene
     rotations = (seen.view.eye @ scene.poses)[:, :3, :3]
     parts, faces = scene.triangle_part, scene.triangle_face
-    normals: Float32Array = _interpolate(
-        seen.triangles, seen.screen, seen.normals, scene.meshes.corner_normals, parts, faces, rotations
-    )
-    return normals
+    return _interpolate(seen.triangles, seen.screen, seen.normals, scene.meshes.corner_normals, parts, faces, rotations)
 
 
 @numba.njit(cache=True, error_model="numpy")

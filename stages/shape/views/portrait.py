@@ -118,8 +118,7 @@ def _ground_light(scene: Scene, view: View, light: KeyLight, hidden: BoolArray) 
     left = np.ones(height * width)
     left[pixels] = 0.6 * soft + 0.4 * wide
     shadow = ((1.0 - left.reshape(height, width)) * fade)[..., None]
-    light_left: FloatArray = 1.0 - shadow * (1.0 - SHADOW)
-    return light_left
+    return 1.0 - shadow * (1.0 - SHADOW)
 
 
 def _ink(seen: Visible, size: tuple[int, int]) -> FloatArray:
@@ -139,8 +138,7 @@ def _reduced(picture: FloatArray) -> FloatArray:
     tiles = picture.reshape(
         height // SUBPIXELS_PER_PIXEL, SUBPIXELS_PER_PIXEL, width // SUBPIXELS_PER_PIXEL, SUBPIXELS_PER_PIXEL, channels
     )
-    mean: FloatArray = tiles.mean(axis=(1, 3))
-    return mean
+    return tiles.mean(axis=(1, 3))
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -132,8 +132,7 @@ class Scene:
     @cached_property
     def triangle_part(self) -> IntArray:
         """The part of each triangle, int32 (t,)."""
-        part: IntArray = np.repeat(np.arange(len(self), dtype=np.int32), np.diff(self.triangle_first))
-        return part
+        return np.repeat(np.arange(len(self), dtype=np.int32), np.diff(self.triangle_first))
 
     @cached_property
     def triangle_face(self) -> IntArray:

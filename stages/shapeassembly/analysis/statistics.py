@@ -56,8 +56,7 @@ def program_statistics(programs: Sequence[AssemblyProgram]) -> ProgramStatistics
 def cluster_curve(signatures: Iterable[str]) -> FloatArray:
     """Return the share of all items that have the 1, 2, 3, ... most frequent structures, float64 (structures,)."""
     counts = np.array(sorted(Counter(signatures).values(), reverse=True), dtype=np.float64)
-    curve: FloatArray = np.cumsum(counts) / max(counts.sum(), 1)
-    return curve
+    return np.cumsum(counts) / max(counts.sum(), 1)
 
 
 def cluster_curves(programs: Sequence[AssemblyProgram]) -> tuple[FloatArray, FloatArray]:

@@ -44,8 +44,7 @@ def box_corners(box: Box) -> FloatArray:
 def inside(box: Box, points: FloatArray, tolerance: float) -> BoolArray:
     """Return which of the points (n, 3) are in the box, or outside by at most `tolerance`."""
     offset = np.abs((points - box.center) @ box.axes.T)
-    within: BoolArray = np.all(offset <= box.size / 2 + tolerance, axis=-1)
-    return within
+    return np.all(offset <= box.size / 2 + tolerance, axis=-1)
 
 
 def bounding_box(points: FloatArray, axes: FloatArray) -> Box:
@@ -99,8 +98,7 @@ def box_gap(first: Box, second: Box) -> tuple[float, FloatArray, FloatArray]:
 def _nearest_in(box: Box, point: FloatArray) -> FloatArray:
     local = box.axes @ (point - box.center)
     half = box.size / 2
-    nearest: FloatArray = box.center + np.minimum(np.maximum(local, -half), half) @ box.axes
-    return nearest
+    return box.center + np.minimum(np.maximum(local, -half), half) @ box.axes
 
 
 def surface_distance(points: FloatArray, boxes: list[Box]) -> FloatArray:

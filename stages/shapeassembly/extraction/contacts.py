@@ -66,14 +66,12 @@ def bottom_or_top(box: Box, bbox: Box, *, top: bool) -> FloatArray | None:
     centers = world_points(box, _FACE_CENTERS)
     offset = np.abs(local_points(bbox, centers)[:, 1] - edge)
     if offset.min() <= END_BAND_SHARE:
-        center: FloatArray = centers[int(offset.argmin())]
-        return center
+        return centers[int(offset.argmin())]
     points = world_points(box, _GRID)
     reaching = np.abs(local_points(bbox, points)[:, 1] - edge) <= END_BAND_SHARE
     if not reaching.any():
         points, reaching = box_corners(box), np.abs(heights - edge) <= END_BAND_SHARE
-    mean: FloatArray = points[reaching].mean(axis=0)
-    return mean
+    return points[reaching].mean(axis=0)
 
 
 def _shared(first: Box, second: Box, tolerance: float) -> FloatArray:
@@ -86,8 +84,7 @@ def _shared(first: Box, second: Box, tolerance: float) -> FloatArray:
         high = np.clip(corners.max(axis=0) + tolerance, -half, half)
         points = own.center + (low + _GRID * (high - low)) @ own.axes
         points_by_frame.append(points[inside(other, points, tolerance)])
-    most: FloatArray = points_by_frame[0] if len(points_by_frame[0]) >= len(points_by_frame[1]) else points_by_frame[1]
-    return most
+    return points_by_frame[0] if len(points_by_frame[0]) >= len(points_by_frame[1]) else points_by_frame[1]
 
 
 def _face_center(first: Box, second: Box, tolerance: float) -> FloatArray | None:

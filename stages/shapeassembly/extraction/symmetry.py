@@ -38,8 +38,7 @@ class SymmetryBody:
     def center(self) -> FloatArray:
         """The middle of the extent, float64 (3,)."""
         corners = np.concatenate(self.boxes)
-        middle: FloatArray = (corners.min(axis=0) + corners.max(axis=0)) / 2
-        return middle
+        return (corners.min(axis=0) + corners.max(axis=0)) / 2
 
 
 @dataclass(frozen=True)

@@ -90,8 +90,7 @@ def _orientations(kit: Kit, part_type: int, upright: bool) -> list[_Orientation]
 def _maps_up(part_type: PartType, up: FloatArray, other: FloatArray) -> np.ndarray:
     """Return which symmetries map one up axis to another, bool (k,)."""
     gaps = np.linalg.norm(part_type.symmetries[:, :3, :3] @ up - other, axis=1)
-    near: np.ndarray = gaps < MAX_UP_DIFFERENCE
-    return near
+    return gaps < MAX_UP_DIFFERENCE
 
 
 def _docked_types(kit: Kit, part_type: int) -> Iterator[tuple[int, FloatArray]]:

@@ -89,8 +89,7 @@ def _canonical_directions(transforms: FloatArray, small: float) -> FloatArray:
     large = np.abs(numbers) > small * max(1.0, float(np.abs(numbers).max(initial=0)))
     first = large.argmax(axis=1)
     back = numbers[np.arange(len(numbers)), first] < 0
-    canonical: FloatArray = np.where(back[:, None, None], invert(transforms), transforms)
-    return canonical
+    return np.where(back[:, None, None], invert(transforms), transforms)
 
 
 def _vectors(transforms: FloatArray, reach: float) -> FloatArray:

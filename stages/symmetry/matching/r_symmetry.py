@@ -51,8 +51,7 @@ def _without(grid: SurfaceGrid, lost: np.ndarray, lost_back: np.ndarray, back: F
 
 def _lands_on_surface(grid: SurfaceGrid, transform: FloatArray, items: np.ndarray) -> BoolArray:
     """Return whether a transform takes each item to an occupied cell or a neighbour of one, bool (i,)."""
-    lands: BoolArray = _near_cells(grid.points[items], transform, grid.items)
-    return lands
+    return _near_cells(grid.points[items], transform, grid.items)
 
 
 def _fill_specks(grid: SurfaceGrid, symmetric: BoolArray, differs: BoolArray) -> BoolArray:
@@ -60,8 +59,7 @@ def _fill_specks(grid: SurfaceGrid, symmetric: BoolArray, differs: BoolArray) ->
 
     Nothing is known of the cells that do not differ. The paper removes isolated voxels of scans (symmetry §4.1).
     """
-    filled: BoolArray = _filled(symmetric, differs, grid.neighbours, MAX_HOLE_CELLS, MAX_NOISE_CELLS)
-    return filled
+    return _filled(symmetric, differs, grid.neighbours, MAX_HOLE_CELLS, MAX_NOISE_CELLS)
 
 
 def r_symmetric_cells(grid: SurfaceGrid, transform: FloatArray) -> tuple[BoolArray, BoolArray]:

@@ -119,8 +119,7 @@ class _Model:
     @cached_property
     def heights(self) -> FloatArray:
         """Height of each corner along the direction, float64 (f, 3)."""
-        heights: FloatArray = self.corners @ self.direction
-        return heights
+        return self.corners @ self.direction
 
     @cached_property
     def spans(self) -> tuple[FloatArray, FloatArray]:
@@ -170,8 +169,7 @@ class _Model:
 
 def _close(signatures: FloatArray, others: FloatArray) -> BoolArray:
     """Return which signatures (n, 10) may belong to sections equal to others (n, 10), or to one (10,): bool (n,)."""
-    close: BoolArray = np.asarray((np.abs(signatures - others) < 1 - MIN_EQUAL_SHARE).all(axis=1))
-    return close
+    return np.asarray((np.abs(signatures - others) < 1 - MIN_EQUAL_SHARE).all(axis=1))
 
 
 def _directions(edges: FloatArray) -> list[FloatArray]:
@@ -205,8 +203,7 @@ def _constant_stretches(model: _Model) -> FloatArray:
     opened = np.searchsorted(np.sort(low[slanted]), levels[:-1] + SAME_PLANE_SHARE / 2 * model.extent)
     closed = np.searchsorted(np.sort(high[slanted]), levels[:-1] + 2 * SAME_PLANE_SHARE * model.extent)
     constant = (opened == closed) & (np.diff(levels) > MIN_STRETCH_SHARE * model.extent)
-    stretches: FloatArray = np.column_stack([levels[:-1], levels[1:]])[constant]
-    return stretches
+    return np.column_stack([levels[:-1], levels[1:]])[constant]
 
 
 def _joints(model: _Model, constant: FloatArray) -> ParallelCuts:
@@ -301,8 +298,7 @@ def _likeness_to_first(model: _Model, sections: Sequence[PlaneSection], offsets:
 
 def _in_rows(same: np.ndarray) -> BoolArray:
     """Return which planes equal the one before or after; `same`, bool (n - 1,): whether each equals the next."""
-    in_rows: BoolArray = np.r_[False, same] | np.r_[same, False]
-    return in_rows
+    return np.r_[False, same] | np.r_[same, False]
 
 
 def _shifts(model: _Model, vertices: FloatArray) -> Iterator[float]:

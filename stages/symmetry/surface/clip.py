@@ -153,10 +153,7 @@ def fragments(
     Returns, in the order of the triangles, the cell of each fragment, int64 (m, 3); its triangle, int64 (m,); a point
     inside it and its area, float64 (m, 4).
     """
-    cut: tuple[np.ndarray, np.ndarray, FloatArray] = _all_fragments(
-        np.ascontiguousarray(corners), origin, size, box[0], box[1]
-    )
-    return cut
+    return _all_fragments(np.ascontiguousarray(corners), origin, size, box[0], box[1])
 
 
 @numba.njit(cache=True)

@@ -13,8 +13,7 @@ BITS_PER_AXIS = 21
 
 def pack(cells: np.ndarray) -> np.ndarray:
     """Pack non-negative cells int64 (n, 3) into one number each, int64 (n,), in lexicographic order."""
-    packed: np.ndarray = (cells[:, 0] << 2 * BITS_PER_AXIS) | (cells[:, 1] << BITS_PER_AXIS) | cells[:, 2]
-    return packed
+    return (cells[:, 0] << 2 * BITS_PER_AXIS) | (cells[:, 1] << BITS_PER_AXIS) | cells[:, 2]
 
 
 def unpack(keys: np.ndarray) -> np.ndarray:

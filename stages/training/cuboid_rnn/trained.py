@@ -94,8 +94,7 @@ def _sample_numbers(
     component = (weights + rng.gumbel(size=weights.shape)).argmax(axis=1)
     rows = np.arange(len(component))
     noise = temperature * rng.standard_normal((len(component), NUMBERS_PER_STEP))
-    numbers: FloatArray = means[rows, component] + deviations[rows, component] * noise
-    return numbers
+    return means[rows, component] + deviations[rows, component] * noise
 
 
 def _boxes(vectors: FloatArray, mirrored: BoolArray) -> tuple[Box, ...]:

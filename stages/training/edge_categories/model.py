@@ -54,8 +54,7 @@ class IndependentEdgeDecoder(EdgeCategoriesModel):
         self.logits = nn.Linear(config.hidden, categories)
 
     def forward(self, batch: CategoryBatch) -> Tensor:
-        logits: Tensor = self.logits(self.reader(batch))
-        return logits
+        return self.logits(self.reader(batch))
 
 
 class AutoregressiveEdgeDecoder(EdgeCategoriesModel):
@@ -88,8 +87,7 @@ class AutoregressiveEdgeDecoder(EdgeCategoriesModel):
         states = self.inputs(batch, self.reader(batch), self.frames(batch), tokens)
         for block in self.blocks:
             states, _, _ = block(states, None)
-        logits: Tensor = self.logits(self.norm(states))
-        return logits
+        return self.logits(self.norm(states))
 
     @torch.no_grad()
     def frames(self, batch: CategoryBatch) -> Tensor:
@@ -104,8 +102,7 @@ class AutoregressiveEdgeDecoder(EdgeCategoriesModel):
 
     def step(self, frames: Tensor, here: Tensor, pose: Tensor) -> Tensor:
         """Return the frames, float (n, 4, 4), of poses float (n, 4, 4) relative to tokens `here`, int64 (n,)."""
-        composed: Tensor = _at(frames, here.clamp(min=0)[:, None])[:, 0] @ pose
-        return composed
+        return _at(frames, here.clamp(min=0)[:, None])[:, 0] @ pose
 
     def inputs(self, batch: CategoryBatch, features: Tensor, frames: Tensor, tokens: Tensor) -> Tensor:
         """Return the inputs of some tokens, float (n, t, width).
@@ -124,8 +121,7 @@ class AutoregressiveEdgeDecoder(EdgeCategoriesModel):
         last = _at(frames, before).masked_fill(is_first, 0.0)
         places = torch.cat([frame[..., :3, :].flatten(-2) for frame in (start, other, last)], dim=-1)
         choice = batch.categories.gather(1, before).masked_fill(tokens == 0, DUMMY_CATEGORY)
-        inputs: Tensor = self.ends(ends) + self.places(places) + self.choice(choice)
-        return inputs
+        return self.ends(ends) + self.places(places) + self.choice(choice)
 
 
 def make_model(config: EdgeCategoriesConfig, tables: CategoryTables, cycles: int) -> EdgeCategoriesModel:

@@ -80,8 +80,7 @@ Word = tuple[TokenField, int, float]
 
 def first_word(field: TokenField) -> int:
     """Return the first word of a field; its other words follow."""
-    start: int = _STARTS[_KIND.get(field, _NUMBER_KIND)]
-    return start
+    return _STARTS[_KIND.get(field, _NUMBER_KIND)]
 
 
 def field_words() -> BoolArray:

@@ -47,8 +47,7 @@ class RecoveryNet(nn.Module):
         embeddings = self.encoder(inputs)[None]
         if self.other is not None:
             embeddings = torch.where(self.continuous[:, None, None], self.other(inputs), embeddings)
-        outputs: Tensor = self.decoders(embeddings, noise)
-        return outputs
+        return self.decoders(embeddings, noise)
 
 
 class Dgcnn(nn.Module):
@@ -120,8 +119,7 @@ class Vgg(nn.Module):
 
     def forward(self, drawings: Tensor) -> Tensor:
         features = self.layers(drawings.contiguous(memory_format=torch.channels_last))
-        embedded: Tensor = self.embedding(features.flatten(1)).relu()
-        return embedded
+        return self.embedding(features.flatten(1)).relu()
 
 
 class HalveResolution(nn.Module):
@@ -179,5 +177,4 @@ def _uniform(parameters: int, before: int, after: int, inputs: int) -> nn.Parame
 
 def _normed(norm: nn.Module, features: Tensor) -> Tensor:
     """Apply `norm` over clouds and points together."""
-    normed: Tensor = norm(features.flatten(0, 1)).view(features.shape)
-    return normed
+    return norm(features.flatten(0, 1)).view(features.shape)

@@ -47,8 +47,7 @@ def edge_maximum(features: Tensor, neighbors: Tensor) -> Tensor:
     returns: float (clouds, n, width)
     """
     function = _EdgeMaximum if features.device.type == "cpu" else _EdgeMaximumOnGpu
-    edges: Tensor = function.apply(features, neighbors)  # type: ignore[no-untyped-call]
-    return edges
+    return function.apply(features, neighbors)  # type: ignore[no-untyped-call]
 
 
 class _EdgeMaximum(torch.autograd.Function):

@@ -121,8 +121,7 @@ def gaussian_points(samples: LatentPoints, count: int, rng: np.random.Generator)
     """Sample points of the Gaussian with mean and covariance of `samples`: float32 (count, latent)."""
     centre: LatentPoints = samples.mean(axis=0)
     weights = rng.standard_normal((count, len(samples))) / np.sqrt(len(samples))
-    points: LatentPoints = (centre + weights @ (samples - centre)).astype(np.float32)
-    return points
+    return (centre + weights @ (samples - centre)).astype(np.float32)
 
 
 def sample(

@@ -119,8 +119,7 @@ def triplet_loss(points: Tensor, histograms: Tensor, margin: float, noise: Gener
         torch.where(differences[0] < differences[1], gaps[0], gaps[1]),
         torch.where(differences[0] < differences[1], gaps[1], gaps[0]),
     )
-    loss: Tensor = (relu(nearer - farther + margin) * (differences[0] != differences[1])).mean()
-    return loss
+    return (relu(nearer - farther + margin) * (differences[0] != differences[1])).mean()
 
 
 def _divergence(mean: Tensor, log_variance: Tensor) -> Tensor:

@@ -137,8 +137,7 @@ def _lowered(resizer: Resizer, assembly: Assembly, route: Sequence[int]) -> Asse
 
 def _named(kit: Kit, names: Sequence[str]) -> np.ndarray:
     """Return which labels of the kit are among the names, bool (labels,)."""
-    is_named: np.ndarray = np.isin(kit.labels, list(names))
-    return is_named
+    return np.isin(kit.labels, list(names))
 
 
 CONSTRAINT = GlobalConstraint(needs=("entries", "exits"), may=("through",), test=_test, repair=_repair)

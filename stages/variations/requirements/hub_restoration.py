@@ -198,8 +198,7 @@ class HubRestorer:
         answers = self.oracle.around(types[near], poses[near], hub, place)
         if (answers == FORBIDDEN_CONTACT).any():
             return None
-        touched: list[int] = near[answers != NO_CONTACT].tolist()
-        return touched
+        return near[answers != NO_CONTACT].tolist()
 
 
 def hub_restorer(task: Task, kit: str) -> HubRestorer:
@@ -243,8 +242,7 @@ def _look_same(part_type: PartType, poses: FloatArray, pose: FloatArray, toleran
     images = pose @ part_type.symmetries
     length = part_type.diagonal / 2
     gaps = pose_vectors(images, length)[:, None] - pose_vectors(poses, length)[None]
-    same: np.ndarray = (np.linalg.norm(gaps, axis=2) <= tolerance).any(axis=0)
-    return same
+    return (np.linalg.norm(gaps, axis=2) <= tolerance).any(axis=0)
 
 
 def _near(boxes: FloatArray, box: FloatArray, slack: float) -> np.ndarray:

@@ -23,5 +23,4 @@ def named_labels(kit: Kit, names: Iterable[str], key: str) -> BoolArray:
             close = nearest_word(name, kit.labels)
             hint = f"did you mean {close}?" if close else f"it has {', '.join(kit.labels)}"
             raise ConfigError(f"{key}: kit {kit.name} has no parts called {name}; {hint}")
-    is_named: BoolArray = np.isin(kit.labels, names)
-    return is_named
+    return np.isin(kit.labels, names)

@@ -18,8 +18,7 @@ def heights_of(kit: Kit, assembly: Assembly) -> FloatArray:
     """Return the height of each part's centroid, float64 (n,)."""
     centroids = np.stack([kit.types[index].centroid for index in assembly.types])
     placed, up = assembly.placements, UP[kit.up]
-    heights: FloatArray = np.einsum("nj,nj->n", placed[:, up, :3], centroids) + placed[:, up, 3]
-    return heights
+    return np.einsum("nj,nj->n", placed[:, up, :3], centroids) + placed[:, up, 3]
 
 
 def spans_of(kit: Kit, assembly: Assembly) -> FloatArray:
@@ -36,8 +35,7 @@ def rigid_types(kit: Kit, rigid: Sequence[str]) -> BoolArray:
 
     Raise ConfigError for a label that no part has.
     """
-    is_rigid: BoolArray = named_labels(kit, rigid, "variations.search.stretch.rigid")[kit.label_of]
-    return is_rigid
+    return named_labels(kit, rigid, "variations.search.stretch.rigid")[kit.label_of]
 
 
 class Resizer:

@@ -115,8 +115,7 @@ class OperatorSelector:
         """Return the probability of each choice: an equal share for exploration, the rest by squared gain per work."""
         end = self._exchanged
         if self.config.method == "growth":
-            only: FloatArray = np.eye(len(self.choices))[end]
-            return only
+            return np.eye(len(self.choices))[end]
         possible = np.array([exemplars > 1 or draw in (PLAIN, RARE) for draw, *_ in self.choices[:end]])
         rates = np.where(possible, (self._gains[:end] + 1.0) / (self._work[:end] + 50.0), 0.0) ** 2
         explored: FloatArray = self.config.novelty.exploration * possible / possible.sum()

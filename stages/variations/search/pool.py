@@ -134,8 +134,7 @@ class FoundVariants:
 
     def described(self, index: int) -> dict[str, Any]:
         """Return the lineage of one variant."""
-        lineage: dict[str, Any] = json.loads(self._lineage[index])
-        return lineage
+        return json.loads(self._lineage[index])
 
     def digest(self, index: int) -> str:
         """Return the hex digest of one variant's canonical graph."""
@@ -213,5 +212,4 @@ def write_kept(
 def _mapped(path: Path) -> np.ndarray:
     """Return an array on disk, mapped; an empty one, which cannot be mapped, is loaded."""
     empty = len(np.load(path, mmap_mode=None, allow_pickle=False)) == 0 if path.stat().st_size < 4096 else False
-    array: np.ndarray = np.load(path, mmap_mode=None if empty else "r", allow_pickle=False)
-    return array
+    return np.load(path, mmap_mode=None if empty else "r", allow_pickle=False)

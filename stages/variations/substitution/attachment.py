@@ -64,8 +64,7 @@ class AttachmentTest:
 
     def _down(self, assembly: Assembly) -> BoolArray:
         """Return which side of each part faces down, bool (n, 6)."""
-        faces_down: BoolArray = -np.einsum("nji,j->ni", assembly.poses[:, :3, :3], self._up) @ AXES.T >= MIN_AXIS_COSINE
-        return faces_down
+        return -np.einsum("nji,j->ni", assembly.poses[:, :3, :3], self._up) @ AXES.T >= MIN_AXIS_COSINE
 
     def _corners(self, assembly: Assembly) -> tuple[FloatArray, FloatArray]:
         """Return the boxes of the parts in their own coordinates, float64 (n, 2, 3), and their corners in the world,
@@ -101,8 +100,7 @@ class AttachmentTest:
 
 def _at(turned: np.ndarray, held: BoolArray) -> BoolArray:
     """Return where a part is held, (6, 6), as if it were turned."""
-    as_turned: BoolArray = held[np.ix_(turned, turned)]
-    return as_turned
+    return held[np.ix_(turned, turned)]
 
 
 def _turned_sides(rotations: FloatArray) -> list[np.ndarray]:

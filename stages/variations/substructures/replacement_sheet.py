@@ -105,8 +105,7 @@ def _as_made(kit: Kit, sample: Sample) -> Assembly:
 def _found(kit: Kit, assembly: Assembly, poses: FloatArray, others: Assembly) -> BoolArray:
     """Return which parts of an assembly, moved to `poses`, are among those `there`, bool (n,)."""
     gaps = np.abs(poses[:, None] - others.poses).max(axis=(2, 3))
-    is_there: BoolArray = ((gaps < kit.pose_tolerance) & (assembly.types[:, None] == others.types)).any(axis=1)
-    return is_there
+    return ((gaps < kit.pose_tolerance) & (assembly.types[:, None] == others.types)).any(axis=1)
 
 
 def _row(kit: Kit, key: str, drawn: DrawnReplacement) -> list[Cell]:
