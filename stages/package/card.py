@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEMA
+from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEMA, VERIFIER
 from stages.package.sources import SourceTally
 from stages.package.tables import class_table, member_table, origin_table, reject_table, source_table, split_table
 
@@ -131,8 +131,8 @@ def card(
         *([reject_table(text.rejects)] if text.rejects else []),
         *text.paragraphs,
         "## Verification",
-        f"`sha256sum -c {CHECKSUMS}` checks every file; `make verify` also checks every sample against its record, and "
-        "recomputes contacts from meshes.",
+        f"`sha256sum -c {CHECKSUMS}` checks every file. `python {VERIFIER}` needs numpy and trimesh only. It also "
+        "checks every record, and the geometry of 100 samples. `make verify` of Shapemill checks statics and drawings.",
         "## Licence and citation",
         f"{facts['license']}.",
         *(["Made from:", origin_table(text.origins)] if text.origins else []),

@@ -5,15 +5,27 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, BinaryIO, cast
 
 from pipeline.paths import file_digest
 from pipeline.stage import Outcome, Task
+from stages.package import standalone_verifier
 from stages.package.card import CardText, card, citation
 from stages.package.classes import count_classes, table_bytes
 from stages.package.hashing import HashingStream
 from stages.package.index import column_kinds, read_rows, write_index
-from stages.package.layout import CARD, CHECKSUMS, CLASSES, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
+from stages.package.layout import (
+    CARD,
+    CHECKSUMS,
+    CLASSES,
+    CROISSANT,
+    MANIFEST,
+    PREVIEW,
+    SCHEMA,
+    VERIFIER,
+    index_path,
+)
 from stages.package.manifest import checksums, manifest
 from stages.package.sources import SourceTally
 from stages.shape.collection.classes import Classes
@@ -21,7 +33,7 @@ from stages.shape.collection.discovery import language_of
 
 
 def compose_dataset(task: Task) -> Outcome:
-    """Write card, Croissant, schema, classes, manifest, checksums and index.
+    """Write card, Croissant, schema, classes, manifest, checksums, verifier and index.
 
     Params of the shard:
 
@@ -64,6 +76,7 @@ def compose_dataset(task: Task) -> Outcome:
         CROISSANT: _text(croissant(facts, shards, members, indexed, class_file, params["origins"], citation(facts))),
         SCHEMA: _text(params["schema"]),
         CLASSES: class_table,
+        VERIFIER: Path(standalone_verifier.__file__).read_bytes(),
     }
     digests = {file: hashlib.sha256(content).hexdigest() for file, content in files.items()}
     digests[PREVIEW] = file_digest(task.input("package", f"{params['preview']}.png"))

@@ -11,6 +11,7 @@ SCHEMA = "schema.json"
 CLASSES = "classes.json"
 CHECKSUMS = "checksums.txt"
 PREVIEW = "preview.png"
+VERIFIER = "verify.py"
 INDEX = "index"
 """Name of the index in `croissant.json`."""
 

@@ -10,7 +10,17 @@ from typing import Any
 from pipeline.config import Config
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.package.compose import compose_dataset
-from stages.package.layout import CARD, CHECKSUMS, CLASSES, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
+from stages.package.layout import (
+    CARD,
+    CHECKSUMS,
+    CLASSES,
+    CROISSANT,
+    MANIFEST,
+    PREVIEW,
+    SCHEMA,
+    VERIFIER,
+    index_path,
+)
 from stages.package.manifest import config_sections
 from stages.package.member_descriptions import describe_members
 from stages.package.merge import merge_shard
@@ -119,7 +129,8 @@ def publish(plan: Plan) -> Mapping[str, str]:
     if DATASET_SHARD not in plan.shards("package"):
         return {}
     files = {
-        f"{name}/{file}": f"{DATASET_SHARD}.{file}" for file in (CARD, CROISSANT, SCHEMA, CLASSES, MANIFEST, CHECKSUMS)
+        f"{name}/{file}": f"{DATASET_SHARD}.{file}"
+        for file in (CARD, CROISSANT, SCHEMA, CLASSES, VERIFIER, MANIFEST, CHECKSUMS)
     }
     files[f"{name}/{PREVIEW}"] = f"{PREVIEW_SHARD}.png"
     files[index_path(plan.config)] = f"{DATASET_SHARD}.parquet"

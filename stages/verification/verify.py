@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.randomness import decision_rng
-from stages.package.layout import MANIFEST
+from stages.package.layout import MANIFEST, VERIFIER
 from stages.verification.files import (
     ClassCounts,
     SampleRow,
@@ -70,10 +70,22 @@ def verify_dataset(folder: Path, samples: int | None, seed: int, workers: int = 
         findings.add(shard_findings)
         rows += shard_rows
         tally.update(counts)
+    _check_standalone(folder, samples, seed, workers, findings)
     check_splits(manifest, rows, findings)
     if len(work) == len(manifest["shards"]):
         check_classes(folder, tally, findings)
     return findings
+
+
+def _check_standalone(folder: Path, samples: int | None, seed: int, workers: int, findings: Findings) -> None:
+    """Run the verifier that comes with each dataset: our copy of it, since a dataset may be a stranger's."""
+    from stages.package.standalone_verifier import verify
+
+    found = verify(folder, samples, seed, workers)
+    findings.look(VERIFIER, found.checked["samples"])
+    for fault in found.faults:
+        where, _, what = fault.partition(": ")
+        findings.fault(VERIFIER, where, what)
 
 
 def _check_shards(

@@ -1,0 +1,551 @@
+#!/usr/bin/env python3
+"""Verify the dataset in this folder. It needs Python 3.10, numpy and trimesh, and nothing of what made the dataset.
+
+    python verify.py                       # all files and records, and the geometry of 100 samples
+    python verify.py --samples all         # the geometry of all samples
+    python verify.py FOLDER --samples 20 --workers 8
+
+It derives from the files what can be derived, by code of its own: checksums, members, records, counts, splits, and from
+the GLB of a sample its bounds, its parts and poses, points and normals, contacts, and the outline of its drawings.
+Each fault is printed with its file and sample. Exit code 0: no fault; 1: faults.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import io
+import json
+import struct
+import sys
+import tarfile
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+
+POSE_TOLERANCE_SHARE = 1e-5
+"""Largest difference of poses and bounds, as a share of the diagonal."""
+POINT_TOLERANCE_SHARE = 1e-4
+"""Largest distance of a point from its part, as a share of the diagonal."""
+MIN_NORMAL_COSINE = 0.99
+POINTS_PER_SAMPLE = 128
+"""Points whose place on the mesh is checked."""
+PAIRS_PER_SAMPLE = 64
+"""Pairs of parts whose contact is checked."""
+VERTICES_PER_PAIR = 16
+OUTLINE_PIXELS = 4.0
+"""Largest distance of a drawing's outline from that of the mesh, besides the line width."""
+INK_LEVEL = 128
+FAULTS_SHOWN = 20
+DISTINCT = ("key", "shape graph", "mesh")
+"""What no two splits share; a key is there once."""
+NOT_CHECKED = "not checked: physical stability (only rootedness is), strings and programs, the Parquet index"
+
+
+@dataclass
+class DatasetFindings:
+    """What was found in a shard, or in the whole dataset.
+
+    faults: sentences, each with its file
+    checked: numbers of things checked
+    split_of: for keys, shape graphs and meshes, by kind: the split and the sample where each was first seen
+    classes: numbers of shapes and parts, by field, class and split
+    """
+
+    faults: list[str] = field(default_factory=list)
+    checked: Counter[str] = field(default_factory=Counter)
+    split_of: dict[str, dict[str, tuple[str, str]]] = field(default_factory=lambda: {kind: {} for kind in DISTINCT})
+    classes: Counter[tuple[str, int, str]] = field(default_factory=Counter)
+
+    def see(self, kind: str, name: str, split: str, sample: str) -> None:
+        """Note where a key, a shape graph or a mesh is, and whether it is in another split too."""
+        first_split, first = self.split_of[kind].setdefault(name, (split, sample))
+        if first != sample and (kind == "key" or first_split != split):
+            self.faults.append(f"{sample}: its {kind} is that of {first} in {first_split} too")
+
+    def add(self, other: DatasetFindings) -> None:
+        """Add the findings of a shard."""
+        self.faults += other.faults
+        self.checked.update(other.checked)
+        self.classes.update(other.classes)
+        for kind, names in other.split_of.items():
+            for name, (split, sample) in names.items():
+                self.see(kind, name, split, sample)
+
+
+def verify(folder: Path, samples: int | None = 100, seed: int = 0, workers: int = 1) -> DatasetFindings:
+    """Return the findings of a dataset. samples: number of samples whose geometry is checked; None for all."""
+    findings = DatasetFindings()
+    listed = check_files(folder, findings)
+    try:
+        manifest = json.loads((folder / "manifest.json").read_bytes())
+        class_rows = json.loads((folder / "classes.json").read_bytes())
+        classes = {int(row["id"]): (row["name"], row["shapes"], row["parts"]) for row in class_rows}
+        counts = [(str(shard["path"]), str(shard["split"]), int(shard["samples"])) for shard in manifest["shards"]]
+        total, splits = int(manifest["samples"]), dict(manifest["splits"])
+        members = [(str(member["name"]), str(member["dtype"]), list(member["shape"])) for member in manifest["members"]]
+        share_split = bool(manifest.get("graphs_share_split"))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        findings.faults.append(f"manifest.json or classes.json cannot be read: {error!r}")
+        return findings
+    count = total if samples is None else min(samples, total)
+    chosen = set(np.random.default_rng(seed).permutation(total)[:count].tolist())
+    labels = {number: str(name) for number, (name, _, _) in classes.items()}
+    jobs, first = [], 0
+    for number, (path, split, size) in enumerate(counts):
+        if path in listed:
+            places = {place - first for place in chosen if first <= place < first + size}
+            jobs.append(ShardJob(folder, path, split, members, labels, share_split, places, (seed, number)))
+        else:
+            findings.faults.append(f"{path}: is in manifest.json and not in checksums.txt")
+        first += size
+    with ProcessPoolExecutor(workers) if workers > 1 else nullcontext() as pool:
+        for result in pool.map(check_shard, jobs) if pool else map(check_shard, jobs):
+            findings.add(result)
+    for path, split, size in counts:
+        if findings.checked.pop(path, 0) != size:
+            findings.faults.append(f"{path}: does not have the {size} samples that manifest.json counts in {split}")
+    if sum(splits.values()) != total or total != sum(size for _, _, size in counts):
+        findings.faults.append(f"manifest.json: its splits and shards do not add up to {total} samples")
+    for number, (name, shapes, parts) in classes.items():
+        for kind, stated in (("shapes", shapes), ("parts", parts)):
+            for split, expected in stated.items():
+                if findings.classes[kind, number, split] != expected:
+                    actual = findings.classes[kind, number, split]
+                    findings.faults.append(f"classes.json: {name}: {expected} {kind} in {split}; there are {actual}")
+    return findings
+
+
+def check_files(folder: Path, findings: DatasetFindings) -> set[str]:
+    """Compare every file with checksums.txt; return the files inside the folder that it lists."""
+    try:
+        lines = (folder / "checksums.txt").read_text(encoding="utf-8").splitlines()
+        digests = {name: digest for digest, name in (line.split("  ", 1) for line in lines)}
+    except (OSError, ValueError) as error:
+        findings.faults.append(f"checksums.txt cannot be read: {error}")
+        return set()
+    inside = set()
+    for name, digest in digests.items():
+        path = folder / name
+        if not path.is_file() or folder.resolve() not in path.resolve().parents:
+            findings.faults.append(f"{name}: is missing")
+            continue
+        inside.add(name)
+        if file_digest(path) != digest:
+            findings.faults.append(f"{name}: is corrupted: its sha256 is not that of checksums.txt")
+        findings.checked["files"] += 1
+    for path in sorted(folder.rglob("*")):
+        name = path.relative_to(folder).as_posix()
+        empty = path.is_dir() and not any(path.iterdir())
+        if empty or path.is_symlink() or (path.is_file() and name not in {*digests, "checksums.txt"}):
+            findings.faults.append(f"{name}: does not belong to the dataset")
+    return inside
+
+
+@dataclass(frozen=True)
+class ShardJob:
+    """A shard to check.
+
+    members: name, dtype and shape of each member
+    labels: name of each class
+    places: samples whose geometry is checked, by their place in the shard
+    """
+
+    folder: Path
+    path: str
+    split: str
+    members: list[tuple[str, str, list[Any]]]
+    labels: dict[int, str]
+    graphs_share_split: bool
+    places: set[int]
+    seed: tuple[int, int]
+
+
+def check_shard(job: ShardJob) -> DatasetFindings:
+    """Return the findings of a shard, whatever its files hold."""
+    findings = DatasetFindings()
+    rng = np.random.default_rng(job.seed)
+    for place, (key, members) in enumerate(read_shard(job.folder / job.path, job.path, findings)):
+        try:
+            for text in sample_faults(job, key, members, findings, rng if place in job.places else None):
+                findings.faults.append(f"{job.path}: {key}: {text}")
+        except Exception as error:
+            findings.faults.append(f"{job.path}: {key}: cannot be read: {type(error).__name__}: {error}")
+        findings.checked.update(["samples", job.path])
+    return findings
+
+
+def read_shard(path: Path, name: str, findings: DatasetFindings) -> Iterator[tuple[str, dict[str, bytes]]]:
+    """Yield key and members of each sample of a shard."""
+    key, members = "", dict[str, bytes]()
+    try:
+        with tarfile.open(path) as tar:
+            for entry in tar:
+                entry_key, _, member = entry.name.partition(".")
+                stream = tar.extractfile(entry)
+                if entry_key != key:
+                    if members:
+                        yield key, members
+                    key, members = entry_key, {}
+                if stream is None or member in members:
+                    findings.faults.append(f"{name}: {entry.name}: is no plain file, or is there twice")
+                else:
+                    members[member] = stream.read()
+    except (OSError, tarfile.TarError) as error:
+        findings.faults.append(f"{name}: cannot be read: {error}")
+    if members:
+        yield key, members
+
+
+def sample_faults(
+    job: ShardJob, key: str, members: dict[str, bytes], findings: DatasetFindings, rng: np.random.Generator | None
+) -> Iterator[str]:
+    """Yield what is wrong with a sample. rng: chooses points and pairs; without it the geometry is not checked."""
+    declared = {name for name, _, _ in job.members}
+    if {*declared, "json"} != {*members, "json"}:
+        yield f"has the members {sorted(members)}, manifest.json lists {sorted(declared)}"
+    record = json.loads(members["json"])
+    if record["key"] != key or record["split"] != job.split:
+        yield f"its record is of {record['key']} in {record['split']}, the shard is of {job.split}"
+    if has_empty_value(record):
+        yield "its json holds a null or an empty value"
+    arrays = {}
+    for name, dtype, shape in job.members:
+        if name.endswith(".npy") and name in members:
+            array = arrays[name] = np.load(io.BytesIO(members[name]), allow_pickle=False)
+            sizes = zip(array.shape, shape, strict=False)
+            right = array.ndim == len(shape) and all(size == given for size, given in sizes if isinstance(given, int))
+            if array.dtype != dtype or not right:
+                yield f"{name} is {array.dtype} {array.shape}, not {dtype} {shape}"
+            if array.dtype.kind == "f" and not np.isfinite(array).all():
+                yield f"{name} holds values that are not finite"
+    yield from record_faults(job, record, members, arrays, findings)
+    if "labels.npy" in arrays:
+        yield from label_faults(record, arrays)
+    if rng is not None and "glb" in members:
+        yield from geometry_faults(record, members, arrays, rng)
+        findings.checked["samples with geometry"] += 1
+
+
+def has_empty_value(value: Any) -> bool:
+    """Return whether JSON holds a null, or an empty list, object or text."""
+    if isinstance(value, dict | list):
+        return not value or any(map(has_empty_value, value.values() if isinstance(value, dict) else value))
+    return value is None or value == ""
+
+
+def record_faults(
+    job: ShardJob,
+    record: dict[str, Any],
+    members: dict[str, bytes],
+    arrays: dict[str, np.ndarray],
+    findings: DatasetFindings,
+) -> Iterator[str]:
+    """Yield what is wrong with parts, counts, text and joints, and note classes, graph and mesh."""
+    parts, counts, sample = record["parts"], record["counts"], f"{job.path}: {record['key']}"
+    names = [part["name"] for part in parts]
+    if len(set(names)) != len(parts) or [part["instance"] for part in parts] != list(range(len(parts))):
+        yield "names or numbers of its parts are not distinct"
+    for part in parts:
+        if job.labels.get(part["class"]) != part["label"]:
+            yield f"{part['name']}: class {part['class']} is not {part['label']} in classes.json"
+    findings.classes.update(("parts", part["class"], job.split) for part in parts)
+    findings.classes.update({("shapes", part["class"], job.split) for part in parts})
+    if (counts["parts"], counts["types"]) != (len(parts), len({part["label"] for part in parts})):
+        yield f"counts {counts['parts']} parts and {counts['types']} types; its list of parts differs"
+    if "contacts.npy" in arrays:
+        contacts = arrays["contacts.npy"]
+        yield from pair_faults("contacts.npy", contacts, len(parts))
+        pieces = component_count(len(parts), contacts)
+        expected = (contacts.shape[1], pieces, contacts.shape[1] - len(parts) + pieces)
+        stated = (counts["contacts"], counts["pieces"], counts["cycles"])
+        if expected != stated:
+            yield f"counts {stated} contacts, pieces and cycles; contacts.npy makes {expected}"
+    if "joints.npy" in arrays:
+        yield from pair_faults("joints.npy", arrays["joints.npy"], len(parts))
+        components = component_count(len(parts), arrays["joints.npy"])
+        if record["physics"]["components"] != components:
+            yield f"counts {record['physics']['components']} components; joints.npy makes {components}"
+    if "txt" in members and not members["txt"].decode().startswith(record["text"]):
+        yield "its text is not that of the record"
+    findings.see("key", record["key"], job.split, sample)
+    if job.graphs_share_split:
+        findings.see("shape graph", record["graph"], job.split, sample)
+    if "glb" in members:
+        findings.see("mesh", hashlib.sha256(members["glb"]).hexdigest(), job.split, sample)
+
+
+def label_faults(record: dict[str, Any], arrays: dict[str, np.ndarray]) -> Iterator[str]:
+    """Yield what is wrong with labels, instances and normals of points."""
+    instances, classes = arrays["instances.npy"], np.array([part["class"] for part in record["parts"]])
+    if instances.size and not 0 <= instances.min() <= instances.max() < len(classes):
+        yield "instances.npy names a part that the record does not have"
+    elif not np.array_equal(classes[instances], arrays["labels.npy"]):
+        yield "labels.npy are not the classes of the parts in instances.npy"
+    if np.abs(np.linalg.norm(arrays["normals.npy"], axis=1) - 1).max(initial=0) > 1e-3:
+        yield "normals.npy are no unit vectors"
+
+
+def geometry_faults(
+    record: dict[str, Any], members: dict[str, bytes], arrays: dict[str, np.ndarray], rng: np.random.Generator
+) -> Iterator[str]:
+    """Yield what the mesh says against record, points, contacts and drawings."""
+    scene: Any = trimesh.load_scene(io.BytesIO(members["glb"]), file_type="glb", process=False)
+    extras = glb_extras(members["glb"])
+    triangles: list[np.ndarray] = []
+    low, high = np.array(record["bounds"][0]), np.array(record["bounds"][1])
+    diagonal = float(np.linalg.norm(high - low))
+    for part in record["parts"]:
+        name = part["name"]
+        if name not in extras:
+            yield f"{name}: is no node of the GLB"
+            return
+        if any(extras[name].get(fact) != part[fact] for fact in ("class", "instance")):
+            yield f"{name}: the GLB says {extras[name]}, the record class {part['class']}"
+        matrix, geometry = scene.graph.get(name)
+        if "pose" in part and np.abs(matrix - np.array(part["pose"])).max() > POSE_TOLERANCE_SHARE * max(diagonal, 1):
+            yield f"{name}: its pose in the GLB is not that of the record"
+        triangles.append(np.array(scene.geometry[geometry].triangles) @ matrix[:3, :3].T + matrix[:3, 3])
+    if len(extras) != len(record["parts"]):
+        yield f"the GLB has {len(extras)} parts, the record {len(record['parts'])}"
+    corners = np.concatenate(triangles).reshape(-1, 3)
+    gap = max(np.abs(corners.min(axis=0) - low).max(), np.abs(corners.max(axis=0) - high).max())
+    if gap > POSE_TOLERANCE_SHARE * diagonal:
+        yield f"its bounds differ from those of the GLB by {gap:.3g}"
+    if "points.npy" in arrays:
+        yield from point_faults(record, triangles, arrays, POINT_TOLERANCE_SHARE * diagonal, rng)
+    if "contacts.npy" in arrays:
+        tolerance = max(float(record["contact_tolerance"]), 1e-6 * diagonal)
+        names = [part["name"] for part in record["parts"]]
+        yield from contact_faults(names, triangles, arrays["contacts.npy"], tolerance, rng)
+    if "joints.npy" in arrays:
+        yield from rooted_faults(record, triangles, arrays["joints.npy"], diagonal)
+    for index, camera in enumerate(record.get("sketches", ())):
+        yield from drawing_faults(f"sketch{index}.png", members[f"sketch{index}.png"], camera, corners)
+
+
+def point_faults(
+    record: dict[str, Any],
+    triangles: list[np.ndarray],
+    arrays: dict[str, np.ndarray],
+    tolerance: float,
+    rng: np.random.Generator,
+) -> Iterator[str]:
+    """Yield points outside the bounds, and what is wrong with a random choice of points."""
+    made = record["points"]
+    points = arrays["points.npy"].astype(np.float64) / made["scale"] + np.array(made["centre"])
+    instances, normals = arrays["instances.npy"], arrays["normals.npy"]
+    low, high = np.array(record["bounds"])
+    if (points < low - tolerance).any() or (points > high + tolerance).any():
+        yield "points lie outside its bounds"
+    for index in rng.permutation(len(points))[:POINTS_PER_SAMPLE].tolist():
+        near = near_triangles(triangles[instances[index]], points[index], tolerance)
+        if not len(near):
+            yield f"point {index} does not lie on its part"
+            return
+        across = np.cross(near[:, 1] - near[:, 0], near[:, 2] - near[:, 0])
+        lengths = np.linalg.norm(across, axis=1)
+        cosines = across[lengths > 0] @ normals[index] / lengths[lengths > 0]
+        if len(cosines) and cosines.max() < MIN_NORMAL_COSINE:
+            yield f"the normal of point {index} is not that of its face"
+            return
+
+
+def contact_faults(
+    names: list[str], triangles: list[np.ndarray], contacts: np.ndarray, tolerance: float, rng: np.random.Generator
+) -> Iterator[str]:
+    """Yield contacts of parts that are apart, and pairs that touch at a vertex and are no contact."""
+    boxes = [(part.reshape(-1, 3).min(axis=0), part.reshape(-1, 3).max(axis=0)) for part in triangles]
+
+    def apart(first: int, second: int) -> bool:
+        (low, high), (other_low, other_high) = boxes[first], boxes[second]
+        return bool((low - other_high > tolerance).any() or (other_low - high > tolerance).any())
+
+    listed = {(first, second) for first, second in contacts.T.tolist()}
+    for first, second in sorted(listed):
+        if apart(first, second):
+            yield f"{names[first]} and {names[second]} are in contacts.npy, and are apart"
+    near = [pair for pair in combinations(range(len(triangles)), 2) if pair not in listed and not apart(*pair)]
+    for place in rng.permutation(len(near))[:PAIRS_PER_SAMPLE].tolist():
+        for first, second in (near[place], near[place][::-1]):
+            vertices = np.unique(triangles[first].reshape(-1, 3), axis=0)
+            low, high = boxes[second]
+            inside = vertices[((vertices >= low - tolerance) & (vertices <= high + tolerance)).all(axis=1)]
+            for vertex in inside[rng.permutation(len(inside))[:VERTICES_PER_PAIR]]:
+                if len(near_triangles(triangles[second], vertex, 0.5 * tolerance)):
+                    yield f"{names[first]} and {names[second]} touch, and are not in contacts.npy"
+                    return
+
+
+def near_triangles(triangles: np.ndarray, point: np.ndarray, tolerance: float) -> np.ndarray:
+    """Return the triangles (n, 3, 3) that are at most `tolerance` from a point."""
+    low, high = triangles.min(axis=1), triangles.max(axis=1)
+    near: np.ndarray = triangles[((low <= point + tolerance) & (high >= point - tolerance)).all(axis=1)]
+    if len(near):
+        closest = trimesh.triangles.closest_point(near, np.repeat(point[None], len(near), axis=0))
+        near = near[np.linalg.norm(closest - point, axis=1) <= tolerance]
+    return near
+
+
+def file_digest(path: Path) -> str:
+    """Return the sha256 of a file."""
+    digest = hashlib.sha256()
+    with open(path, "rb") as stream:
+        while block := stream.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def component_of(count: int, pairs: np.ndarray) -> np.ndarray:
+    """Return a representative of the connected component of each of `count` nodes, int64 (count,). pairs: (2, n)."""
+    parent = list(range(count))
+
+    def root(node: int) -> int:
+        while parent[node] != node:
+            parent[node] = parent[parent[node]]
+            node = parent[node]
+        return node
+
+    for first, second in pairs.T.tolist():
+        parent[root(first)] = root(second)
+    return np.array([root(node) for node in range(count)], dtype=np.int64)
+
+
+def component_count(count: int, pairs: np.ndarray) -> int:
+    """Return the number of connected components of `count` nodes. pairs: (2, n)."""
+    return len(np.unique(component_of(count, pairs)))
+
+
+def pair_faults(name: str, pairs: np.ndarray, count: int) -> Iterator[str]:
+    """Yield what is wrong with pairs of parts, (2, n)."""
+    if not pairs.size:
+        return
+    if pairs.min() < 0 or pairs.max() >= count:
+        yield f"{name} names a part that the record does not have"
+    if (pairs[0] >= pairs[1]).any() or len(np.unique(pairs, axis=1).T) != pairs.shape[1]:
+        yield f"{name} holds a pair twice, of one part, or in the wrong order"
+
+
+def rooted_faults(
+    record: dict[str, Any], triangles: list[np.ndarray], joints: np.ndarray, diagonal: float
+) -> Iterator[str]:
+    """Yield a verdict on rootedness that joints and heights contradict; parts near the limit are left open."""
+    lowest = np.array([part[..., 1].min() for part in triangles])
+    ground = record["bounds"][0][1]
+    margin = 1e-4 * diagonal
+    tolerance = float(record["joint_tolerance"])
+    component = component_of(len(triangles), joints)
+    surely = set(component[lowest <= ground + margin].tolist())
+    possibly = set(component[lowest <= ground + tolerance + margin].tolist())
+    if record["physics"]["rooted"] and set(component.tolist()) - possibly:
+        yield "is called rooted, and a part is not connected to the ground"
+    if not record["physics"]["rooted"] and not set(component.tolist()) - surely:
+        yield "is called not rooted, and all parts are connected to the ground"
+
+
+def glb_extras(content: bytes) -> dict[str, dict[str, Any]]:
+    """Return the `extras` of the nodes of a GLB that have a class, by name."""
+    length = struct.unpack_from("<I", content, 12)[0]
+    nodes = json.loads(content[20 : 20 + length])["nodes"]
+    return {node["name"]: node["extras"] for node in nodes if "class" in node.get("extras", {})}
+
+
+def drawing_faults(name: str, content: bytes, camera: dict[str, Any], corners: np.ndarray) -> Iterator[str]:
+    """Yield a drawing whose ink does not reach as far as the mesh does in its camera."""
+    pixels = grey_png(content)
+    if pixels.shape != (camera["height"], camera["width"]):
+        yield f"{name} has {pixels.shape} pixels, its camera {camera['height']} x {camera['width']}"
+        return
+    rows, columns = np.nonzero(pixels < INK_LEVEL)
+    if not len(rows):
+        yield f"{name} is blank"
+        return
+    seen = np.unique(corners, axis=0) @ np.array(camera["world_to_camera"])[:3, :3].T
+    seen = seen + np.array(camera["world_to_camera"])[:3, 3]
+    depth = seen[:, 2:] if camera["projection"] == "perspective" else np.ones((len(seen), 1))
+    if (depth <= 0).any():
+        return
+    places = np.concatenate([seen[:, :2] / depth, np.ones((len(seen), 1))], axis=1) @ np.array(camera["intrinsics"]).T
+    limit = OUTLINE_PIXELS + float(camera["line_width"])
+    size = np.array([camera["width"], camera["height"]])
+    low, high = np.clip(places[:, :2].min(axis=0), 0, size), np.clip(places[:, :2].max(axis=0), 0, size)
+    ink = np.array([columns.min(), rows.min()]), np.array([columns.max() + 1, rows.max() + 1])
+    gap = max(np.abs(low - ink[0]).max(), np.abs(high - ink[1]).max())
+    if gap > limit:
+        yield f"{name}: the outline of the drawing is {gap:.0f} pixels from that of the mesh"
+
+
+def grey_png(content: bytes) -> np.ndarray:
+    """Return the pixels of an 8-bit grey PNG without interlacing, uint8 (h, w). Raises ValueError for another file."""
+    if content[:8] != b"\x89PNG\r\n\x1a\n":
+        raise ValueError("no PNG")
+    place, data, header = 8, b"", b""
+    while place < len(content):
+        size, kind = struct.unpack_from(">I4s", content, place)
+        body = content[place + 8 : place + 8 + size]
+        header, data = (body if kind == b"IHDR" else header), (data + body if kind == b"IDAT" else data)
+        place += size + 12
+    width, height, depth, color, _, _, interlace = struct.unpack(">IIBBBBB", header)
+    if (depth, color, interlace) != (8, 0, 0):
+        raise ValueError("no grey PNG of 8 bits")
+    lines = np.frombuffer(zlib.decompress(data), np.uint8).reshape(height, width + 1)
+    pixels = np.zeros((height, width), np.uint8)
+    above = np.zeros(width, np.int64)
+    for row, line in enumerate(lines):
+        pixels[row] = above = unfiltered(int(line[0]), line[1:].astype(np.int64), above)
+    return pixels
+
+
+def unfiltered(kind: int, line: np.ndarray, above: np.ndarray) -> np.ndarray:
+    """Return a line of a PNG without its filter, int64 (w,)."""
+    if kind == 0:
+        return line
+    if kind == 1:
+        return np.cumsum(line) % 256
+    result: np.ndarray = (line + above) % 256
+    if kind == 2:
+        return result
+    result = np.zeros_like(line)
+    left = corner = 0
+    for column, value in enumerate(line.tolist()):
+        up = int(above[column])
+        if kind == 3:
+            guess = (left + up) // 2
+        else:
+            gaps = abs(up - corner), abs(left - corner), abs(left + up - 2 * corner)
+            guess = (left, up, corner)[gaps.index(min(gaps))]
+        left, corner = (value + guess) % 256, up
+        result[column] = left
+    return result
+
+
+def main() -> int:
+    """Verify, print, and return the exit code."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
+    parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).resolve().parent)
+    parser.add_argument("--samples", default="100", help="samples whose geometry is checked: a number, or all")
+    parser.add_argument("--seed", type=int, default=0, help="of the choice of samples")
+    parser.add_argument("--workers", type=int, default=1, help="number of processes")
+    options = parser.parse_args()
+    samples = None if options.samples == "all" else int(options.samples)
+    findings = verify(options.folder, samples, options.seed, options.workers)
+    print("\n".join(findings.faults[:FAULTS_SHOWN]), end="\n" * bool(findings.faults))
+    if len(findings.faults) > FAULTS_SHOWN:
+        print(f"and {len(findings.faults) - FAULTS_SHOWN} more")
+    print("checked:", ", ".join(f"{count} {what}" for what, count in findings.checked.items()))
+    print(NOT_CHECKED)
+    print(f"{len(findings.faults)} faults" if findings.faults else "good")
+    return 1 if findings.faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

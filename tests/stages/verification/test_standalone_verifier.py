@@ -1,0 +1,110 @@
+"""The verifier that comes with a dataset needs nothing of the project, and finds faults by itself."""
+
+from __future__ import annotations
+
+import ast
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from stages.package import standalone_verifier
+from stages.package.standalone_verifier import drawing_faults, grey_png, verify
+from tests.stages.verification.forge import FOLDER_FORGERIES, FORGERIES, copy_dataset, forge
+
+LEFT_OPEN = {
+    "a margin of its own",
+    "a graph of another name",
+    "stable flipped",
+    "the text of another sample in record too",
+    "points that are seen and are not",
+    "an edited card",
+}
+"""What only `make verify` finds: statics, strings and graphs are not derived without the project."""
+DRAWINGS = {"a mirrored sketch", "the sketch of another sample", "a blank sketch", "a truncated sketch"}
+"""The toy dataset has sketches of its own, which show nothing."""
+
+
+@pytest.fixture
+def folder(toy_folder: Path, tmp_path: Path) -> Path:
+    return copy_dataset(toy_folder, tmp_path, with_work=False)
+
+
+def test_it_imports_the_standard_library_numpy_and_trimesh_only() -> None:
+    tree = ast.parse(Path(standalone_verifier.__file__).read_text(encoding="utf-8"))
+    names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    names |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    packages = {name.partition(".")[0] for name in names}
+    assert packages <= {*sys.stdlib_module_names, "numpy", "trimesh"}
+
+
+def test_it_runs_alone_in_the_folder_of_a_dataset(folder: Path) -> None:
+    command = [sys.executable, "-I", str(folder / "verify.py"), "--samples", "all"]
+    done = subprocess.run(command, cwd=folder.parent, capture_output=True, text=True, check=False)
+    assert "23 samples with geometry" in done.stdout
+    assert done.stdout.endswith("good\n")
+    assert done.returncode == 0
+
+
+def test_workers_make_no_difference(folder: Path) -> None:
+    forge(folder, "bounds twice as large", np.random.default_rng(0))
+    one, two = verify(folder, None), verify(folder, None, workers=2)
+    assert one == two
+    assert one.faults
+
+
+@pytest.mark.parametrize("name", sorted({*FORGERIES} - DRAWINGS - LEFT_OPEN))
+def test_a_forged_sample_is_found_without_the_project(folder: Path, name: str) -> None:
+    key = forge(folder, name, np.random.default_rng(len(name)))
+    faults = verify(folder, None).faults
+    assert any(key in fault for fault in faults), faults
+
+
+@pytest.mark.parametrize("name", sorted({*FOLDER_FORGERIES} - LEFT_OPEN))
+def test_a_forged_folder_is_found_without_the_project(folder: Path, name: str) -> None:
+    forge(folder, name, np.random.default_rng(0))
+    assert verify(folder, 0).faults
+
+
+def test_shard_outside_the_folder_is_not_opened(folder: Path) -> None:
+    listing = folder / "checksums.txt"
+    listing.write_text(f"{'0' * 64}  ../toy-index/toy.parquet\n" + listing.read_text(encoding="utf-8"), "utf-8")
+    assert "../toy-index/toy.parquet: is missing" in verify(folder, 0).faults
+
+
+def test_a_drawing_must_reach_as_far_as_the_mesh_in_its_camera() -> None:
+    corners = np.array([[0, 0, 1.0], [1, 0, 1], [1, 2, 1], [0, 2, 3]])
+    camera = {
+        "width": 100,
+        "height": 90,
+        "projection": "orthographic",
+        "line_width": 1.0,
+        "world_to_camera": np.eye(4).tolist(),
+        "intrinsics": [[20, 0, 30], [0, 20, 25], [0, 0, 1]],
+    }
+
+    def faults(left: int, top: int, right: int, bottom: int) -> list[str]:
+        pixels = np.full((90, 100), 255, np.uint8)
+        pixels[top : bottom + 1, left : right + 1] = 0
+        stream = io.BytesIO()
+        Image.fromarray(pixels).save(stream, "png")
+        return list(drawing_faults("sketch0.png", stream.getvalue(), camera, corners))
+
+    assert faults(30, 25, 50, 65) == []
+    assert faults(50, 25, 70, 65) == ["sketch0.png: the outline of the drawing is 21 pixels from that of the mesh"]
+    assert faults(30, 25, 50, 45) == ["sketch0.png: the outline of the drawing is 19 pixels from that of the mesh"]
+    assert faults(99, 89, 0, 0) == ["sketch0.png is blank"]
+
+
+@pytest.mark.parametrize("level", range(3))
+def test_png_lines_are_read_as_another_library_reads_them(level: int) -> None:
+    y, x = np.mgrid[:60, :70]
+    images = (np.uint8((x * y) % 256), np.random.default_rng(0).integers(0, 256, (60, 70)).astype(np.uint8))
+    stream = io.BytesIO()
+    pixels = np.uint8((x + 3 * y) % 256) if level == 2 else images[level]
+    Image.fromarray(pixels).save(stream, "png")
+    assert np.array_equal(grey_png(stream.getvalue()), pixels)
