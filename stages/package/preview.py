@@ -45,11 +45,11 @@ def draw_preview(task: Task) -> Outcome:
     params, config = task.shard.params, task.config.section(PackageConfig)
     sketches = task.config.section(SketchesConfig)
     backend = sketches.renderer
-    camera = BELOW if sketches.views[0].elevation < 0 else ABOVE
+    camera = BELOW if sketches.views and sketches.views[0].elevation < 0 else ABOVE
     collection, shards = Collection(task), params["shards"]
-    members_by_stage = {stage: _members(task, stage, shards) for stage in params["rows"]}
+    keys_by_stage = [_keys(task, stage, shards) for stage in params["rows"]]
     samples = [sample for shard in shards for sample in collection.samples(shard)]
-    complete = [sample for sample in samples if all(sample.key in added for added in members_by_stage.values())]
+    complete = [sample for sample in samples if all(sample.key in keys for keys in keys_by_stage)]
     complete = complete[:: -(-len(complete) // MAX_PREVIEW_CANDIDATES)]
     chosen = varied([(sample, collection.shape(sample)) for sample in complete], config.previewed)
     variants = [Cell(_picture(shape, camera, backend), part_count(shape)) for _, shape in chosen]
@@ -59,9 +59,9 @@ def draw_preview(task: Task) -> Outcome:
     ]
     if exemplars:
         sections.insert(0, Section("Exemplars", _rows(exemplars), "input"))
-    for stage, added in members_by_stage.items():
-        row = members()[stage].row
-        if row is not None:
+    for stage in params["rows"]:
+        added = _members(task, stage, shards, {sample.key for sample, _ in chosen[:PREVIEW_COLUMNS]})
+        for row in members()[stage].rows(task.config):
             cells = [Cell(row.draw(added[sample.key], camera, CELL_PIXELS)) for sample, _ in chosen[:PREVIEW_COLUMNS]]
             sections.append(Section(row.title, _rows(cells), row.caption(task.config)))
     with task.output(f"{task.shard.name}.png") as stream:
@@ -92,8 +92,14 @@ def _farthest(samples: Sequence[tuple[Sample, Shape]], count: int) -> list[tuple
     return [samples[index] for index in chosen]
 
 
-def _members(task: Task, stage: str, shards: Sequence[str]) -> dict[str, dict[str, bytes]]:
-    return {key: members for shard in shards for key, members in read_shard(task.input(stage, f"{shard}.tar"))}
+def _keys(task: Task, stage: str, shards: Sequence[str]) -> set[str]:
+    return {key for shard in shards for key, _ in read_shard(task.input(stage, f"{shard}.tar"))}
+
+
+def _members(task: Task, stage: str, shards: Sequence[str], keys: set[str]) -> dict[str, dict[str, bytes]]:
+    """Return the members of some samples by key."""
+    stored = (item for shard in shards for item in read_shard(task.input(stage, f"{shard}.tar")))
+    return {key: members for key, members in stored if key in keys}
 
 
 def _picture(shape: Shape, camera: Camera, backend: RendererName) -> ByteArray:

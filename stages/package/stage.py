@@ -61,7 +61,8 @@ def plan(plan: Plan) -> list[Shard]:
         return merged
     read = language_of(producer).reads(plan)
     preview_shards = [shard["name"] for shard in filled[:MAX_PREVIEW_SHARDS]]
-    rows = [stage for stage, added in members().items() if added.row and preview_shards[0] in plan.shards(stage)]
+    added = [stage for stage in members() if preview_shards[0] in plan.shards(stage)]
+    rows = [stage for stage in added if members()[stage].rows(plan.config)]
     preview = {
         "producer": producer,
         "title": plan.config.title or plan.config.name,

@@ -63,4 +63,4 @@ def _draw(members: Mapping[str, bytes], camera: Camera, size: int) -> ByteArray:
     return points_portrait(points.astype(np.float64), labels.astype(np.int32), camera, (size, size), "y")
 
 
-MEMBERS = Members(of=_members, fields=_fields, row=PreviewRow("Points", _caption, _draw))
+MEMBERS = Members(of=_members, fields=_fields, rows=lambda _: (PreviewRow("Points", _caption, _draw),))

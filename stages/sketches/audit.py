@@ -13,7 +13,7 @@ import numpy.typing as npt
 from stages.shape.arrays import FloatArray
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import PackagedSample
-from stages.sketches.cameras import projected
+from stages.shape.views.camera_record import pixel_rays, projected
 
 INK_SHARE_RANGE = (2e-4, 0.9)
 """Minimum and maximum share of ink, relative to a black picture."""
@@ -102,7 +102,7 @@ def outline_shares(
 
     step = max(1, -(-max(inked.shape) // RAYS_ACROSS))
     rows, columns = (np.arange(step // 2, length, step) for length in inked.shape)
-    origins, directions = _rays(camera, columns + 0.5, rows + 0.5)
+    origins, directions = pixel_rays(camera, columns + 0.5, rows + 0.5)
     hit = sample.rays.hit(origins.reshape(-1, 3), directions.reshape(-1, 3)).reshape(len(rows), len(columns))
     if not hit.any():
         return 0.0, 1.0
@@ -122,20 +122,8 @@ def _is_seen_near(pixel: npt.NDArray[np.int64], near: float, camera: Mapping[str
     place: row and column of the pixel, (2,)
     """
     offsets = np.arange(-near, near + FINE_RAY_SPACING_PIXELS, FINE_RAY_SPACING_PIXELS)
-    origins, directions = _rays(camera, pixel[1] + 0.5 + offsets, pixel[0] + 0.5 + offsets)
+    origins, directions = pixel_rays(camera, pixel[1] + 0.5 + offsets, pixel[0] + 0.5 + offsets)
     return bool(sample.rays.hit(origins.reshape(-1, 3), directions.reshape(-1, 3)).any())
-
-
-def _rays(camera: Mapping[str, Any], columns: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return origins and directions, float64 (h, w, 3), of the rays through picture points, in mesh coordinates."""
-    intrinsics, pose = np.array(camera["intrinsics"]), np.array(camera["world_to_camera"])
-    rotation, origin = pose[:3, :3].T, -pose[:3, :3].T @ pose[:3, 3]
-    x, y = np.meshgrid((columns - intrinsics[0, 2]) / intrinsics[0, 0], (rows - intrinsics[1, 2]) / intrinsics[1, 1])
-    ahead = np.stack([x, y, np.ones_like(x)], axis=-1)
-    if camera["projection"] == "perspective":
-        return np.broadcast_to(origin, ahead.shape), ahead @ rotation.T
-    in_plane = np.stack([x, y, np.zeros_like(x)], axis=-1)
-    return in_plane @ rotation.T + origin, np.broadcast_to(rotation[:, 2], ahead.shape)
 
 
 AUDIT = Audit(faults=sketch_faults)

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.errors import ShardFailed
 from stages.shape.arrays import ByteArray
-from stages.shape.views.buffers import RendererName, visible_triangles
+from stages.shape.views.buffers import RendererName, Visible, visible_triangles
 from stages.shape.views.camera import Camera, View
 from stages.shape.views.scene import Scene
 from stages.sketches.settings import SketchView, StrokeOptions
@@ -32,10 +32,19 @@ def draw_sketch(
 
     Raises ShardFailed if nothing is seen or drawn: a blank drawing is never a sample.
     """
+    seen = visible_triangles(scene, camera, (size * supersample, size * supersample), renderer)
+    drawing = draw_visible(seen, supersample, options)
+    if drawing.min() == drawing.max():
+        raise ShardFailed(f"blank drawing: no line of {len(scene)} parts is seen from {camera}")
+    return drawing, seen.view
+
+
+def draw_visible(seen: Visible, supersample: int, options: StrokeOptions) -> ByteArray:
+    """Return dark lines on white, uint8 (h, w), of a view with `supersample` samples to a pixel in x and y."""
     from stages.shape.views.ink import ink_strokes
     from stages.shape.views.strokes import BOUNDARY_LINE, CONTOUR_LINE, CREASE_LINE, OUTLINE_LINE, find_strokes
 
-    seen = visible_triangles(scene, camera, (size * supersample, size * supersample), renderer)
+    height, width = (length // supersample for length in seen.triangles.shape)
     strokes = find_strokes(seen, options.crease_angle, options.step * supersample, options.shortest * supersample)
     widths = {
         OUTLINE_LINE: options.outline,
@@ -43,8 +52,5 @@ def draw_sketch(
         BOUNDARY_LINE: options.boundary,
         CREASE_LINE: options.crease,
     }
-    ink = ink_strokes(strokes, widths, size, size, 1.0 / supersample, options.crowding)
-    drawing = np.rint(255.0 * (1.0 - options.ink * ink)).astype(np.uint8)
-    if drawing.min() == drawing.max():
-        raise ShardFailed(f"blank drawing: no line of {len(scene)} parts is seen from {camera}")
-    return drawing, seen.view
+    ink = ink_strokes(strokes, widths, width, height, 1.0 / supersample, options.crowding)
+    return np.rint(255.0 * (1.0 - options.ink * ink)).astype(np.uint8)

@@ -1,9 +1,7 @@
-"""Drawings as images: augmentations and PNG, both by OpenImageIO."""
+"""Augmentations of drawings, by OpenImageIO."""
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -56,24 +54,6 @@ def erode(drawing: ByteArray, size: int) -> ByteArray:
     import OpenImageIO as oiio
 
     return _pixels(oiio.ImageBufAlgo.dilate(_buffer(drawing), size, size))
-
-
-def png_bytes(drawing: ByteArray) -> bytes:
-    """Return the drawing (h, w) as a single-channel 8-bit PNG; equal drawings give equal bytes."""
-    import OpenImageIO as oiio
-
-    height, width = drawing.shape
-    spec = oiio.ImageSpec(width, height, 1, "uint8")
-    # OpenImageIO writes to files only.
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "drawing.png"
-        output = oiio.ImageOutput.create(str(path))
-        if output is None:
-            raise ShardFailed(f"OpenImageIO cannot write PNGs: {oiio.geterror()}")
-        written = output.open(str(path), spec) and output.write_image(np.ascontiguousarray(drawing)[:, :, None])
-        if not (output.close() and written):
-            raise ShardFailed(f"OpenImageIO cannot write a PNG: {output.geterror()}")
-        return path.read_bytes()
 
 
 def _buffer(drawing: ByteArray) -> Any:

@@ -11,7 +11,7 @@ from pipeline.config import Config
 from stages.shape.arrays import ByteArray
 from stages.shape.collection.members import Member, Members, PreviewRow, RecordField
 from stages.shape.views.camera import Camera
-from stages.sketches.cameras import CAMERA_FIELDS
+from stages.shape.views.camera_record import CAMERA_FIELDS
 from stages.sketches.settings import SketchesConfig
 
 
@@ -33,6 +33,10 @@ def _fields(_: Config) -> Mapping[str, RecordField]:
     properties = {
         "view": {"description": "its name in the config", "type": "string", "minLength": 1},
         **CAMERA_FIELDS,
+        "flipped": {
+            "description": "whether left and right are mirrored; intrinsics account for it",
+            "type": "boolean",
+        },
         "line_width": {"description": "no line is wider; unit: pixels", "type": "number", "exclusiveMinimum": 0},
     }
     return {
@@ -64,4 +68,4 @@ def _draw(members: Mapping[str, bytes], _: Camera, __: int) -> ByteArray:
     return np.asarray(Image.open(io.BytesIO(members["sketch0.png"])).convert("L"))
 
 
-MEMBERS = Members(of=_members, fields=_fields, row=PreviewRow("Sketches", _caption, _draw))
+MEMBERS = Members(of=_members, fields=_fields, rows=lambda _: (PreviewRow("Sketches", _caption, _draw),))

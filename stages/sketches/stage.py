@@ -13,11 +13,12 @@ from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.sample import Sample
 from stages.shape.views.buffers import renderer_version
+from stages.shape.views.camera_record import camera_fields
+from stages.shape.views.image_files import png_bytes
 from stages.shape.views.renderer_check import check_renderer
 from stages.shape.views.scene import Scene, scene_of
-from stages.sketches.cameras import camera_fields
 from stages.sketches.draw import draw_sketch, jittered_camera
-from stages.sketches.image import augment, png_bytes
+from stages.sketches.image import augment
 from stages.sketches.settings import SketchesConfig
 
 
@@ -57,7 +58,7 @@ def drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene) -
         if drawing.min() == drawing.max():
             raise ShardFailed(f"sample {sample.key}, view {view.name}: eroding by {config.augment.size} left no line")
         members[f"sketch{index}.png"] = png_bytes(drawing)
-        fields = camera_fields(seen, config.size, flipped)
+        fields = {**camera_fields(seen, config.size, config.size, flipped), "flipped": flipped}
         described.append({"view": view.name, **fields, "line_width": float(widest + thicker)})
     return {"json": json_bytes({"sketches": described}), **members}
 

@@ -11,11 +11,11 @@ from stages.shape.kit import Assembly, Grammar, Kit, PartType
 from stages.shape.shape import kit_shape
 from stages.shape.views.buffers import RendererName, render_buffers
 from stages.shape.views.camera import Camera
+from stages.shape.views.image_files import png_bytes
 from stages.shape.views.opengl import load_pyrender
 from stages.shape.views.renderer_check import check_triangle
 from stages.shape.views.scene import Scene, scene_of
 from stages.sketches.draw import draw_sketch
-from stages.sketches.image import png_bytes
 from stages.sketches.settings import StrokeOptions
 from tests.bench.measure import Measure, rate
 

@@ -19,7 +19,7 @@ TEXT = "txt"
 class Member:
     """One file of every sample.
 
-    name: what follows the key, such as `points.npy`; the suffix is the format: npy, png, txt, json or glb
+    name: what follows the key, such as `points.npy`; the suffix is the format: npy, png, jpg, webp, exr, txt, json, glb
     sentence: description for people
     dtype: dtype of an array
     shape: shape of an array, with a name for each length that differs between samples; arrays of one sample that share
@@ -69,6 +69,10 @@ def _no_fields(_: Config) -> Mapping[str, RecordField]:
     return {}
 
 
+def _no_rows(_: Config) -> Sequence[PreviewRow]:
+    return ()
+
+
 def _nothing_to_say(_: Plan) -> Sequence[str]:
     return ()
 
@@ -83,12 +87,12 @@ class Members:
     of: function of the config that returns the members
     fields: function of the config that returns the fields of the record by name
     columns: columns of the index by name
-    row: row of the preview, or None
+    rows: function of the config that returns the rows of the preview
     card: paragraphs and tables for the card's section on how the dataset was made, from finished records
     """
 
     of: Callable[[Config], tuple[Member, ...]]
     fields: Callable[[Config], Mapping[str, RecordField]] = _no_fields
     columns: Mapping[str, IndexColumn] = field(default_factory=dict)
-    row: PreviewRow | None = None
+    rows: Callable[[Config], Sequence[PreviewRow]] = _no_rows
     card: Callable[[Plan], Sequence[str]] = _nothing_to_say

@@ -36,7 +36,14 @@ def project_triangles(scene: Scene, view: View, moves: FloatArray, width: int, h
 
 def screen_normals(scene: Scene, view: View, screen: FloatArray) -> FloatArray:
     """Return unit normals of all triangles in eye space, turned towards the viewer, float64 (t, 3)."""
-    rotations = (view.eye @ scene.poses)[:, :3, :3]
+    return facing_normals(scene, (view.eye @ scene.poses)[:, :3, :3], screen)
+
+
+def facing_normals(scene: Scene, rotations: FloatArray, screen: FloatArray) -> FloatArray:
+    """Return unit normals of all triangles in eye space, turned towards the viewer, float64 (t, 3).
+
+    rotations: from the mesh coordinates of each part to eye space, float64 (n, 3, 3)
+    """
     parts, faces = scene.triangle_part, scene.triangle_face
     normals: FloatArray = _facing_normals(scene.meshes.normals, parts, faces, rotations, screen)
     return normals

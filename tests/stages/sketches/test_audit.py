@@ -11,8 +11,8 @@ import pytest
 
 from stages.shape.collection.packaged import PackagedSample
 from stages.shape.geometry.bounds import shape_bounds
+from stages.shape.views.image_files import png_bytes
 from stages.sketches.audit import AUDIT
-from stages.sketches.image import png_bytes
 from stages.sketches.settings import Augmentation
 from tests.stages.sketches.png import png_array
 from tests.stages.sketches.test_cameras import VIEWS, lopsided, sketch

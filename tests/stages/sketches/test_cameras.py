@@ -16,8 +16,8 @@ from scipy.spatial import ConvexHull, cKDTree
 from stages.package.glb import glb_bytes
 from stages.shape.kit import Assembly
 from stages.shape.shape import Shape, kit_shape, upright
+from stages.shape.views.camera_record import camera_fields, projected
 from stages.shape.views.scene import scene_of
-from stages.sketches.cameras import camera_fields, projected
 from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.image import augment
 from stages.sketches.settings import Augmentation, SketchView, StrokeOptions
@@ -71,7 +71,8 @@ def sketch(view: str, up: str = "y", chances: Augmentation | None = None) -> Ske
     camera = jittered_camera(VIEWS[view], rng)
     drawing, seen = draw_sketch(scene_of(shape), camera, IMAGE_PIXELS, 2, StrokeOptions(), "raster")
     drawing, flipped, thicker = augment(drawing, chances or Augmentation(), rng)
-    described = json.loads(json.dumps(camera_fields(seen, IMAGE_PIXELS, flipped)))
+    fields = {**camera_fields(seen, IMAGE_PIXELS, IMAGE_PIXELS, flipped), "flipped": flipped}
+    described = json.loads(json.dumps(fields))
     return Sketch(drawing, described, glb_bytes(shape), thicker)
 
 

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from stages.sketches.image import augment, dilate, erode, flip, png_bytes
+from stages.shape.views.image_files import png_bytes
+from stages.sketches.image import augment, dilate, erode, flip
 from stages.sketches.settings import Augmentation
 from tests.stages.sketches.png import png_array
 

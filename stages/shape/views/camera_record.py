@@ -1,4 +1,4 @@
-"""The camera of a drawing in its record: how points of the mesh map to the picture."""
+"""Cameras in records, with OpenCV's axes: how points of the mesh map to a picture, and back to rays."""
 
 from __future__ import annotations
 
@@ -41,28 +41,25 @@ CAMERA_FIELDS: Mapping[str, Any] = {
         "minItems": 4,
         "maxItems": 4,
     },
-    "flipped": {"description": "whether left and right are mirrored; intrinsics account for it", "type": "boolean"},
 }
 """JSON schema of the fields of `camera_fields`, by name."""
 
 
-def camera_fields(view: View, size: int, flipped: bool) -> dict[str, Any]:
-    """Return the record of the camera of a square picture.
+def camera_fields(view: View, width: int, height: int, flipped: bool = False) -> dict[str, Any]:
+    """Return the record of the camera of a picture.
 
-    size: side of the picture in pixels
+    width, height: size of the picture in pixels
     flipped: whether the picture was mirrored after it was drawn
     """
-    half = size / 2
-    across, down = view.projection[0, 0] * half, view.projection[1, 1] * half
-    intrinsics = np.array([[-across if flipped else across, 0.0, half], [0.0, down, half], [0.0, 0.0, 1.0]])
+    across, down = view.projection[0, 0] * width / 2, view.projection[1, 1] * height / 2
+    intrinsics = np.array([[-across if flipped else across, 0.0, width / 2], [0.0, down, height / 2], [0.0, 0.0, 1.0]])
     # adding zero turns minus zeros into zeros, which read better in text
     matrices = {"intrinsics": intrinsics, "world_to_camera": OPENGL_TO_OPENCV @ view.eye}
     return {
-        "width": size,
-        "height": size,
+        "width": width,
+        "height": height,
         "projection": "perspective" if view.perspective else "orthographic",
         **{name: (np.round(matrix, CAMERA_DECIMALS) + 0.0).tolist() for name, matrix in matrices.items()},
-        "flipped": flipped,
     }
 
 
@@ -77,3 +74,18 @@ def projected(camera: Mapping[str, Any], points: FloatArray) -> FloatArray:
         depth = np.where(seen[:, 2:] > 0.0, seen[:, 2:], np.nan)
         seen = seen / depth
     return seen[:, :2] @ intrinsics[:2, :2].T + intrinsics[:2, 2]
+
+
+def pixel_rays(camera: Mapping[str, Any], columns: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return origins and directions, float64 (h, w, 3), of the rays through picture points, in mesh coordinates.
+
+    columns, rows: coordinates of the points in pixels, (w,) and (h,)
+    """
+    intrinsics, pose = np.array(camera["intrinsics"]), np.array(camera["world_to_camera"])
+    rotation, origin = pose[:3, :3].T, -pose[:3, :3].T @ pose[:3, 3]
+    x, y = np.meshgrid((columns - intrinsics[0, 2]) / intrinsics[0, 0], (rows - intrinsics[1, 2]) / intrinsics[1, 1])
+    ahead = np.stack([x, y, np.ones_like(x)], axis=-1)
+    if camera["projection"] == "perspective":
+        return np.broadcast_to(origin, ahead.shape), ahead @ rotation.T
+    in_plane = np.stack([x, y, np.zeros_like(x)], axis=-1)
+    return in_plane @ rotation.T + origin, np.broadcast_to(rotation[:, 2], ahead.shape)
