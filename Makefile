@@ -76,7 +76,7 @@ RUN        = @$(SHAPEMILL) run $@ $(OPTIONS) $(RUNNING)
 # Making datasets ----------------------------------------------------------------------------------------------------
 
 .PHONY: dataset autoconfig exemplars variations proportions programs grammars program_sampling shapeassembly
-.PHONY: string_sampling validity abstraction strings points sketches package
+.PHONY: string_sampling validity abstraction strings points sketches views package
 dataset: setup  ## Make the dataset of CONFIG in OUT: whatever is missing or outdated
 	@$(SHAPEMILL) run $(OPTIONS) $(RUNNING)
 
@@ -109,7 +109,9 @@ points: $(PRODUCERS)  ## Sample a labelled point cloud of each shape
 	$(RUN)
 sketches: $(PRODUCERS)  ## Draw each shape as lines
 	$(RUN)
-package: validity abstraction strings points sketches  ## Write the dataset's folder: shards, index, card, checksums
+views: $(PRODUCERS)  ## Render images of each shape, if the config has cameras
+	$(RUN)
+package: validity abstraction strings points sketches views  ## Write the dataset's folder: shards, index, card, checksums
 	$(RUN)
 
 .PHONY: train recover

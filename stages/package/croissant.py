@@ -23,9 +23,14 @@ FORMATS = {
     "glb": "model/gltf-binary",
     "npy": "application/octet-stream",
     "png": "image/png",
+    "jpg": "image/jpeg",
+    "webp": "image/webp",
+    "exr": "image/x-exr",
     "txt": "text/plain",
     "json": "application/json",
 }
+IMAGES = (".png", ".jpg", ".webp")
+"""Suffixes of members that mlcroissant decodes as images."""
 ELEMENTS = {"float32": "cr:Float32", "float64": "cr:Float64", "int16": "cr:Int16", "int32": "cr:Int32"}
 ELEMENTS |= {"uint8": "cr:UInt8"}
 KINDS = {"string": "sc:Text", "bool": "sc:Boolean", "int32": "sc:Integer", "int64": "sc:Integer", "float64": "sc:Float"}
@@ -203,7 +208,7 @@ def _class_records() -> mlc.RecordSet:
 
 
 def _content_types(member: Mapping[str, Any]) -> list[str]:
-    if member["name"].endswith(".png"):
+    if member["name"].endswith(IMAGES):
         return ["sc:ImageObject"]
     return ["sc:Text", ELEMENTS[member["dtype"]]] if member["name"].endswith(".npy") else ["sc:Text"]
 

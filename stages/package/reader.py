@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import trimesh
 
     from stages.shape.shape import Shape
+    from stages.views.reading import SampleView
 
 SPLITS = ("train", "val", "test")
 
@@ -88,8 +89,15 @@ class DatasetSample:
         """The line drawings, uint8 (h, w) each; `record["sketches"]` has their cameras."""
         from PIL import Image
 
-        names = sorted(name for name in self.members if name.startswith("sketch") and name.endswith(".png"))
+        names = [f"sketch{index}.png" for index in range(len(self.record.get("sketches", ())))]
         return tuple(np.asarray(Image.open(io.BytesIO(self.members[name])), dtype=np.uint8) for name in names)
+
+    @cached_property
+    def views(self) -> tuple[SampleView, ...]:
+        """The rendered views: camera, colour, depth, normals, instances and what else the dataset has; else empty."""
+        from stages.views.reading import read_views
+
+        return read_views(self.members, self.record.get("views", []))
 
     @property
     def text(self) -> str:

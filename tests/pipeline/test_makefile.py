@@ -79,7 +79,8 @@ def test_dataset_is_one_call_and_every_stage_runs_after_its_inputs() -> None:
     runs = calls("package", *given)
     assert [run[3] for run in runs] == [
         "autoconfig", "exemplars", "variations", "proportions", "programs", "grammars", "program_sampling",
-        "shapeassembly", "string_sampling", "validity", "abstraction", "strings", "points", "sketches", "package",
+        "shapeassembly", "string_sampling", "validity", "abstraction", "strings", "points", "sketches", "views",
+        "package",
     ]  # fmt: skip
     assert all(run == ["-m", "pipeline", "run", run[3], *OPTIONS] for run in runs)
 
@@ -125,9 +126,9 @@ def test_every_target_gets_every_value_unchanged(tmp_path: Path) -> None:
     targets = ("package", "plan", "status", "verify", "inspect", "eval", "doctor", "clean")
     arguments = [f"{name}={said}" for name in VARIABLES]
     reached = calls(*targets, *arguments)
-    assert len(reached) == 15 + len(targets[1:]) + 1, "15 stages; inspect looks at a program and a model"
+    assert len(reached) == 16 + len(targets[1:]) + 1, "16 stages; inspect looks at a program and a model"
     assert all(any(said in argument for argument in call) for call in reached)
-    assert sum(call.count(said) for call in reached if call[2] == "run") == 15 * 6
+    assert sum(call.count(said) for call in reached if call[2] == "run") == 16 * 6
     assert make("help", *arguments).stdout.count(said) == len(VARIABLES)
     assert not list(tmp_path.iterdir())
 

@@ -47,6 +47,19 @@ class RayCaster:
         hits: BoolArray = scene.test_occlusions(_tensor(rays), tnear=nearest, tfar=farthest, nthreads=1).numpy()
         return hits
 
+    def first_hits(self, origins: FloatArray, directions: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Return what rays hit first: the distance in lengths of the directions, float64 (n,), infinite for nothing,
+        and the triangle, int32 (n,), -1 for nothing.
+
+        origins, directions: float64 (n, 3)
+        """
+        scene, middle = self._scene
+        rays = np.concatenate([origins - middle, directions], axis=1).astype(np.float32)
+        hits = scene.cast_rays(_tensor(rays), nthreads=1)
+        distances = hits["t_hit"].numpy().astype(np.float64)
+        triangles = hits["primitive_ids"].numpy().astype(np.int64)
+        return distances, np.where(np.isfinite(distances), triangles, -1).astype(np.int32)
+
     def nearest(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the nearest triangle of each point, int32 (n,), and its distance, float64 (n,)."""
         scene, middle = self._scene

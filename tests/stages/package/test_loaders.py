@@ -83,6 +83,10 @@ print(json.dumps({
     "nodes": sorted(first["glb"].graph.nodes_geometry),
     "parts": [part["name"] for part in first["json"]["parts"]],
     "size": first["sketch0.png"].size,
+    "color": first["color0.png"].size,
+    "ids": str(numpy.asarray(first["instances0.png"]).dtype),
+    "shown": sorted(set(numpy.asarray(first["instances0.png"]).ravel().tolist())),
+    "frames": [frame["file_path"] for frame in first["transforms.json"]["frames"]],
     "points": [len(each["points.npy"]) for each in loaded["val"]],
     "contacts": {
         each["__key__"]: numpy.asarray(each["contacts.npy"]).tolist()
@@ -111,6 +115,10 @@ def test_hugging_face_datasets_loads_every_split_with_typed_members(toy_folder: 
     assert "null" not in features["json"]
     assert found["nodes"] == sorted(found["parts"])
     assert found["size"] == [24, 24]
+    assert found["color"] == [32, 24]
+    assert found["ids"] == "uint16"
+    assert set(found["shown"]) <= set(range(len(found["parts"]) + 1))
+    assert found["frames"] == [f"{toy_keys('test')[0]}.color0.png"]
     assert set(found["points"]) == {POINT_COUNT}
 
 
@@ -167,7 +175,7 @@ def test_mlcroissant_validates_without_error_or_warning_and_yields_every_member(
         assert set(records) == set(stored)
         for key, content in records.items():
             size = len(stored[key][member])
-            assert content in ([24, 24], size, stored[key][member].decode("latin-1"))
+            assert content in ([24, 24], [32, 24], size, stored[key][member].decode("latin-1"))
 
 
 def test_mlcroissant_knows_splits_types_and_shapes(toy_folder: Path, croissant: dict[str, Any]) -> None:

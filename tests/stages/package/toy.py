@@ -34,6 +34,8 @@ from stages.sketches.settings import SketchesConfig, SketchView
 from stages.sketches.stage import drawings
 from stages.strings.settings import StringsConfig
 from stages.validity.stage import STAGE as VALIDITY
+from stages.views.settings import RingCameras, ViewsConfig
+from stages.views.stage import STAGE as VIEWS
 from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
 
 BOX = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
@@ -185,6 +187,7 @@ TOY_STAGES: Mapping[str, Stage] = named_inputs(
         VALIDITY,
         ABSTRACTION,
         Stage("sketches", __name__, SketchesConfig, (PRODUCERS,), collection_shards, _make_sketches, _no_bytes),
+        VIEWS,
         replace(PACKAGE, check=lambda _: None),
     ]
 )
@@ -202,6 +205,14 @@ def toy_config(shards: int = 4) -> Config:
         "points": PointsConfig(uniform=64, farthest=16, pool=256),
         "sketches": SketchesConfig(
             size=24, renderer="raster", views=(SketchView(name="left"), SketchView(name="right", azimuth=30.0))
+        ),
+        "views": ViewsConfig(
+            cameras=(RingCameras(count=1),),
+            width=32,
+            height=24,
+            images=("color", "depth", "instances"),
+            depth_format="exr",
+            transforms=True,
         ),
         "package": PackageConfig(previewed=1),
     }

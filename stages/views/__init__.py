@@ -1,0 +1,1 @@
+"""Stage `views`: any shape as rendered images: colour, depth, normals, instances, classes, masks."""
