@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
 
 from pipeline.randomness import decision_rng
 from stages.autoconfig.closed_box import is_closed_box
@@ -12,19 +15,29 @@ from stages.autoconfig.resolved_kit import ResolvedKit
 from stages.autoconfig.settings import RANDOM_STREAM
 from stages.autoconfig.yield_estimate import LOOK_FIRST, MAX_SAMPLES_REQUESTED, YieldEstimate, rounded_text
 from stages.exemplars.build import Observation
+from stages.proportions.choice import chosen_texts
 from stages.proportions.distinct_warps import DistinctWarps
+from stages.proportions.draws import draw_proportions, drawn_layouts
 from stages.proportions.settings import ProportionsConfig
 from stages.proportions.stage import CANDIDATES_PER_SAMPLE
-from stages.proportions.warp import Lattice, lattice_of, warped
+from stages.proportions.text import ProportionShapes, proportion_text
+from stages.proportions.warp import Lattice
 from stages.proportions.warp_check import warp_fault
 from stages.shape.kit import Kit
 from stages.shape.physics.judge import unmet_requirement
 from stages.shape.physics.settings import Requirements
-from stages.shape.resolved_settings import FALLBACK_KEY, FALLBACK_STABLE_KEY
+from stages.shape.resolved_settings import FALLBACK_KEY, FALLBACK_STABLE_KEY, PROPORTIONS_FALLBACK, ROWS_FALLBACK
 from stages.shape.shape import Shape, kit_shape
+from stages.variations.rows.kit_rows import KitRow, rows_of_kit
+from stages.variations.settings import RowsConfig
 
 TRIAL_DRAWS = 36
 """Draws of a trial, of all exemplars together."""
+MAX_LAYOUTS_TRIED = 24
+"""Layouts with other rows that a trial draws, of all exemplars together."""
+MIN_OTHER_LAYOUTS_FOUND = 2
+"""Layouts with other rows from which a dataset has them."""
+MAX_ROWS_SHOWN = 3
 MIN_SUCCESS_RATE = 0.2
 """Share of the draws that must hold together; with less a run ends before it has the samples requested."""
 
@@ -38,6 +51,8 @@ class ResizeEstimate:
     shapes: the most different of the draws, at most the number asked for.
     stable: whether a dataset should require stable shapes, since all exemplars are.
     is_closed_box: whether all exemplars are closed boxes.
+    other_layouts: number of layouts with longer or shorter rows among the draws.
+    rows: rows of the exemplars that become longer and shorter.
     """
 
     success_rate: float
@@ -45,10 +60,21 @@ class ResizeEstimate:
     shapes: Sequence[Shape]
     stable: bool
     is_closed_box: bool
+    other_layouts: int = 0
+    rows: Sequence[KitRow] = ()
+
+    @property
+    def has_rows(self) -> bool:
+        """Whether there are enough layouts with longer or shorter rows to speak of."""
+        return self.other_layouts >= MIN_OTHER_LAYOUTS_FOUND
 
     @property
     def sentence(self) -> str:
         """How many shapes there are, and whether they differ visibly."""
+        if self.has_rows:
+            count = "dozens of" if self.other_layouts >= MAX_LAYOUTS_TRIED else f"about {self.other_layouts}"
+            named = "; ".join(row.sentence for row in self.rows[:MAX_ROWS_SHOWN])
+            return f"{count} layouts with longer and shorter rows ({named}), in hundreds of proportions"
         count = "hundreds" if self.different >= MAX_SAMPLES_REQUESTED else f"about {rounded_text(self.different)}"
         sentence = f"{count} of the same layout in other proportions"
         if not self.is_closed_box:
@@ -80,7 +106,8 @@ def resize_fallback(resolved: ResolvedKit, layouts: YieldEstimate, max_shapes: i
         return None
     reason = f"{estimate.success_rate:.0%} of what is drawn holds together; of other layouts {layouts.sentence}"
     stable_reason = "the exemplars are stable" if estimate.stable else "not even the exemplars are stable"
-    values = {**unvaried.values, FALLBACK_KEY: "proportions", FALLBACK_STABLE_KEY: estimate.stable}
+    fallback = ROWS_FALLBACK if estimate.has_rows else PROPORTIONS_FALLBACK
+    values = {**unvaried.values, FALLBACK_KEY: fallback, FALLBACK_STABLE_KEY: estimate.stable}
     reasons = {**unvaried.reasons, FALLBACK_KEY: reason, FALLBACK_STABLE_KEY: stable_reason}
     return ResizeFallback(replace(unvaried, values=values, reasons=reasons), built, estimate)
 
@@ -118,28 +145,39 @@ def _different(lattice: Lattice, config: ProportionsConfig, exemplar: int, wante
 
 
 def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
-    """Draw resized exemplars of a kit, with all of their parts; randomness depends on the kit only."""
-    config = ProportionsConfig()
+    """Draw resized exemplars of a kit, with all of their parts, and where they have rows, longer and shorter ones;
+    randomness depends on the kit only.
+    """
+    config, rows = ProportionsConfig(), RowsConfig()
     required = Requirements(stable=True)
     stable = all(unmet_requirement(required, kit_shape(kit, exemplar.whole)) is None for exemplar in kit.exemplars)
-    require = required if stable else Requirements()
-    count = len(kit.exemplars)
-    tried = held = different = 0
+    config = config.model_copy(update={"require": required if stable else Requirements()})
+    count, shapes_of = len(kit.exemplars), ProportionShapes(kit)
+    tried = held = different = others = 0
     shapes: list[Shape] = []
     for number, exemplar in enumerate(kit.exemplars):
-        lattice = lattice_of(kit, exemplar.whole)
-        kept: list[Shape] = []
-        distinct = DistinctWarps(lattice, config.min_difference)
+        streams = partial(decision_rng, 0, RANDOM_STREAM, "rows", number)
+        wanted = -(-MAX_LAYOUTS_TRIED // count)
+        layouts = drawn_layouts(shapes_of, exemplar.name, config, rows, wanted, streams, lambda _: None)
+        others += sum(bool(layout.changes) for layout in layouts)
+        sides = np.ptp(shapes_of.layout(exemplar.name).boxes, axis=(0, 1))
+        texts: list[str] = []
+        made: dict[str, Shape] = {}
         for draw in range(-(-TRIAL_DRAWS // count)):
             rng = decision_rng(0, RANDOM_STREAM, "proportions", number, draw)
-            warp = lattice.draw(rng, config.log_std, config.max_factor)
-            shape = warped(kit, exemplar.whole, lattice, warp)
+            layout = layouts[draw % len(layouts)]
+            proportions = draw_proportions(exemplar.name, layout, sides, rng, config, rows)
+            shape = shapes_of.warped(layout.unwarped, proportions.warp)
             tried += 1
-            if warp_fault(kit, exemplar.whole, shape) is None and unmet_requirement(require, shape) is None:
-                kept.append(shape)
-                distinct.add(warp)
-        held += len(kept)
-        shapes += [kept[index] for index in distinct.farthest_first(len(range(number, max_shapes, count)))]
+            fault = warp_fault(kit, layout.unwarped.assembly, shape) or unmet_requirement(config.require, shape)
+            if fault is None:
+                texts.append(proportion_text(proportions))
+                made[texts[-1]] = shape
+        held += len(made)
+        chosen = chosen_texts(shapes_of, texts, len(range(number, max_shapes, count)), config.min_difference)
+        shapes += [made[text] for text, _ in chosen]
+        lattice = shapes_of.unwarped(exemplar.name, ()).lattice
         different += _different(lattice, config, number, len(range(number, MAX_SAMPLES_REQUESTED, count)))
     closed = all(is_closed_box(kit_shape(kit, exemplar.whole)) for exemplar in kit.exemplars)
-    return ResizeEstimate(held / max(tried, 1), different, shapes, stable, closed)
+    found = rows_of_kit(kit) if others else ()
+    return ResizeEstimate(held / max(tried, 1), different, shapes, stable, closed, others, found)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pipeline.paths import DatasetPaths
 from stages.exemplars.language import dataset_kits
 from stages.proportions.language import LANGUAGE
-from stages.proportions.text import ProportionError, exemplar_of, proportion_text, read_proportions, shape_of_text
+from stages.proportions.text import ProportionError, ProportionShapes, proportion_text, read_proportions
 from stages.proportions.warp_check import warp_fault
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import PackagedSample
@@ -18,14 +18,15 @@ def _recheck(sample: PackagedSample, paths: DatasetPaths) -> Iterator[str]:
     record = sample.record
     if record["language"] != LANGUAGE.name:
         return
-    kit = dataset_kits(paths)[record["kit"]]
+    shapes = ProportionShapes(dataset_kits(paths)[record["kit"]])
     try:
-        name, warp = read_proportions(record["text"])
-        fault = warp_fault(kit, exemplar_of(kit, name).whole, shape_of_text(kit, record["text"]))
+        proportions = read_proportions(record["text"])
+        unwarped = shapes.unwarped(proportions.exemplar, proportions.changes)
+        fault = warp_fault(shapes.kit, unwarped.assembly, shapes.warped(unwarped, proportions.warp))
     except ProportionError as error:
         yield str(error)
         return
-    if proportion_text(name, warp) != record["text"]:
+    if proportion_text(proportions) != record["text"]:
         yield "its proportions read and written again give another text"
     if fault is not None:
         yield f"compared with its exemplar: {fault}"

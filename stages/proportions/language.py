@@ -8,7 +8,7 @@ from typing import Any
 from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan
 from stages.exemplars.language import KitDecoder, dataset_kits
-from stages.proportions.text import shape_of_text
+from stages.proportions.text import ProportionShapes, shape_of_text
 from stages.shape.arrays import IntArray
 from stages.shape.collection.language import Language, RebuildShape
 from stages.shape.kit import Kit
@@ -17,18 +17,19 @@ from stages.shape.sample import Sample
 from stages.shape.shape import Shape, kit_shape, part_count, upright
 
 
-class Proportions:
+class ProportionDecoder:
     """The kits that a shard reads."""
 
     def __init__(self, kits: Mapping[str, Kit]) -> None:
         self._kits = kits
+        self._shapes = {name: ProportionShapes(kit) for name, kit in kits.items()}
         self.sources = KitDecoder(kits).sources
 
     def shape(self, sample: Sample) -> Shape:
         """Return the exemplar resized by the sample's text. Raises ProportionError for a text that does not fit its
         kit.
         """
-        return shape_of_text(self._kits[sample.kit], sample.text)
+        return shape_of_text(self._shapes[sample.kit], sample.text)
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
         """Return the exemplars, hubs among their parts."""
@@ -43,7 +44,7 @@ def _reads(plan: Plan) -> tuple[str, ...]:
 
 
 def _rebuild(paths: DatasetPaths) -> RebuildShape:
-    kits = dataset_kits(paths)
+    kits = {name: ProportionShapes(kit) for name, kit in dataset_kits(paths).items()}
 
     def shape(record: Mapping[str, Any], _: IntArray) -> Shape:
         if record["kit"] not in kits:
@@ -56,10 +57,10 @@ def _rebuild(paths: DatasetPaths) -> RebuildShape:
 LANGUAGE = Language(
     name="proportions",
     reads=_reads,
-    decoder=lambda task: Proportions(input_kits(task)),
+    decoder=lambda task: ProportionDecoder(input_kits(task)),
     graphs=False,
-    text="Its proportions as JSON: the exemplar, and for each axis the factors of the intervals between the ends of "
-    "the exemplar's parts.",
+    text="Its proportions as JSON: the exemplar, the periods of rows that were inserted or removed, if any, and for "
+    "each axis the factors of the intervals between the ends of the parts.",
     rebuild=_rebuild,
     coordinates="The unit is that of the model files, and the lowest point is as high as in the exemplar. The origin "
     "of a mesh is the middle of the box around the part, and poses do not rotate.",

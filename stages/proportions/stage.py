@@ -8,18 +8,20 @@ its text is its factors, and `stages.proportions.text.shape_of_text` makes the s
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
+
+import numpy as np
 
 from pipeline.config import Config
 from pipeline.errors import ConfigError, ShardFailed
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
-from stages.proportions.distinct_warps import DistinctWarps
+from stages.proportions.choice import chosen_texts
 from stages.proportions.settings import MAX_SAMPLES_PER_KIT, ProportionsConfig
-from stages.proportions.text import proportion_text, read_proportions
-from stages.proportions.warp import lattice_of, warped
+from stages.proportions.text import ProportionShapes, proportion_text, read_proportions
 from stages.proportions.warp_check import warp_fault
 from stages.shape.collection.assignment import (
     SplitConfig,
@@ -29,15 +31,16 @@ from stages.shape.collection.assignment import (
     write_listings,
 )
 from stages.shape.collection.origin import missing_licenses
-from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_input import input_kit
-from stages.shape.resolved_settings import FALLBACK_STABLE_KEY
+from stages.shape.resolved_settings import FALLBACK_KEY, FALLBACK_STABLE_KEY, ROWS_FALLBACK
 from stages.variations.fallback import resolved_fallback
 from stages.variations.settings import VariationsConfig
 
 BYTES_A_SAMPLE = 8_000
 CANDIDATES_PER_SAMPLE = 2
 """Candidates that the choice has for each requested sample."""
+MIN_GRAPHS_PER_SPLITS = 20
+"""Shape graphs from which splits share none."""
 
 
 def plan(plan: Plan) -> list[Shard]:
@@ -49,10 +52,11 @@ def plan(plan: Plan) -> list[Shard]:
     if not config.samples_per_kit:
         return []
     request = config.model_dump(mode="json", include={"samples_per_kit", "splits", "require"})
+    with_rows = _changes_rows(plan)
     searches = [
         Shard(
             _search_name(kit, number),
-            {"job": "search", "kit": kit, "number": number, "request": request},
+            {"job": "search", "kit": kit, "number": number, "rows": with_rows, "request": request},
             (f"exemplars/{kit}",),
         )
         for kit in plan.shards("exemplars")
@@ -91,6 +95,12 @@ def _requested_config(plan: Plan) -> ProportionsConfig:
     )
 
 
+def _changes_rows(plan: Plan) -> bool:
+    """Return whether rows become longer and shorter: as stated, or as resolved for layouts that are replaced."""
+    use = plan.config.section(VariationsConfig).rows.use
+    return resolved_fallback(plan).get(FALLBACK_KEY) == ROWS_FALLBACK if use == "auto" else use
+
+
 def _task_config(task: Task) -> ProportionsConfig:
     """Return the section with the plan's request."""
     request = ProportionsConfig.model_validate_json(json.dumps(task.shard.params["request"]))
@@ -115,32 +125,43 @@ def run_shard(task: Task) -> Outcome:
 
 
 def run_search(task: Task) -> Outcome:
-    """Write `.txt`: the texts of shapes that hold together and meet the requirements, one a line."""
+    """Write `.txt`: the texts of shapes that hold together and meet the requirements, one a line.
+
+    The exemplars take turns, and so do the layouts of one exemplar.
+    """
+    from stages.proportions.draws import draw_proportions, drawn_layouts
     from stages.shape.physics.judge import unmet_requirement
 
-    config = _task_config(task)
+    config, rows = _task_config(task), task.config.section(VariationsConfig).rows
     kit = input_kit(task, task.shard.params["kit"])
-    exemplars = [exemplar.whole for exemplar in kit.exemplars]
-    lattices = [lattice_of(kit, exemplar) for exemplar in exemplars]
-    distinct = [DistinctWarps(lattice, config.min_difference) for lattice in lattices]
+    shapes = ProportionShapes(kit)
     wanted = -(-CANDIDATES_PER_SAMPLE * config.samples_per_kit // config.parallel_searches)
+    layouts = [
+        drawn_layouts(
+            shapes, exemplar.name, config, rows if task.shard.params["rows"] else None, wanted,
+            partial(task.rng, "rows", number), partial(task.reject, exemplar.name),
+        )
+        for number, exemplar in enumerate(kit.exemplars)
+    ]  # fmt: skip
+    sides = [np.ptp(shapes.layout(exemplar.name).boxes, axis=(0, 1)) for exemplar in kit.exemplars]
     texts: list[str] = []
     tries = 0
     while len(texts) < wanted and tries < config.oversample * wanted:
-        index = tries % len(exemplars)
+        exemplar = tries % len(layouts)
+        layout = layouts[exemplar][tries // len(layouts) % len(layouts[exemplar])]
         tries += 1
-        name, whole, lattice = kit.exemplars[index].name, exemplars[index], lattices[index]
-        text = proportion_text(name, lattice.draw(task.rng("factors", tries), config.log_std, config.max_factor))
-        warp = read_proportions(text)[1]
-        if not distinct[index].is_new(warp):
+        name, rng = kit.exemplars[exemplar].name, task.rng("factors", tries)
+        text = proportion_text(draw_proportions(name, layout, sides[exemplar], rng, config, rows))
+        warp = read_proportions(text).warp
+        if not layout.is_new(warp):
             task.reject(text, "too near the exemplar or an earlier draw")
             continue
-        shape = warped(kit, whole, lattice, warp)
-        reason = warp_fault(kit, whole, shape) or unmet_requirement(config.require, shape)
+        shape = shapes.warped(layout.unwarped, warp)
+        reason = warp_fault(kit, layout.unwarped.assembly, shape) or unmet_requirement(config.require, shape)
         if reason is not None:
             task.reject(text, reason)
             continue
-        distinct[index].add(warp)
+        layout.distinct.add(warp)
         texts.append(text)
         task.progress(len(texts), wanted)
     with task.output(f"{task.shard.name}.txt") as stream:
@@ -162,33 +183,39 @@ def run_choice(task: Task) -> Outcome:
         )
     rows: list[dict[str, Any]] = []
     counts: dict[str, int] = {}
+    layouts: dict[str, int] = {}
     files = {kit.name: [shape.path for shape in kit.shapes] for kit in task.config.section(ExemplarsConfig).kits}
     for name, of_kit in texts.items():
-        kit = input_kit(task, name)
+        shapes = ProportionShapes(input_kit(task, name))
+        exemplars = shapes.kit.exemplars
         chosen: list[dict[str, Any]] = []
-        for number, (exemplar, path) in enumerate(zip(kit.exemplars, files[name], strict=True)):
-            own = [text for text in of_kit if read_proportions(text)[0] == exemplar.name]
-            distinct = DistinctWarps(lattice_of(kit, exemplar.whole), config.min_difference)
-            for text in own:
-                distinct.add(read_proportions(text)[1])
-            count = len(range(number, config.samples_per_kit, len(kit.exemplars)))
-            graph = kit.labelled(exemplar.assembly)
-            digest = graph_digest(graph.types, graph.edges)
-            for index in distinct.farthest_first(count):
-                parents = ["/".join(path.parts[-2:])]
-                row = {"kit": name, "graph": digest, "method": "proportions", "parents": parents, "text": own[index]}
-                chosen.append(row)
+        for number, (exemplar, path) in enumerate(zip(exemplars, files[name], strict=True)):
+            own = [text for text in of_kit if read_proportions(text).exemplar == exemplar.name]
+            count = len(range(number, config.samples_per_kit, len(exemplars)))
+            parents = ["/".join(path.parts[-2:])]
+            for text, graph in chosen_texts(shapes, own, count, config.min_difference):
+                method = "rows" if read_proportions(text).changes else "proportions"
+                chosen.append({"kit": name, "graph": graph, "method": method, "parents": parents, "text": text})
         for number, row in enumerate(chosen):
             rows.append({"key": f"{name}-{number:06d}", **row})
         counts[name] = len(chosen)
+        layouts[name] = len({row["graph"] for row in chosen})
     if not rows:
         raise ShardFailed(
             "no exemplar holds together in other proportions, or none differs enough; set proportions.log_std or "
             "proportions.min_difference smaller, or require less, or vary the layout: variations.samples_per_kit"
         )
-    split_of = assign_splits([[row] for row in range(len(rows))], config.splits, task.rng("splits"))
+    split_of = assign_splits(_split_groups(rows), config.splits, task.rng("splits"))
     shards = write_listings(task, rows, split_of, config.splits)
-    return Outcome(0, {"shards": shards, "shapes": counts})
+    return Outcome(0, {"shards": shards, "shapes": counts, "layouts": layouts})
+
+
+def _split_groups(rows: Sequence[Mapping[str, Any]]) -> list[list[int]]:
+    """Return which rows share a split: those of one graph where there are enough graphs, otherwise each is alone."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for number, row in enumerate(rows):
+        groups.setdefault((row["kit"], row["graph"]), []).append(number)
+    return list(groups.values()) if len(groups) >= MIN_GRAPHS_PER_SPLITS else [[row] for row in range(len(rows))]
 
 
 def run_collection(task: Task) -> Outcome:
@@ -209,7 +236,9 @@ def report(plan: Plan) -> Sequence[str]:
             for reason, rejects in plan.rejects("proportions", _search_name(kit, search)).items():
                 rejected[reason] = rejected.get(reason, 0) + rejects
         why = ", ".join(f"{rejects:,} {reason}" for reason, rejects in sorted(rejected.items()))
-        lines.append(f"{kit}: {count:,} of {config.samples_per_kit:,} shapes; rejected: {why or 'none'}")
+        layouts = summary["layouts"][kit]
+        of_layouts = f" of {layouts:,} layouts" if layouts > 1 else ""
+        lines.append(f"{kit}: {count:,} of {config.samples_per_kit:,} shapes{of_layouts}; rejected: {why or 'none'}")
         if count < config.samples_per_kit:
             lines.append(
                 f"warning: {kit} has fewer shapes than requested; lower proportions.min_difference, or "

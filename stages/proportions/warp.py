@@ -15,8 +15,8 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.contact import world_boxes
 from stages.shape.geometry.pose import transform_points
-from stages.shape.kit import Assembly, Kit, PartMesh
-from stages.shape.shape import Shape, kit_shape
+from stages.shape.kit import Assembly, PartMesh
+from stages.shape.shape import Shape
 
 MERGED_ENDS_SHARE = 2e-3
 """Ends of parts nearer to each other than this share of the longest side are one."""
@@ -100,10 +100,10 @@ class Lattice:
         return np.concatenate([(image - (image[0] + image[-1]) / 2) / max(diagonal, 1e-12) for image in images])
 
 
-def lattice_of(kit: Kit, exemplar: Assembly) -> Lattice:
-    """Return the intervals of an exemplar of a kit, hubs among its parts."""
-    boxes = world_boxes(kit.types, exemplar.types, exemplar.poses)
-    near = max(kit.contact_tolerance, MERGED_ENDS_SHARE * float(np.ptp(boxes, axis=(0, 1)).max()))
+def lattice_of(shape: Shape, contact_tolerance: float) -> Lattice:
+    """Return the intervals of a shape. contact_tolerance: nearer ends are one, in units."""
+    boxes = world_boxes(shape.meshes, shape.assembly.types, shape.assembly.poses)
+    near = max(contact_tolerance, MERGED_ENDS_SHARE * float(np.ptp(boxes, axis=(0, 1)).max()))
     known: list[float] = []
     knots, lengths = [], []
     for axis in range(3):
@@ -119,26 +119,26 @@ def lattice_of(kit: Kit, exemplar: Assembly) -> Lattice:
             numbers.append(number)
         knots.append(knot_positions)
         lengths.append(np.array(numbers, dtype=np.int64))
-    return Lattice((knots[0], knots[1], knots[2]), (lengths[0], lengths[1], lengths[2]), {"y": 1, "z": 2}[kit.up])
+    return Lattice((knots[0], knots[1], knots[2]), (lengths[0], lengths[1], lengths[2]), {"y": 1, "z": 2}[shape.up])
 
 
-def warped(kit: Kit, exemplar: Assembly, lattice: Lattice, warp: Sequence[FloatArray]) -> Shape:
-    """Return an exemplar in other proportions.
+def warped(shape: Shape, lattice: Lattice, warp: Sequence[FloatArray]) -> Shape:
+    """Return a shape in other proportions.
 
     Each part has a mesh of its own whose origin is the middle of its box. Poses do not rotate, and contacts are those
-    of the exemplar. Raises ValueError for factors that do not fit this lattice.
+    of the shape. Raises ValueError for factors that do not fit this lattice.
     """
-    shape, images = kit_shape(kit, exemplar), lattice.images(warp)
-    poses = np.tile(np.eye(4), (len(exemplar), 1, 1))
+    original, images = shape.assembly, lattice.images(warp)
+    poses = np.tile(np.eye(4), (len(original), 1, 1))
     meshes = []
-    for part, (kind, pose) in enumerate(zip(exemplar.types.tolist(), exemplar.poses, strict=True)):
-        mesh = kit.types[kind]
+    for part, (kind, pose) in enumerate(zip(original.types.tolist(), original.poses, strict=True)):
+        mesh = shape.meshes[kind]
         positions = transform_points(pose, mesh.vertices)
         moved = np.column_stack([_mapped(positions[:, axis], lattice.knots[axis], images[axis]) for axis in range(3)])
         centre = (moved.min(axis=0) + moved.max(axis=0)) / 2
         poses[part, :3, 3] = centre
         meshes.append(WarpedMesh(shape.part_names[part], moved - centre, mesh.faces, mesh.face_colors, mesh))
-    assembly = Assembly(np.arange(len(meshes), dtype=np.int16), poses, exemplar.edges)
+    assembly = Assembly(np.arange(len(meshes), dtype=np.int16), poses, original.edges)
     return replace(shape, meshes=tuple(meshes), assembly=assembly, own_names=shape.part_names)
 
 

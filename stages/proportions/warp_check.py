@@ -14,18 +14,20 @@ from stages.shape.stretch import STRETCHED_DEPTH
 
 
 def warp_fault(kit: Kit, exemplar: Assembly, shape: Shape) -> str | None:
-    """Return why a shape of `warped` is rejected, or None.
+    """Return why a shape of `warped`, or of a layout, is rejected, or None.
+
+    exemplar: the same parts by types of the kit, with the contacts that they must have
 
     `contact lost`: parts that touch in the exemplar are apart by more than STRETCHED_DEPTH of the smaller one's
     diagonal. `parts clash`: parts without contact in the exemplar penetrate deeper than that.
     """
-    meshes, poses = shape.meshes, shape.assembly.poses
+    meshes, kinds, poses = shape.meshes, shape.assembly.types.tolist(), shape.assembly.poses
     boxes = world_boxes(meshes, shape.assembly.types, poses)
-    slack = {part: STRETCHED_DEPTH * mesh.diagonal for part, mesh in enumerate(meshes)}
+    slack = [STRETCHED_DEPTH * meshes[kind].diagonal for kind in kinds]
     contact, penetration = ContactTest(meshes, kit.contact_tolerance), PenetrationTest(meshes)
     wanted = exemplar.edges
     for (i, j), pose in zip(wanted.tolist(), relative_poses(poses, wanted), strict=True):
-        if not contact.touches(i, j, pose, kit.contact_tolerance + min(slack[i], slack[j])):
+        if not contact.touches(kinds[i], kinds[j], pose, kit.contact_tolerance + min(slack[i], slack[j])):
             return "contact lost"
     touching = {(i, j) for i, j in wanted.tolist()}
     pairs = overlapping_boxes(boxes, 0.0)
@@ -34,7 +36,7 @@ def warp_fault(kit: Kit, exemplar: Assembly, shape: Shape) -> str | None:
             continue
         a, b = sorted((int(exemplar.types[i]), int(exemplar.types[j])))
         allowed = kit.grammar.depths.get((a, b), 0.0) + kit.contact_tolerance + min(slack[i], slack[j])
-        is_near = depth_bound(boxes[i], boxes[j]) > allowed and contact.touches(i, j, pose, 0.0)
-        if is_near and penetration.depth(i, j, pose) > allowed:
+        is_near = depth_bound(boxes[i], boxes[j]) > allowed and contact.touches(kinds[i], kinds[j], pose, 0.0)
+        if is_near and penetration.depth(kinds[i], kinds[j], pose) > allowed:
             return "parts clash"
     return None

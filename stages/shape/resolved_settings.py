@@ -14,6 +14,8 @@ MAX_COPIED_SHARE_KEY = "require.max_copied_share"
 STABLE_KEY = "require.stable"
 REQUIRED_LABELS_KEY = "require.labels"
 FALLBACK_KEY = "fallback"
+PROPORTIONS_FALLBACK, ROWS_FALLBACK = "proportions", "rows"
+"""Values of FALLBACK_KEY: exemplars in other proportions, and those with longer and shorter rows too."""
 FALLBACK_STABLE_KEY = "proportions.require.stable"
 
 

@@ -179,6 +179,36 @@ class SelectionConfig(StrictModel):
     )
 
 
+class RowsConfig(StrictModel):
+    """How rows of congruent parts become longer and shorter."""
+
+    use: Literal["auto"] | bool = Field(
+        "auto",
+        description="Whether resized exemplars get longer and shorter rows. `auto`: where a short search finds almost "
+        "no other layouts (see `fallback`) and the exemplars have rows.",
+    )
+    min_count: float = Field(
+        0.5,
+        gt=0,
+        le=1,
+        description="Minimum length of a row, as a multiple of its length in the exemplar, rounded down to at least 1.",
+    )
+    max_count: float = Field(
+        2.0, ge=1, le=20, description="Maximum length of a row, as a multiple of its length in the exemplar."
+    )
+    max_changes: int = Field(3, ge=1, le=20, description="Maximum number of rows that one shape changes.")
+    size: Literal["keep", "grow"] = Field(
+        "keep",
+        description="Overall size of a shape with other rows. `keep`: its sides stay within `size_range`, and its "
+        "parts shrink or grow to fit. `grow`: parts and steps keep their sizes.",
+    )
+    size_range: tuple[Annotated[float, Field(gt=0, le=1)], Annotated[float, Field(ge=1)]] = Field(
+        (0.7, 1.5),
+        description="With `size: keep`: smallest and largest side of the box around a shape, as a multiple of that of "
+        "the exemplar.",
+    )
+
+
 class VariantSplitConfig(SplitConfig):
     """How samples are divided into splits and shards, and what keeps splits apart."""
 
@@ -268,6 +298,9 @@ class VariationsConfig(StrictModel):
         "proportions, by the section `proportions`, if these hold together.",
     )
     search: SearchConfig = Field(default_factory=SearchConfig, description="How variants are searched for.")
+    rows: RowsConfig = Field(
+        default_factory=RowsConfig, description="How rows of congruent parts become longer and shorter."
+    )
     selection: SelectionConfig = Field(
         default_factory=SelectionConfig, description="How the dataset is selected from what was found."
     )

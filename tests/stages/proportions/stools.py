@@ -8,6 +8,7 @@ import trimesh
 
 from stages.proportions.warp import Lattice, lattice_of
 from stages.shape.kit import Assembly, Kit
+from stages.shape.shape import kit_shape
 from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose
 
 FRAME = trimesh.util.concatenate(
@@ -36,4 +37,4 @@ def whole() -> Assembly:
 
 @cache
 def lattice() -> Lattice:
-    return lattice_of(kit(), whole())
+    return lattice_of(kit_shape(kit(), whole()), kit().contact_tolerance)

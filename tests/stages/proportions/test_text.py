@@ -5,21 +5,28 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.proportions.text import ProportionError, exemplar_of, proportion_text, read_proportions, shape_of_text
-from stages.proportions.warp import lattice_of
-from tests.stages.proportions.stools import kit
+from stages.proportions.text import (
+    ProportionError,
+    Proportions,
+    ProportionShapes,
+    exemplar_of,
+    proportion_text,
+    read_proportions,
+    shape_of_text,
+)
+from tests.stages.proportions.stools import kit, lattice
 
 
 def test_a_text_comes_back_and_makes_the_shape_that_it_says() -> None:
     exemplar = kit().exemplars[0]
-    warp = lattice_of(kit(), exemplar.whole).draw(np.random.default_rng(1), 0.2, 2.0)
-    text = proportion_text(exemplar.name, warp)
-    name, read = read_proportions(text)
-    assert exemplar_of(kit(), name) is exemplar
-    for one, other in zip(read, warp, strict=True):
+    warp = lattice().draw(np.random.default_rng(1), 0.2, 2.0)
+    text = proportion_text(Proportions(exemplar.name, warp))
+    read = read_proportions(text)
+    assert exemplar_of(kit(), read.exemplar) is exemplar
+    for one, other in zip(read.warp, warp, strict=True):
         np.testing.assert_array_equal(one, other)
-    assert proportion_text(name, read) == text
-    assert len(shape_of_text(kit(), text)) == len(exemplar.whole)
+    assert proportion_text(read) == text
+    assert len(shape_of_text(ProportionShapes(kit()), text)) == len(exemplar.whole)
 
 
 @pytest.mark.parametrize(
@@ -37,4 +44,4 @@ def test_a_text_comes_back_and_makes_the_shape_that_it_says() -> None:
 )
 def test_what_says_no_proportions_is_refused(text: str, why: str) -> None:
     with pytest.raises(ProportionError, match=why):
-        shape_of_text(kit(), text)
+        shape_of_text(ProportionShapes(kit()), text)

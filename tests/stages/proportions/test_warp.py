@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from stages.proportions.warp import warped
 from stages.proportions.warp_check import warp_fault
 from stages.shape.geometry.contact import ContactTest, world_boxes
-from stages.shape.shape import Shape
+from stages.shape.shape import Shape, kit_shape
 from tests.stages.proportions.stools import kit, lattice, whole
 
 
@@ -19,7 +19,7 @@ def boxes(shape: Shape) -> np.ndarray:
 
 
 def drawn(seed: int, spread: float = 0.3) -> Shape:
-    return warped(kit(), whole(), lattice(), lattice().draw(np.random.default_rng(seed), spread, 2.0))
+    return warped(kit_shape(kit(), whole()), lattice(), lattice().draw(np.random.default_rng(seed), spread, 2.0))
 
 
 def test_knots_are_the_ends_of_parts() -> None:
@@ -30,7 +30,7 @@ def test_knots_are_the_ends_of_parts() -> None:
 
 
 def test_factors_of_one_leave_the_exemplar_as_it_is() -> None:
-    same = warped(kit(), whole(), lattice(), [np.ones(len(lengths)) for lengths in lattice().lengths])
+    same = warped(kit_shape(kit(), whole()), lattice(), [np.ones(len(lengths)) for lengths in lattice().lengths])
     np.testing.assert_allclose(boxes(same), world_boxes(kit().types, whole().types, whole().poses), atol=1e-9)
     assert same.labels == kit().labels
     assert [mesh.label for mesh in same.meshes] == [kit().types[kind].label for kind in whole().types]
@@ -70,7 +70,7 @@ def test_the_bar_of_a_frame_stays_beside_the_board_that_lies_on_it() -> None:
     """A part is moved a vertex at a time: as a whole the frame would take its bar elsewhere."""
     factors = [np.ones(len(lengths)) for lengths in lattice().lengths]
     factors[1][0] = 2.0
-    shape = warped(kit(), whole(), lattice(), factors)
+    shape = warped(kit_shape(kit(), whole()), lattice(), factors)
     frame, board = (int(np.flatnonzero(whole().types == kit().labels.index(name))[0]) for name in ("frame", "board"))
     heights = np.unique(np.round(shape.meshes[frame].vertices[:, 1] + shape.assembly.poses[frame, 1, 3], 6))
     assert boxes(shape)[board, 0, 1] == pytest.approx(heights[-2])
@@ -89,7 +89,7 @@ def test_factors_stay_within_their_bounds_and_signatures_know_no_size() -> None:
 def test_factors_of_another_lattice_are_refused(wrong: list[float]) -> None:
     factors = [np.array(wrong), *(np.ones(len(lengths)) for lengths in lattice().lengths[1:])]
     with pytest.raises(ValueError, match="axis x has 3 intervals and needs one positive factor for each"):
-        warped(kit(), whole(), lattice(), factors)
+        warped(kit_shape(kit(), whole()), lattice(), factors)
 
 
 def test_shape_with_lost_contacts_is_rejected() -> None:

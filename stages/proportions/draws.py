@@ -1,0 +1,132 @@
+"""Random shapes of an exemplar: some layouts with other rows, each in random proportions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.proportions.distinct_warps import DistinctWarps
+from stages.proportions.settings import ProportionsConfig
+from stages.proportions.text import Proportions, ProportionShapes, Unwarped
+from stages.proportions.warp import FACTOR_DECIMALS, Lattice, Warp
+from stages.proportions.warp_check import warp_fault
+from stages.shape.arrays import FloatArray
+from stages.shape.physics.judge import unmet_requirement
+from stages.shape.physics.settings import Requirements
+from stages.variations.rows.draws import LayoutDraws
+from stages.variations.rows.slabs import RowChange
+from stages.variations.settings import RowsConfig
+
+TRIES_PER_LAYOUT = 4
+"""Draws of layouts for each one that is wanted."""
+MAX_LAYOUTS = 48
+"""Layouts of one exemplar that one search resizes."""
+MIN_OTHER_LAYOUTS = 8
+"""Layouts with other rows from which the exemplar's own is left out."""
+THIN_SHARE = 0.04
+"""Lengths below this share of the longest side are the thickness of boards, which keep it as long as that is possible.
+"""
+MIN_COMPRESSION = 0.25
+"""Factor below which boards become thinner too."""
+
+
+@dataclass(frozen=True)
+class DrawnLayout:
+    """A layout of an exemplar with the warps of it that were accepted."""
+
+    changes: tuple[RowChange, ...]
+    unwarped: Unwarped
+    distinct: DistinctWarps
+
+    def is_new(self, warp: Warp) -> bool:
+        """Return whether a warp differs enough from those accepted and, for the exemplar's own layout, from none."""
+        if self.changes and not len(self.distinct):
+            return True
+        return self.distinct.is_new(warp)
+
+
+def drawn_layouts(
+    shapes: ProportionShapes,
+    exemplar: str,
+    config: ProportionsConfig,
+    rows: RowsConfig | None,
+    wanted: int,
+    rng_of: Callable[[int], np.random.Generator],
+    reject: Callable[[str], None],
+) -> list[DrawnLayout]:
+    """Return at most `wanted` layouts of an exemplar that hold together; its own alone without `rows`.
+
+    rng_of: function that returns the random numbers of each draw
+    reject: is told why a layout is rejected
+    """
+    own = DrawnLayout((), shapes.unwarped(exemplar, ()), _distinct(shapes.unwarped(exemplar, ()), config))
+    if rows is None:
+        return [own]
+    draws = LayoutDraws(shapes.layout(exemplar), rows)
+    found: list[DrawnLayout] = []
+    known = {draws.exemplar.key}
+    if not draws.rows:
+        return [own]
+    wanted = min(wanted, MAX_LAYOUTS)
+    for number in range(TRIES_PER_LAYOUT * wanted):
+        drawn = draws.draw(rng_of(number))
+        if drawn is None or drawn[1].key in known or len(found) == wanted:
+            continue
+        changes, layout = drawn
+        known.add(layout.key)
+        unwarped = shapes.unwarped_layout(layout)
+        fault = warp_fault(shapes.kit, unwarped.assembly, unwarped.shape) or _fault(config.require, unwarped)
+        if fault is not None:
+            reject(f"row: {fault}")
+            continue
+        found.append(DrawnLayout(changes, unwarped, _distinct(unwarped, config)))
+    return found if len(found) >= MIN_OTHER_LAYOUTS else [own, *found]
+
+
+def _fault(require: Requirements, unwarped: Unwarped) -> str | None:
+    return unmet_requirement(require, unwarped.shape)
+
+
+def _distinct(unwarped: Unwarped, config: ProportionsConfig) -> DistinctWarps:
+    return DistinctWarps(unwarped.lattice, config.min_difference)
+
+
+def draw_proportions(
+    exemplar: str,
+    layout: DrawnLayout,
+    sides: FloatArray,
+    rng: np.random.Generator,
+    config: ProportionsConfig,
+    rows: RowsConfig,
+) -> Proportions:
+    """Return random proportions of a layout. sides: those of the box around the exemplar, float64 (3,)."""
+    lattice = layout.unwarped.lattice
+    warp = lattice.draw(rng, config.log_std, config.max_factor)
+    if layout.changes and rows.size == "keep":
+        warp = within_range(lattice, warp, sides, rows.size_range)
+    elif layout.changes:
+        x, y, z = (np.ones(len(factors)) for factors in warp)
+        warp = x, y, z
+    return Proportions(exemplar, warp, layout.changes)
+
+
+def within_range(lattice: Lattice, warp: Warp, sides: FloatArray, limits: tuple[float, float]) -> Warp:
+    """Return a warp changed so that each side of the box around a shape is within a range of multiples of `sides`."""
+    fitted = []
+    longest = max(float(knots[-1] - knots[0]) for knots in lattice.knots)
+    for knots, factors, side in zip(lattice.knots, warp, sides.tolist(), strict=True):
+        lengths = np.diff(knots) * factors
+        length = float(lengths.sum())
+        wanted = min(max(length, limits[0] * side), limits[1] * side)
+        if not len(lengths) or length <= 0 or np.isclose(wanted, length):
+            fitted.append(factors)
+            continue
+        scaled = lengths > THIN_SHARE * longest
+        rest = float(lengths[~scaled].sum())
+        factor = (wanted - rest) / max(float(lengths[scaled].sum()), 1e-12)
+        changed = np.where(scaled, factor, 1.0) if factor >= MIN_COMPRESSION else np.full(len(lengths), wanted / length)
+        fitted.append(np.maximum(np.round(factors * changed, FACTOR_DECIMALS), 10.0**-FACTOR_DECIMALS))
+    x, y, z = fitted
+    return x, y, z

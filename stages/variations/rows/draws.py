@@ -1,0 +1,106 @@
+"""Random layouts of an exemplar: a few rows are made longer or shorter, one after another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from stages.variations.rows.layout import Layout
+from stages.variations.rows.rows import Row, find_rows
+from stages.variations.rows.slabs import RowChange, SlabError, repeat
+from stages.variations.rows.steps import Step, longest_row, steps_of
+from stages.variations.settings import RowsConfig
+
+MAX_PARTS_FACTOR = 4.0
+"""Maximum number of parts of a layout, as a multiple of that of its exemplar."""
+MAX_SIDE_FACTOR = 3.0
+"""Maximum side of the box around a layout, as a multiple of that of its exemplar, before its size is restored."""
+MAX_LAYOUTS_REMEMBERED = 400
+TRIES_PER_CHANGE = 6
+
+
+class LayoutDraws:
+    """Draws layouts of one exemplar. What it remembers saves time and never changes a result."""
+
+    def __init__(self, layout: Layout, config: RowsConfig) -> None:
+        self.exemplar, self.config = layout, config
+        self.steps = steps_of(layout)
+        self._rows: dict[bytes, list[Row]] = {}
+        self._limits = [self._limits_of(step) for step in self.steps]
+
+    @property
+    def rows(self) -> Sequence[Row]:
+        """The rows of the exemplar."""
+        return self._rows_of(self.exemplar)
+
+    def draw(self, rng: np.random.Generator) -> tuple[tuple[RowChange, ...], Layout] | None:
+        """Return changes and the layout that they make, or None where no change was possible."""
+        layout, changes = self.exemplar, list[RowChange]()
+        for _ in range(int(rng.integers(1, self.config.max_changes + 1))):
+            for _ in range(TRIES_PER_CHANGE):
+                changed = self._change(layout, rng)
+                if changed is not None:
+                    layout = changed[1]
+                    changes += changed[0]
+                    break
+        return (tuple(changes), layout) if changes and layout.key != self.exemplar.key else None
+
+    def _change(self, layout: Layout, rng: np.random.Generator) -> tuple[list[RowChange], Layout] | None:
+        """Return one row of a layout made longer or shorter, or None where the draw is not valid."""
+        rows = self._rows_of(layout)
+        if not rows:
+            return None
+        row: Row | None = rows[int(rng.integers(len(rows)))]
+        assert row is not None
+        least, most = self._limits[row.step]
+        wanted = int(rng.integers(least, most + 1))
+        if wanted > row.count and len(row.insertions):
+            change = row.insertion(int(rng.integers(len(row.insertions))), wanted - row.count)
+            longer = self._repeated(layout, change)
+            return None if longer is None else ([change], longer)
+        changes: list[RowChange] = []
+        while row is not None and wanted < row.count and len(row.removals):
+            change = row.removal(int(rng.integers(len(row.removals))))
+            shorter = self._repeated(layout, change)
+            if shorter is None:
+                break
+            changes.append(change)
+            layout, count = shorter, row.count
+            row = next(
+                (other for other in self._rows_of(layout) if _same_row(other, row) and other.count < count), None
+            )
+        return (changes, layout) if changes else None
+
+    def _repeated(self, layout: Layout, change: RowChange) -> Layout | None:
+        """Return a changed layout within the limits, or None."""
+        try:
+            changed = repeat(layout, change)
+        except SlabError:
+            return None
+        if len(changed) > MAX_PARTS_FACTOR * len(self.exemplar):
+            return None
+        if (changed.extent > MAX_SIDE_FACTOR * self.exemplar.extent).any():
+            return None
+        for step, (least, most) in zip(self.steps, self._limits, strict=True):
+            count = max(longest_row(changed.mates(step.shift)), 1)
+            if count > most or (count < least and change.times < 0):
+                return None
+        return changed
+
+    def _limits_of(self, step: Step) -> tuple[int, int]:
+        """Return the minimum and the maximum length of rows with a step."""
+        least, most = int(self.config.min_count * step.count), int(self.config.max_count * step.count)
+        return max(least, 1), most
+
+    def _rows_of(self, layout: Layout) -> list[Row]:
+        key = layout.key + layout.poses[:1].tobytes()
+        if key not in self._rows:
+            if len(self._rows) >= MAX_LAYOUTS_REMEMBERED:
+                self._rows.clear()
+            self._rows[key] = find_rows(layout, self.steps)
+        return self._rows[key]
+
+
+def _same_row(first: Row, second: Row) -> bool:
+    return first.step == second.step and first.copied == second.copied and bool((first.normal == second.normal).all())

@@ -1,0 +1,54 @@
+"""The rows of a kit, in words and numbers, as `make inspect` says them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.shape.kit import Kit
+from stages.variations.rows.layout import layout_of
+from stages.variations.rows.rows import Row, find_rows
+
+MAX_LABELS_SHOWN = 3
+
+
+@dataclass(frozen=True)
+class KitRow:
+    """A row of an exemplar that can become longer or shorter.
+
+    exemplar: name of the exemplar
+    labels: number of parts of each label in one period, most frequent first
+    count: parts of the row
+    direction: `along x`, `along y`, `along z` or `along a slope`
+    """
+
+    exemplar: str
+    labels: tuple[tuple[str, int], ...]
+    count: int
+    direction: str
+
+    @property
+    def sentence(self) -> str:
+        """What the row is, such as `5 times board, along y`."""
+        names = [f"{count} {label}" if count > 1 else label for label, count in self.labels[:MAX_LABELS_SHOWN]]
+        more = " and more" if len(self.labels) > MAX_LABELS_SHOWN else ""
+        return f"{self.count} times {', '.join(names)}{more}, {self.direction}"
+
+
+def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
+    """Return the rows of all exemplars of a kit, the longest of each exemplar and direction first."""
+    found: list[KitRow] = []
+    for exemplar in kit.exemplars:
+        rows = sorted(find_rows(layout_of(kit, exemplar)), key=lambda row: (-row.count, len(row.copied), row.copied))
+        described = [_described(kit, exemplar.name, row) for row in rows]
+        found += dict.fromkeys(described)
+    return tuple(found)
+
+
+def _described(kit: Kit, exemplar: str, row: Row) -> KitRow:
+    counts = Counter(kit.types[kind].label for kind in row.copied)
+    axes = np.flatnonzero(row.shift)
+    direction = f"along {'xyz'[axes[0]]}" if len(axes) == 1 else "along a slope"
+    return KitRow(exemplar, tuple(counts.most_common()), row.count, direction)

@@ -1,0 +1,91 @@
+"""Rows of a layout, and the changes of their lengths that are valid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.variations.rows.layout import Layout
+from stages.variations.rows.slabs import RowChange, Slab
+from stages.variations.rows.steps import ROUNDING_DECIMALS, Step, longest_row, steps_of
+
+MAX_PLANES = 160
+"""Ends of slabs that are tried for each step and normal."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """Places where periods of one kind can be inserted or removed.
+
+    step: index of the step among those of the exemplar
+    normal: float64 (3,)
+    shift: float64 (3,)
+    count: parts of the longest row with this step
+    copied: the parts of the exemplar that a period holds, by their types, ascending
+    insertions: ends of slabs that can be inserted, float64 (k,)
+    removals: ends of slabs that can be removed, float64 (k,)
+    """
+
+    step: int
+    normal: FloatArray
+    shift: FloatArray
+    count: int
+    copied: tuple[int, ...]
+    insertions: FloatArray
+    removals: FloatArray
+
+    def insertion(self, index: int, times: int) -> RowChange:
+        """Return the insertion of `times` periods at one of the places."""
+        return RowChange(self.normal, self.shift, float(self.insertions[index]), times)
+
+    def removal(self, index: int) -> RowChange:
+        """Return the removal of the period at one of the places."""
+        return RowChange(self.normal, self.shift, float(self.removals[index]), -1)
+
+
+def find_rows(layout: Layout, steps: Sequence[Step] | None = None) -> list[Row]:
+    """Return the rows of a layout with one of the steps, by default its own."""
+    rows: list[Row] = []
+    for number, step in enumerate(steps_of(layout) if steps is None else steps):
+        mates, previous = layout.mates(step.shift), layout.mates(-step.shift)
+        count = longest_row(mates)
+        if count < 1:
+            continue
+        for normal in step.normals():
+            rows += _rows_along(layout, number, step, count, normal, mates, previous)
+    return rows
+
+
+def _rows_along(
+    layout: Layout, number: int, step: Step, count: int, normal: FloatArray, mates: np.ndarray, previous: np.ndarray
+) -> Iterator[Row]:
+    """Yield the rows with one step and one normal, by what a period holds."""
+    low, high = layout.spans(normal)
+    found: dict[tuple[int, ...], list[tuple[float, bool, bool, bool]]] = {}
+    for at in _planes(layout, low, high, (mates >= 0) | (previous >= 0)).tolist():
+        slab = Slab(layout, normal, step.shift, at, mates, previous, low, high)
+        may_insert, may_remove = slab.insertion_fault() is None, slab.removal_fault() is None
+        if (may_insert or may_remove) and (slab.is_regular or slab.spanning_fault() is None):
+            copied = tuple(sorted(layout.types[slab.recurs].tolist()))
+            found.setdefault(copied, []).append((at, may_insert, may_remove, slab.is_regular))
+    for copied, places in found.items():
+        # A cut leaves vertices, after which a part may no longer repeat itself elsewhere.
+        best = [place for place in places if place[3]] or places
+        insertions = np.array([at for at, may_insert, _, _ in best if may_insert])
+        removals = np.array([at for at, _, may_remove, _ in best if may_remove])
+        yield Row(number, normal, step.shift, count, copied, insertions, removals)
+
+
+def _planes(layout: Layout, low: FloatArray, high: FloatArray, recurs: np.ndarray) -> FloatArray:
+    """Return ends of slabs worth trying, ascending: ends of recurring parts, and the middles between these."""
+    ends = np.sort(np.concatenate([low[recurs], high[recurs]]))
+    if not len(ends):
+        return ends
+    ends = ends[np.concatenate([[True], np.diff(ends) > 2.0 * layout.tolerance])]
+    planes = np.sort(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
+    chosen = planes[np.unique(np.linspace(0, len(planes) - 1, min(len(planes), MAX_PLANES)).astype(np.int64))]
+    rounded: FloatArray = np.round(chosen, ROUNDING_DECIMALS)
+    return rounded

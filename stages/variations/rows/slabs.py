@@ -1,0 +1,283 @@
+"""Slabs: a period of rows between two parallel planes, inserted or removed.
+
+A slab begins at `at - normal @ shift` along its normal and ends at `at`. Parts that begin in it are copied by the
+shift, parts beyond it move, and parts that span it become longer or shorter. A slab is valid where each contact across
+its end recurs a period earlier, so that a new seam shows only what the exemplar shows. What occurs once stays where it
+is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from stages.shape.arrays import BoolArray, FloatArray
+from stages.shape.kit import PartMesh
+from stages.variations.rows.layout import Layout, sorted_edges, with_classes
+from stages.variations.rows.spanning import Span
+
+
+class SlabError(ValueError):
+    """A slab that cannot be inserted or removed; the message says why."""
+
+
+@dataclass(frozen=True)
+class RowChange:
+    """A period that is inserted or removed.
+
+    normal: float64 (3,), of length 1
+    shift: translation by one period, float64 (3,), with `normal @ shift > 0`
+    at: where the slab ends along the normal
+    times: number of periods inserted, or -1 for one that is removed
+    """
+
+    normal: FloatArray
+    shift: FloatArray
+    at: float
+    times: int
+
+
+@dataclass(frozen=True, eq=False)
+class Slab:
+    """The parts of a layout by where they are relative to a slab.
+
+    mates, previous: int64 (n,), the part one step after and one step before each, or -1
+    low, high: float64 (n,), where each part begins and ends along the normal
+    """
+
+    layout: Layout
+    normal: FloatArray
+    shift: FloatArray
+    at: float
+    mates: np.ndarray
+    previous: np.ndarray
+    low: FloatArray
+    high: FloatArray
+
+    @property
+    def start(self) -> float:
+        """Where the slab begins along its normal."""
+        return self.at - float(self.normal @ self.shift)
+
+    @cached_property
+    def within(self) -> BoolArray:
+        """Which parts begin in the slab, bool (n,)."""
+        tolerance = self.layout.tolerance
+        begins: BoolArray = (self.low >= self.start - tolerance) & (self.low < self.at - tolerance)
+        return begins
+
+    @cached_property
+    def recurs(self) -> BoolArray:
+        """Which parts begin in the slab and have a part one step before or after."""
+        recurring: BoolArray = self.within & ((self.mates >= 0) | (self.previous >= 0))
+        return recurring
+
+    @cached_property
+    def beyond(self) -> BoolArray:
+        """Which parts begin at the end of the slab or after it."""
+        behind: BoolArray = self.low >= self.at - self.layout.tolerance
+        return behind
+
+    @cached_property
+    def spanning(self) -> np.ndarray:
+        """Parts that begin before the slab and end after it, int64 (k,), ascending."""
+        begins = self.low < self.start - self.layout.tolerance
+        return np.flatnonzero(begins & (self.high > self.at + self.layout.tolerance))
+
+    @cached_property
+    def before(self) -> BoolArray:
+        """Which parts begin before the slab and end before its end."""
+        left: BoolArray = ~self.within & ~self.beyond
+        left[self.spanning] = False
+        return left
+
+    def insertion_fault(self) -> str | None:
+        """Return why periods cannot be inserted as far as contacts tell, or None."""
+        within, beyond, before, recurs = self.within, self.beyond, self.before, self.recurs
+        tolerance = self.layout.tolerance
+        if not recurs.any():
+            return "nothing recurs in the slab"
+        crosses = self.high > self.at + tolerance
+        if (crosses & within & ~recurs).any():
+            return "a part that occurs once crosses the end of the slab"
+        if (crosses & recurs & (self.previous < 0)).any():
+            return "no part crosses the start of the slab as one crosses its end"
+        i, j = self._both_ways
+        if (before[i] & beyond[j]).any():
+            return "parts before and after the slab touch"
+        across = within[i] & beyond[j]
+        behind = self.previous[j[across]]
+        if (~recurs[i[across]]).any() or (behind < 0).any() or not recurs[behind].all():
+            return "a contact across the end of the slab does not recur at its start"
+        back = recurs[i] & before[j] & (self.mates[i] < 0)
+        if not self._leads_into(j[back], recurs):
+            return "a contact at the start of the slab does not recur at its end"
+        return None
+
+    def removal_fault(self) -> str | None:
+        """Return why the period cannot be removed as far as contacts tell, or None."""
+        within, beyond, before, recurs = self.within, self.beyond, self.before, self.recurs
+        if not recurs.any():
+            return "nothing recurs in the slab"
+        if (within & ~recurs).any():
+            return "a part that occurs once is in the slab"
+        if not (beyond | before).any() and not len(self.spanning):
+            return "nothing would be left"
+        crosses = before & (self.high > self.start + self.layout.tolerance)
+        if not self._leads_into(np.flatnonzero(crosses), recurs):
+            return "no part crosses the end of the slab as one crosses its start"
+        i, j = self._both_ways
+        if (before[i] & beyond[j]).any():
+            return "parts before and after the slab touch"
+        across = within[i] & beyond[j]
+        behind = self.previous[j[across]]
+        if (behind < 0).any() or not within[behind].all():
+            return "a contact across the end of the slab does not recur at its start"
+        back = within[i] & before[j]
+        if (self.mates[i[back]] < 0).any():
+            return "a contact at the start of the slab does not recur at its end"
+        return None
+
+    @cached_property
+    def is_regular(self) -> bool:
+        """Whether no part that spans the slab has to be cut."""
+        return all(self.span(part).is_regular for part in self.spanning.tolist())
+
+    def spanning_fault(self) -> str | None:
+        """Return why a part that spans the slab can become neither longer nor shorter, or None."""
+        for part in self.spanning.tolist():
+            if not self.span(part).can_change:
+                return "a part that spans the slab is neither a prism there nor repeats itself"
+        return None
+
+    @property
+    def _both_ways(self) -> tuple[np.ndarray, np.ndarray]:
+        edges = self.layout.edges
+        return np.concatenate([edges[:, 0], edges[:, 1]]), np.concatenate([edges[:, 1], edges[:, 0]])
+
+    def _leads_into(self, parts: np.ndarray, aims: BoolArray) -> bool:
+        """Return whether one step leads from each part to one of the aims."""
+        mates = self.mates[parts]
+        return bool((mates >= 0).all() and aims[mates].all())
+
+    def span(self, part: int) -> Span:
+        """Return a spanning part with the slab."""
+        layout = self.layout
+        points = layout.points[part]
+        heights = points @ self.normal
+        mates, previous = layout.vertex_mates(part, self.shift), layout.vertex_mates(part, -self.shift)
+        slab = self.start, self.at, self.shift, layout.tolerance
+        return Span(layout.meshes[part], points, mates, previous, heights, *slab)
+
+
+def slab_of(layout: Layout, change: RowChange) -> Slab:
+    """Return the slab of a change of a layout."""
+    low, high = layout.spans(change.normal)
+    mates, previous = layout.mates(change.shift), layout.mates(-change.shift)
+    return Slab(layout, change.normal, change.shift, change.at, mates, previous, low, high)
+
+
+def repeat(layout: Layout, change: RowChange) -> Layout:
+    """Return a layout in which periods are inserted or one is removed. Raises SlabError where that is not valid."""
+    slab = slab_of(layout, change)
+    fault = slab.insertion_fault() if change.times > 0 else slab.removal_fault()
+    fault = fault or slab.spanning_fault()
+    if fault is not None:
+        raise SlabError(fault)
+    return inserted(slab, change.times) if change.times > 0 else removed(slab)
+
+
+def inserted(slab: Slab, times: int) -> Layout:
+    """Return the layout with `times` more copies of a valid slab, after its own parts."""
+    layout = slab.layout
+    copied = np.flatnonzero(slab.recurs)
+    index_of = np.full(len(layout), -1, dtype=np.int64)
+    index_of[copied] = np.arange(len(copied))
+
+    def copy(part: int, number: int) -> int:
+        return part if number == 0 else len(layout) + (number - 1) * len(copied) + int(index_of[part])
+
+    edges: list[tuple[int, int]] = []
+    for i, j in layout.edges.tolist():
+        for part, other in ((i, j), (j, i)):
+            if slab.recurs[part] and slab.beyond[other]:
+                behind = int(slab.previous[other])
+                edges += [(copy(part, number), copy(behind, number + 1)) for number in range(times)]
+                edges.append((copy(part, times), other))
+                break
+            if slab.recurs[part] and slab.before[other]:
+                into = int(slab.mates[other])
+                edges.append((part, other))
+                if into >= 0 and slab.recurs[into]:
+                    edges += [(copy(into, number), copy(part, number + 1)) for number in range(times)]
+                break
+            if slab.recurs[part] and not slab.recurs[other] and not slab.within[other]:  # it spans the slab
+                edges += [(copy(part, number), other) for number in range(times + 1)]
+                break
+        else:
+            edges.append((i, j))
+            if slab.recurs[i] and slab.recurs[j]:
+                edges += [(copy(i, number), copy(j, number)) for number in range(1, times + 1)]
+    meshes, poses = _moved(slab, times)
+    copies = []
+    for number in range(1, times + 1):
+        shifted = layout.poses[copied].copy()
+        shifted[:, :3, 3] += number * slab.shift
+        copies.append(shifted)
+    kept = np.concatenate([np.arange(len(layout)), np.tile(copied, times)])
+    grown = replace(
+        layout,
+        meshes=tuple(meshes[part] for part in kept.tolist()),
+        poses=np.concatenate([poses, *copies]),
+        types=layout.types[kept],
+        origins=layout.origins[kept],
+        edges=sorted_edges(edges),
+    )
+    keys = _class_keys(slab, times)
+    return with_classes(grown, [keys[part] for part in kept.tolist()])
+
+
+def removed(slab: Slab) -> Layout:
+    """Return the layout without the parts of a valid slab, those beyond it one step nearer."""
+    layout = slab.layout
+    meshes, poses = _moved(slab, -1)
+    kept = np.flatnonzero(~slab.within)
+    index_of = np.full(len(layout), -1, dtype=np.int64)
+    index_of[kept] = np.arange(len(kept))
+    edges = [(i, j) for i, j in layout.edges.tolist() if not (slab.within[i] or slab.within[j])]
+    for i, j in layout.edges.tolist():
+        for part, other in ((i, j), (j, i)):
+            if slab.within[part] and slab.before[other]:
+                edges.append((int(slab.mates[part]), other))
+    shorter = replace(
+        layout,
+        meshes=tuple(meshes[part] for part in kept.tolist()),
+        poses=poses[kept],
+        types=layout.types[kept],
+        origins=layout.origins[kept],
+        edges=sorted_edges([(int(index_of[i]), int(index_of[j])) for i, j in edges]),
+    )
+    keys = _class_keys(slab, -1)
+    return with_classes(shorter, [keys[part] for part in kept.tolist()])
+
+
+def _moved(slab: Slab, times: int) -> tuple[list[PartMesh], FloatArray]:
+    """Return surface and pose of each part: those beyond the slab are moved, those that span it changed."""
+    meshes, poses = list(slab.layout.meshes), slab.layout.poses.copy()
+    poses[slab.beyond, :3, 3] += times * slab.shift
+    for part in slab.spanning.tolist():
+        meshes[part], poses[part] = slab.span(part).changed(times)
+    return meshes, poses
+
+
+def _class_keys(slab: Slab, times: int) -> list[tuple[int, ...]]:
+    """Return for each part what it has in common with parts that are translates of it after the change.
+
+    Spanning parts of one class stay translates if they begin at the same height.
+    """
+    keys: list[tuple[int, ...]] = [(kind, 0, 0) for kind in slab.layout.classes.tolist()]
+    for part in slab.spanning.tolist():
+        keys[part] = keys[part][0], times, round(float(slab.low[part]) / slab.layout.mate_tolerance)
+    return keys

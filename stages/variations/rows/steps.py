@@ -1,0 +1,110 @@
+"""Steps: translations that lead from parts to congruent parts, and the rows that they make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.variations.rows.layout import Layout
+
+MAX_STEP_SHARE = 0.75
+"""Longest step, as a share of the box along its direction; a longer one joins the two ends of a shape, such as legs."""
+MIN_STEP_TOLERANCES = 4.0
+"""Shortest step, in tolerances of mates."""
+MAX_STEPS = 24
+MAX_NEIGHBOURS_PER_PART = 24
+"""Nearest parts of its class that are considered for steps from a part."""
+ROUNDING_DECIMALS = 9
+MAX_SKEW = 0.02
+"""Components of a step along other axes, as a share of the step, up to which it is a step along an axis."""
+MIN_NORMAL_SHARE = 0.15
+"""Axes along which a slanted step has at least this share of its length may be normals of its slab."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A translation between congruent parts.
+
+    shift: float64 (3,)
+    count: parts of the longest row with this step
+    parts: number of parts that have a part at this step
+    """
+
+    shift: FloatArray
+    count: int
+    parts: int
+
+    @property
+    def is_along_axis(self) -> bool:
+        """Whether it is parallel to an axis."""
+        return int(np.count_nonzero(self.shift)) == 1
+
+    def normals(self) -> list[FloatArray]:
+        """Return normals, float64 (3,) of length 1, of slabs that this step crosses."""
+        length = float(np.linalg.norm(self.shift))
+        axes = [np.eye(3)[axis] for axis in np.flatnonzero(np.abs(self.shift) >= MIN_NORMAL_SHARE * length)]
+        upwards = [axis * np.sign(axis @ self.shift) for axis in axes]
+        return upwards if self.is_along_axis else [*upwards, np.round(self.shift / length, ROUNDING_DECIMALS)]
+
+
+def longest_row(mates: np.ndarray) -> int:
+    """Return the number of parts of the longest row. mates: int64 (n,), as of `Layout.mates`."""
+    has_previous = np.zeros(len(mates), dtype=bool)
+    has_previous[mates[mates >= 0]] = True
+    longest, row = 0, np.flatnonzero(~has_previous & (mates >= 0))
+    length = 1
+    while len(row) and length <= len(mates):
+        row = mates[row]
+        length += 1
+        longest = max(longest, length)
+        row = row[mates[row] >= 0]
+    return longest
+
+
+def steps_of(layout: Layout) -> list[Step]:
+    """Return the steps of a layout, those that most parts take first; of two opposite ones the one whose largest
+    component is positive.
+    """
+    shifts = _shifts(layout)
+    if not len(shifts):
+        return []
+    width = 2.0 * layout.mate_tolerance
+    _, first, counts = np.unique(
+        np.rint(shifts / width).astype(np.int64), axis=0, return_index=True, return_counts=True
+    )
+    order = np.lexsort((first, -counts))[: 4 * MAX_STEPS]
+    steps: list[Step] = []
+    for index in order.tolist():
+        near = np.abs(shifts - shifts[first[index]]).max(axis=1) <= width
+        shift = np.round(np.median(shifts[near], axis=0), ROUNDING_DECIMALS)
+        if any(np.abs(step.shift - shift).max() <= layout.mate_tolerance for step in steps):
+            continue
+        mates = layout.mates(shift)
+        count = longest_row(mates)
+        if count >= 2:
+            steps.append(Step(shift, count, int((mates >= 0).sum())))
+    steps.sort(key=lambda step: (-step.parts, float(np.linalg.norm(step.shift)), *step.shift.tolist()))
+    return steps[:MAX_STEPS]
+
+
+def _shifts(layout: Layout) -> FloatArray:
+    """Return the differences of the anchors of parts of one class, float64 (k, 3), of usable lengths."""
+    from scipy.spatial import cKDTree
+
+    found = [np.empty((0, 3))]
+    for kind in np.flatnonzero(np.bincount(layout.classes) > 1).tolist():
+        anchors = layout.anchors[layout.classes == kind]
+        count = min(len(anchors), MAX_NEIGHBOURS_PER_PART + 1)
+        _, near = cKDTree(anchors).query(anchors, k=count)
+        found.append((anchors[near[:, 1:]] - anchors[:, None]).reshape(-1, 3))
+    shifts = np.concatenate(found)
+    lengths = np.linalg.norm(shifts, axis=1)
+    shifts = np.where(np.abs(shifts) <= np.minimum(MAX_SKEW * lengths, layout.mate_tolerance)[:, None], 0.0, shifts)
+    largest = np.abs(shifts).argmax(axis=1)
+    is_positive = shifts[np.arange(len(shifts)), largest] > 0
+    shares = np.abs(shifts) / np.maximum(layout.extent, 1e-12)
+    is_short = np.take_along_axis(shares, largest[:, None], axis=1)[:, 0] <= MAX_STEP_SHARE
+    usable: FloatArray = shifts[is_positive & is_short & (lengths > MIN_STEP_TOLERANCES * layout.mate_tolerance)]
+    return usable

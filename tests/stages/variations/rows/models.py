@@ -1,0 +1,126 @@
+"""Shapes with rows of known lengths, built part by part."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+
+from stages.shape.kit import Kit
+from stages.variations.rows.layout import Layout, layout_of
+from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose
+
+SHELF_BOARDS, BOARD_STEP = 5, 0.4
+MESHES = {
+    "side": box(0.05, 2.0, 0.4),
+    "board": box(0.9, 0.04, 0.4),
+    "crate": box(0.5, 0.2, 0.3),
+    "post": box(0.1, 1.0, 0.1),
+    "pin": box(0.06, 1.0, 0.06),
+}
+
+
+def layout(meshes: dict[str, trimesh.Trimesh], parts: Sequence[Placed]) -> tuple[Kit, Layout]:
+    """Return the kit of one shape and the layout of its exemplar."""
+    kit = kit_of(meshes, [parts], ("point", "line", "face"))
+    return kit, layout_of(kit, kit.exemplars[0])
+
+
+def shelf(boards: int = SHELF_BOARDS, crates: Sequence[int] = ()) -> tuple[Kit, Layout]:
+    """Two sides that hold boards; a crate lies on each of the boards in `crates`."""
+    sides = [("side", pose(x, 1.0, 0.0)) for x in (-0.475, 0.475)]
+    held = [("board", pose(0.0, 0.2 + BOARD_STEP * number, 0.0)) for number in range(boards)]
+    lying = [("crate", pose(0.0, 0.32 + BOARD_STEP * number, 0.0)) for number in crates]
+    return layout(MESHES, [*sides, *held, *lying])
+
+
+def rail(posts: int = 8) -> tuple[Kit, Layout]:
+    """A bar on posts and pins that alternate."""
+    meshes = MESHES | {"bar": box(posts * 0.5, 0.1, 0.1)}
+    feet = [("pin" if number % 2 else "post", pose(0.25 + 0.5 * number, 0.5, 0.0)) for number in range(posts)]
+    return layout(meshes, [("bar", pose(posts * 0.25, 1.05, 0.0)), *feet])
+
+
+def leaning_frame(bars: int = 6) -> tuple[Kit, Layout]:
+    """Two slanted posts with bars between them; everything is turned about x."""
+    turn = trimesh.transformations.rotation_matrix(0.6, [1, 0, 0])
+    posts = [("post", turn @ pose(x, 1.5, 0.0)) for x in (-0.3, 0.3)]
+    held = [("bar", turn @ pose(0.0, 0.25 + 0.5 * number, 0.0)) for number in range(bars)]
+    return layout({"post": box(0.1, 3.0, 0.1), "bar": box(0.5, 0.06, 0.06)}, [*posts, *held])
+
+
+def plate(xs: Sequence[float], ys: Sequence[float], depth: float, solid: np.ndarray) -> trimesh.Trimesh:
+    """Return a plate in one piece, extruded along z, of the solid cells (x, y) of a grid."""
+    padded = np.pad(solid, 1)
+    triangles: list[list[list[float]]] = []
+
+    def quad(*corners: tuple[float, float, float]) -> None:
+        a, b, c, d = (list(corner) for corner in corners)
+        triangles.extend([[a, b, c], [a, c, d]])
+
+    for i, j in np.argwhere(solid).tolist():
+        x, nx, y, ny = xs[i], xs[i + 1], ys[j], ys[j + 1]
+        low, high = -depth / 2, depth / 2
+        quad((x, y, high), (nx, y, high), (nx, ny, high), (x, ny, high))
+        quad((x, y, low), (x, ny, low), (nx, ny, low), (nx, y, low))
+        if not padded[i, j + 1]:
+            quad((x, y, low), (x, y, high), (x, ny, high), (x, ny, low))
+        if not padded[i + 2, j + 1]:
+            quad((nx, y, low), (nx, ny, low), (nx, ny, high), (nx, y, high))
+        if not padded[i + 1, j]:
+            quad((x, y, low), (nx, y, low), (nx, y, high), (x, y, high))
+        if not padded[i + 1, j + 2]:
+            quad((x, ny, low), (x, ny, high), (nx, ny, high), (nx, ny, low))
+    return trimesh.Trimesh(**trimesh.triangles.to_kwargs(np.array(triangles)))
+
+
+def wall(columns: int = 3, storeys: int = 3) -> tuple[Kit, Layout]:
+    """A wall in one piece with a hole for each window of a grid."""
+    xs = [0.0, *(edge + 1.5 * number for number in range(columns) for edge in (0.7, 1.3)), 1.5 * columns + 0.5]
+    ys = [0.0, *(edge + 1.6 * number for number in range(storeys) for edge in (0.6, 1.4)), 1.6 * storeys + 0.4]
+    solid = np.ones((len(xs) - 1, len(ys) - 1), dtype=bool)
+    solid[1::2, 1::2] = False
+    windows = [("window", pose(1.0 + 1.5 * i, 1.0 + 1.6 * j, 0.0)) for i in range(columns) for j in range(storeys)]
+    wall_pose = pose((xs[0] + xs[-1]) / 2, (ys[0] + ys[-1]) / 2, 0.0)
+    middle = np.array([(xs[0] + xs[-1]) / 2, (ys[0] + ys[-1]) / 2, 0.0])
+    pierced = plate(xs, ys, 0.2, solid).apply_translation(-middle)
+    return layout({"wall": pierced, "window": box(0.6, 0.8, 0.1)}, [("wall", wall_pose), *windows])
+
+
+def truss(bays: int = 5) -> tuple[Kit, Layout]:
+    """Two chords, each with a knot at every joint and in one piece, with a bar at each joint."""
+    xs = [edge + number for number in range(bays + 1) for edge in (-0.05, 0.05)]
+    solid = np.ones((len(xs) - 1, 3), dtype=bool)
+    solid[1::2, [0, 2]] = False
+    chord = plate(xs, [-0.05, -0.02, 0.02, 0.05], 0.04, solid)
+    bars = [("bar", pose(float(number), 0.5, 0.0)) for number in range(bays + 1)]
+    chords = [("chord", pose(0.0, y, 0.0)) for y in (0.0, 1.0)]
+    return layout({"chord": chord, "bar": box(0.05, 0.9, 0.05)}, [*chords, *bars])
+
+
+def stair(steps: int = 6) -> tuple[Kit, Layout]:
+    """Two slanted beams, prisms along the slope, that carry steps."""
+    rise, run, length = 0.2, 0.3, 0.3 * (steps + 1)
+    low = np.array([[0.0, -0.15], [length, -0.15 + length * rise / run], [length, length * rise / run], [0.0, 0.0]])
+    vertices = np.array([[x, y, z] for z in (0.0, 0.05) for x, y in low])
+    faces = [[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7], [0, 1, 5], [0, 5, 4], [1, 2, 6], [1, 6, 5], [2, 3, 7],
+             [2, 7, 6], [3, 0, 4], [3, 4, 7]]  # fmt: skip
+    beam = trimesh.Trimesh(vertices, faces, process=False)
+    treads = [("tread", pose(run * (number + 0.8), rise * (number + 0.8) - 0.05, 0.525)) for number in range(steps)]
+    beams = [("beam", pose(0.0, 0.0, z)) for z in (0.0, 1.0)]
+    return layout({"beam": beam, "tread": box(0.2, 0.04, 0.95)}, [*beams, *treads])
+
+
+def mirrored_row(pairs: int = 3) -> tuple[Kit, Layout]:
+    """A bar with left and right brackets in turn, which are mirror images."""
+    bracket = trimesh.Trimesh(
+        [[0, 0, 0], [0.2, 0, 0], [0, 0.5, 0], [0, 0, 0.1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], process=False
+    )
+    other = bracket.copy()
+    other.vertices[:, 0] *= -1
+    other.invert()
+    meshes = {"bar": box(2.0 * pairs, 0.1, 0.4), "left": bracket, "right": other}
+    brackets = [(name, pose(0.4 + 2.0 * number + 0.9 * (name == "right"), 0.0, 0.0)) for number in range(pairs)
+                for name in ("left", "right")]  # fmt: skip
+    return layout(meshes, [("bar", pose(pairs * 1.0, -0.05, 0.0)), *brackets])

@@ -1,0 +1,188 @@
+"""Rows become longer and shorter, every contact stays, and what occurs once stays once."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from stages.proportions.warp_check import warp_fault
+from stages.shape.geometry.contact import ContactTest
+from stages.shape.kit import Kit
+from stages.variations.rows.draws import LayoutDraws
+from stages.variations.rows.kit_rows import rows_of_kit
+from stages.variations.rows.layout import Layout
+from stages.variations.rows.rows import Row, find_rows
+from stages.variations.rows.slabs import RowChange, SlabError, repeat
+from stages.variations.rows.steps import steps_of
+from stages.variations.settings import RowsConfig
+from tests.stages.variations.rows import models
+
+MODELS: dict[str, Callable[[], tuple[Kit, Layout]]] = {
+    "shelf": models.shelf,
+    "rail": models.rail,
+    "leaning frame": models.leaning_frame,
+    "wall": models.wall,
+    "truss": models.truss,
+    "stair": models.stair,
+    "mirrored row": models.mirrored_row,
+}
+
+
+def counts(kit: Kit, layout: Layout) -> Counter[str]:
+    return Counter(kit.types[kind].label for kind in layout.types.tolist())
+
+
+def changes(rows: list[Row], times: int) -> Iterator[RowChange]:
+    for row in rows:
+        places = row.insertions if times > 0 else row.removals
+        for index in range(len(places)):
+            yield row.insertion(index, times) if times > 0 else row.removal(index)
+
+
+def check(kit: Kit, layout: Layout) -> None:
+    """Parts touch where the layout has contacts and nowhere else, by the contact test on their meshes."""
+    shape = layout.shape(kit)
+    found = ContactTest(shape.meshes, kit.contact_tolerance).contacts(shape.assembly.types, shape.assembly.poses)
+    np.testing.assert_array_equal(found, layout.edges)
+    assert warp_fault(kit, layout.assembly(), shape) is None
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("times", [1, 3, -1])
+def test_every_change_keeps_contacts_and_adds_none(name: str, times: int) -> None:
+    kit, layout = MODELS[name]()
+    tried = list(changes(find_rows(layout), times))
+    assert tried, f"the {name} has rows"
+    for change in tried[:: 1 + len(tried) // 12]:
+        check(kit, repeat(layout, change))
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_removing_what_was_inserted_gives_the_exemplar_back(name: str) -> None:
+    _, layout = MODELS[name]()
+    for change in list(changes(find_rows(layout), 1))[::5]:
+        longer = repeat(layout, change)
+        end = change.at + float(change.normal @ change.shift)
+        same = repeat(longer, RowChange(change.normal, change.shift, end, -1))
+        assert same.key == layout.key
+        np.testing.assert_array_equal(same.edges, layout.edges)
+        np.testing.assert_allclose(same.boxes, layout.boxes, atol=1e-6)
+
+
+def test_a_shelf_gets_boards_and_longer_sides() -> None:
+    kit, layout = models.shelf()
+    (first, *_) = find_rows(layout)
+    assert first.count == models.SHELF_BOARDS
+    np.testing.assert_allclose(first.shift, [0.0, models.BOARD_STEP, 0.0])
+    longer = repeat(layout, first.insertion(2, 3))
+    assert counts(kit, longer) == {"side": 2, "board": 8}
+    np.testing.assert_allclose(longer.extent, layout.extent + np.array([0.0, 3 * models.BOARD_STEP, 0.0]))
+    assert all(mesh.label == "side" for mesh in longer.meshes[:2])
+
+
+def test_a_row_can_be_shortened_to_one() -> None:
+    kit, layout = models.shelf(3)
+    for _ in range(2):
+        layout = repeat(layout, next(changes(find_rows(layout), -1)))
+    assert counts(kit, layout) == {"side": 2, "board": 1}
+    check(kit, layout)
+    assert not find_rows(layout)
+
+
+def test_what_occurs_once_stays_once() -> None:
+    kit, layout = models.shelf(crates=[2])
+    tried = [*changes(find_rows(layout), 1), *changes(find_rows(layout), -1)]
+    assert tried
+    for change in tried:
+        changed = repeat(layout, change)
+        assert counts(kit, changed)["crate"] == 1
+        check(kit, changed)
+
+
+def test_alternating_parts_stay_alternating() -> None:
+    kit, layout = models.rail()
+    for times in (1, -1):
+        for change in changes(find_rows(layout), times):
+            changed = repeat(layout, change)
+            feet = [part for part in range(len(changed)) if kit.types[changed.types[part]].label != "bar"]
+            order = sorted(feet, key=lambda part: changed.anchors[part, 0])
+            names = [kit.types[changed.types[part]].label for part in order]
+            assert all(one != other for one, other in pairwise(names)), names
+
+
+def test_a_grid_grows_in_both_directions() -> None:
+    kit, layout = models.wall()
+    rows = find_rows(layout)
+    assert {tuple(np.flatnonzero(row.shift).tolist()) for row in rows} == {(0,), (1,)}
+    wide = next(row for row in rows if row.shift[0] > 0 and row.count == 3)
+    wider = repeat(layout, wide.insertion(0, 1))
+    tall = next(row for row in find_rows(wider) if row.shift[1] > 0 and row.count == 3)
+    both = repeat(wider, tall.insertion(0, 1))
+    assert counts(kit, both) == {"wall": 1, "window": 16}
+    check(kit, both)
+
+
+def test_a_slanted_row_moves_along_its_slope() -> None:
+    for build in (models.leaning_frame, models.stair):
+        _, layout = build()
+        row = next(row for row in find_rows(layout) if len(row.insertions) and row.count == 6)
+        assert np.count_nonzero(np.abs(row.shift) > 1e-6) == 2
+        longer = repeat(layout, row.insertion(0, 2))
+        np.testing.assert_allclose(longer.extent - layout.extent, 2 * np.abs(row.shift), atol=1e-6)
+
+
+def test_a_periodic_chord_keeps_its_knots() -> None:
+    kit, layout = models.truss()
+    row = next(row for row in find_rows(layout) if row.count == 6)
+    longer = repeat(layout, row.insertion(0, 2))
+    chord, before = longer.points[0], layout.points[0]
+    assert len(np.unique(np.round(chord[np.abs(chord[:, 1]) > 0.049, 0] - 0.05))) == 8
+    assert np.ptp(chord[:, 0]) == pytest.approx(np.ptp(before[:, 0]) + 2.0)
+    check(kit, longer)
+
+
+def test_a_slab_that_does_not_fit_says_why() -> None:
+    _, layout = models.shelf(crates=[2])
+    up = np.array([0.0, 1.0, 0.0])
+    with pytest.raises(SlabError, match="occurs once is in the slab"):
+        repeat(layout, RowChange(up, up * models.BOARD_STEP, 1.3, -1))
+    with pytest.raises(SlabError, match="nothing recurs"):
+        repeat(layout, RowChange(up, up * 0.3, 1.2, 1))
+
+
+def test_draws_depend_on_the_seed_alone_and_stay_in_range() -> None:
+    kit, layout = models.wall()
+    keys = []
+    for draws in (LayoutDraws(layout, RowsConfig()), LayoutDraws(layout, RowsConfig())):
+        drawn = [draws.draw(np.random.default_rng(seed)) for seed in range(10)]
+        keys.append([result and result[1].key for result in drawn])
+    assert keys[0] == keys[1]
+    made = [result for result in drawn if result]
+    assert len(made) > 6
+    for result in made:
+        check(kit, result[1])
+        assert 1 <= counts(kit, result[1])["window"] <= 36
+
+
+def test_every_draw_of_every_model_passes_the_check() -> None:
+    for build in MODELS.values():
+        kit, layout = build()
+        draws = LayoutDraws(layout, RowsConfig())
+        drawn = [result for seed in range(4) if (result := draws.draw(np.random.default_rng(seed)))]
+        assert drawn
+        for made, changed in drawn:
+            check(kit, changed)
+            again = layout
+            for change in made:
+                again = repeat(again, change)
+            assert again.key == changed.key
+
+
+def test_rows_are_described() -> None:
+    kit, layout = models.shelf()
+    assert rows_of_kit(kit)[0].sentence == "5 times board, along y"
+    assert [step.count for step in steps_of(layout)] == [5, 3, 2]
