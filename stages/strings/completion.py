@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numba
 
-from stages.strings.grammar_arrays import NO_COMPLETION
+NO_COMPLETION = 1 << 28
+"""Tokens to complete a node that cannot be completed."""
 
 
 @numba.njit(cache=True)

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numba
 
-from stages.strings.completion import tokens_to_complete
-from stages.strings.grammar_arrays import NO_COMPLETION
+from stages.strings.completion import NO_COMPLETION, tokens_to_complete
 from stages.strings.mask_state import NO_NODE, NODE, not_joined, open_cycles
 
 AT_CURRENT = -2

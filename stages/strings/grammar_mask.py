@@ -18,8 +18,9 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from stages.strings.compiled_grammar import CompiledGrammar
+from stages.strings.completion import NO_COMPLETION
 from stages.strings.cycle_certificates import can_complete, find_certificates, forget_certificates
-from stages.strings.grammar_arrays import NO_COMPLETION, CompiledGrammar
 from stages.strings.mask_state import (
     CLOSE,
     END_TOKEN,

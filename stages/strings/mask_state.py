@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from stages.strings.completion import tokens_to_complete
-from stages.strings.grammar_arrays import NO_COMPLETION
+from stages.strings.completion import NO_COMPLETION, tokens_to_complete
 
 END_TOKEN = 0
 NO_NODE = -1

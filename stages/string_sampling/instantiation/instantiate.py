@@ -25,7 +25,6 @@ from stages.string_sampling.instantiation.state import (
     graph_tables,
     new_state,
 )
-from stages.strings.compiled_grammar import compile_grammar
 from stages.variations.growth.state import KnownContacts
 from stages.variations.kernels.outcomes import Outcome
 from stages.variations.kernels.tables import kit_tables
@@ -71,7 +70,6 @@ class Instantiator:
         self.kit, self.oracle, self.upright = kit, oracle, upright
         self.placements = find_placements(kit, upright)
         self._tables = kit_tables(kit, upright)
-        self._grammar = compile_grammar(kit.grammar, len(kit.labels), 0, partial=True)
         self._reach = new_reach(len(self.placements.orientation_types))
         slotted = kit.grammar.strictness in SLOT_LEVELS
         self._slots = SlotGrammar(kit, oracle.dockings, upright) if slotted else None
@@ -109,7 +107,7 @@ class Instantiator:
             table = self.oracle.table
             contacts = KnownContacts(table.keys, table.values, self._address)
             left = method._replace(budget=method.budget - placements)
-            problem = Problem(self._tables, self.placements, self._grammar, contacts, graph, guide, left, self._reach)
+            problem = Problem(self._tables, self.placements, contacts, graph, guide, left, self._reach)
             outcome = solve(rng, problem, within)
             self.oracle.raise_pending()
             placements += int(self._s.counts[N_PLACEMENTS])

@@ -29,6 +29,7 @@ import numpy as np
 from stages.shape.geometry.contact_lookup import NO_CONTACT, UNKNOWN_CONTACT, call_oracle, contact_key, quantize_pose
 from stages.shape.geometry.hash_tables import look_up
 from stages.shape.geometry.pose_kernels import compose, relative_transform
+from stages.shape.graphs.grammar_patterns import fits
 from stages.string_sampling.instantiation.guidance import Guide, drop_frames, propagate_frames, score_by_category
 from stages.string_sampling.instantiation.placements import DockedPlacements
 from stages.string_sampling.instantiation.reach import MAX_CHAIN_LENGTH, ChainReach, can_reach
@@ -41,7 +42,6 @@ from stages.string_sampling.instantiation.state import (
     GraphTables,
     SolverMethod,
 )
-from stages.strings.grammar_arrays import CompiledGrammar
 from stages.variations.growth.state import KnownContacts
 from stages.variations.kernels.outcomes import Outcome
 from stages.variations.kernels.structs import KitTables
@@ -58,7 +58,6 @@ class Problem(NamedTuple):
 
     kit: KitTables
     placements: DockedPlacements
-    grammar: CompiledGrammar
     contacts: KnownContacts
     graph: GraphTables
     guide: Guide
@@ -387,7 +386,7 @@ def _count_neighbours(problem, s, value):
 def _score_by_contacts(problem, s, node):
     """Score the values of a node by their number of contacts; prune those whose contacts the grammar cannot admit."""
     graph_labels = problem.graph.labels
-    label, labels = graph_labels[node], len(problem.grammar.counted)
+    label, labels = graph_labels[node], len(problem.kit.rules.patterns.counted)
     own, around = np.zeros(labels, dtype=np.int64), np.zeros(labels, dtype=np.int64)
     for value in range(s.domain_start[node], s.domain_end[node]):
         if not s.in_domain[value]:
@@ -422,7 +421,7 @@ def _can_be_complete(problem, s, node, fresh, counts):
         other = graph.ends[k]
         if s.assigned[other] < 0 and other != fresh:
             counts[graph.labels[other]] += 1
-    return _fits(problem.grammar, graph.labels[node], counts, False)
+    return fits(problem.kit.rules.patterns, graph.labels[node], counts, False)
 
 
 @numba.njit(cache=True)
@@ -431,30 +430,8 @@ def _all_complete(problem, s):
     labels = problem.graph.labels
     wrong = 0
     for node in range(len(labels)):
-        wrong += not _fits(problem.grammar, labels[node], s.neighbours[node], True)
+        wrong += not fits(problem.kit.rules.patterns, labels[node], s.neighbours[node], True)
     return wrong == 0
-
-
-@numba.njit(cache=True)
-def _fits(grammar, label, counts, complete):
-    """Return whether neighbours by label fit a pattern; unless `complete`, together with any others."""
-    labels, total = len(grammar.counted), 0
-    for kind in range(labels):
-        if grammar.counted[kind]:
-            total += counts[kind]
-    for pattern in range(grammar.first[label], grammar.first[label + 1]):
-        lacking, fits = 0, True
-        for kind in range(labels):
-            if counts[kind] > grammar.high[pattern, kind]:
-                fits = False
-                break
-            lacking += max(grammar.low[pattern, kind] - counts[kind], 0)
-        size = grammar.size[pattern]
-        if not fits or (complete and lacking > 0):
-            continue
-        if size < 0 or total + lacking == size or (not complete and total + lacking < size):
-            return True
-    return False
 
 
 @numba.njit(cache=True)

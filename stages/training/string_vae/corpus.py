@@ -13,8 +13,7 @@ from pipeline.errors import Rejected
 from pipeline.shards import read_shard
 from pipeline.stage import Outcome, Task
 from stages.shape.kit_input import input_kit
-from stages.strings.compiled_grammar import compile_grammar, patterns_json
-from stages.strings.grammar_arrays import CompiledGrammar
+from stages.strings.compiled_grammar import CompiledGrammar, compile_grammar, patterns_json
 from stages.strings.settings import StringsConfig
 from stages.strings.tokens import make_alphabet, number_value, split_tokens
 from stages.training.corpus import write_arrays, write_description

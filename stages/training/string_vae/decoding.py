@@ -10,7 +10,7 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from stages.strings.grammar_arrays import CompiledGrammar
+from stages.strings.compiled_grammar import CompiledGrammar
 from stages.training.string_vae.model import StringVae
 from stages.training.string_vae.vocabulary import END_TOKEN
 

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from stages.strings.compiled_grammar import compile_patterns
+from stages.strings.compiled_grammar import CompiledGrammar, compile_patterns
 from stages.strings.decoder import decode
 from stages.strings.encoder import canonical_string
-from stages.strings.grammar_arrays import CompiledGrammar
 from stages.strings.tokens import StringError
 from stages.training.checkpoint import load_module
 from stages.training.latent import LatentPoints

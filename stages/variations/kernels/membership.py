@@ -1,6 +1,6 @@
-"""Whether a grammar admits a neighbourhood, by its rule (strings §3); earlier verdicts are remembered.
+"""Whether a grammar admits a neighbourhood, by its patterns (strings §3); earlier verdicts are remembered.
 
-It agrees with `stages.shape.graphs.neighbourhoods.admits`, without hubs, which no shape of the search has.
+Shapes of the search have no hubs.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import numpy as np
 
 from stages.shape.geometry.contact_lookup import UNKNOWN_CONTACT
 from stages.shape.geometry.hash_tables import look_up, mix
+from stages.shape.graphs.grammar_patterns import fits
 
 
 @numba.njit(cache=True, inline="always")
@@ -22,7 +23,7 @@ def neighbourhood_key(kit, part_type):
 def recalled(rules, key):
     """Return 1 or 0 where the verdict of this key is known, else MISSING_KEY."""
     verdict = look_up(rules.keys, rules.verdicts, key)
-    return 0 if verdict == UNKNOWN_CONTACT and rules.level == 0 else verdict
+    return 0 if verdict == UNKNOWN_CONTACT and rules.is_exact else verdict
 
 
 @numba.njit(cache=True)
@@ -33,44 +34,12 @@ def admitted(kit, part_type, near, count):
         key += kit.weights[near[n]]
     verdict = recalled(kit.rules, key)
     if verdict == UNKNOWN_CONTACT:
-        labels = np.empty(count, dtype=np.int64)
+        counts = np.zeros(len(kit.rules.patterns.counted), dtype=np.int64)
         for n in range(count):
-            labels[n] = kit.label_of[near[n]]
-        verdict = _rule(kit.rules, kit.label_of[part_type], labels, count)
+            counts[kit.label_of[near[n]]] += 1
+        verdict = 1 if fits(kit.rules.patterns, kit.label_of[part_type], counts, True) else 0
         _remember(kit.rules, key, verdict)
     return verdict == 1
-
-
-@numba.njit(cache=True)
-def _rule(rules, part_type, near, count):
-    """Return the verdict of the rule, on labels."""
-    if rules.level < 4 and (count >= rules.sizes.shape[1] or not rules.sizes[part_type, count]):
-        return 0
-    if rules.level == 1:
-        key = mix(np.uint64(part_type) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(count))
-        for n in range(count):
-            first = True
-            for m in range(n):
-                if near[m] == near[n]:
-                    first = False
-                    break
-            if first:
-                key += rules.set_weights[near[n]]
-        at = np.searchsorted(rules.sets, key)
-        return 1 if at < len(rules.sets) and rules.sets[at] == key else 0
-    around = 0
-    for other in range(rules.local.shape[1]):
-        if rules.local[part_type, other] >= 0:
-            around += 1
-    for n in range(count):
-        row = rules.local[part_type, near[n]]
-        if row < 0:
-            return 0
-        for m in range(n if rules.level == 2 else 0):
-            column = rules.local[part_type, near[m]]
-            if row != column and not rules.pairs[rules.pair_starts[part_type] + row * around + column]:
-                return 0
-    return 1
 
 
 @numba.njit(cache=True)

@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from stages.shape.graphs.grammar_patterns import GrammarPatterns
+
 N_EDGES, N_UNKNOWNS, N_PARTS, N_BOUNDARY, TRY_NUMBER, N_PIECE_PARTS = range(6)
 """Indices of `Workspace.counts`."""
 MAX_COMPONENT_CHOICES = 64
@@ -20,16 +22,11 @@ MIN_UPRIGHT_COSINE = 0.999
 class NeighbourhoodRules(NamedTuple):
     """Which neighbourhoods a grammar admits. Types are indices of labels here, as `KitTables.label_of` gives them."""
 
-    level: int  # 0 multiset, 1 count_and_set, 2 count_and_pairs, 3 count_and_types, 4 slots: types around a part only
-    keys: np.ndarray  # uint64 (2^k,): open-addressing table of neighbourhoods asked for; at level 0 all observed ones
+    patterns: GrammarPatterns
+    is_exact: bool  # all that is admitted is in the table, since the level is `multiset`
+    keys: np.ndarray  # uint64 (2^k,): open-addressing table of neighbourhoods asked for, and of all observed ones
     verdicts: np.ndarray  # int64 (2^k,): 1 admitted, 0 not
     filled: np.ndarray  # int64 (1,): number of keys
-    sizes: np.ndarray  # bool (types, k): whether a part of a type may have k neighbours
-    set_weights: np.ndarray  # uint64 (types,)
-    sets: np.ndarray  # uint64 (m,): sorted keys of a type with a number and a set of neighbour types
-    local: np.ndarray  # int32 (types, types): index of a type among those seen around another, or -1
-    pair_starts: np.ndarray  # int64 (types,): first row of each type in `pairs`
-    pairs: np.ndarray  # bool (p,): row by row, whether two types were seen around one part
 
 
 class KitTables(NamedTuple):

@@ -7,7 +7,7 @@ import numpy as np
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact_lookup import POSE_QUANTUM
 from stages.shape.geometry.contact_oracle import ContactOracle
-from stages.shape.graphs.neighbourhoods import STRICTNESS
+from stages.shape.graphs.grammar_patterns import grammar_patterns
 from stages.shape.kit import Assembly, Grammar, Kit
 from stages.variations.kernels.structs import N_UNKNOWNS, KitTables, NeighbourhoodRules, ShapeTables, Workspace
 
@@ -39,51 +39,24 @@ def multiset_weights(types: int) -> np.ndarray:
 
 def _rules(grammar: Grammar, weights: np.ndarray) -> NeighbourhoodRules:
     """Return the neighbourhoods that `grammar` admits. weights: uint64 (labels,)"""
-    types = len(weights)
-    observed = {part_type: list(seen) for part_type, seen in grammar.neighbourhoods.items()}
-    sizes = {(part_type, sum(count for _, count in near)) for part_type, seen in observed.items() for near in seen}
-    has_size = np.zeros((types, 1 + max(size for _, size in sizes)), dtype=np.bool_)
-    has_size[tuple(np.array(sorted(sizes)).T)] = True
-    set_weights = np.random.Generator(np.random.PCG64(types + 1)).integers(1, 2**63, types, dtype=np.uint64)
-    sets, known = set(), []
-    local = np.full((types, types), -1, dtype=np.int32)
-    squares = np.zeros(types + 1, dtype=np.int64)
-    for part_type, seen in observed.items():
-        around_types = sorted({other for near in seen for other, _ in near})
-        local[part_type, around_types] = np.arange(len(around_types))
-        squares[part_type + 1] = len(around_types) ** 2
-        for near in seen:
-            size = sum(count for _, count in near)
-            key = _mix((part_type * 0x9E3779B97F4A7C15 + size) % 2**64)
-            sets.add((key + sum(int(set_weights[other]) for other, _ in near)) % 2**64)
-            total = _mix(int(weights[part_type])) + sum(int(weights[other]) * count for other, count in near)
-            known.append(total % 2**64)
-    starts = squares.cumsum()
-    pairs = np.zeros(starts[-1], dtype=np.bool_)
-    for part_type, seen in observed.items():
-        side = round(float(squares[part_type + 1]) ** 0.5)
-        for near in seen:
-            rows = local[part_type, [other for other, _ in near]]
-            pairs[starts[part_type] + (rows[:, None] * side + rows[None, :]).ravel()] = True
-    # Every observed neighbourhood is admitted at every level.
+    known = [
+        (_mix(int(weights[part_type])) + sum(int(weights[other]) * count for other, count in near)) % 2**64
+        for part_type, observed in grammar.neighbourhoods.items()
+        for near in observed
+    ]
     room = 1 << max(16, (4 * len(known)).bit_length())
     keys, verdicts = np.zeros(room, dtype=np.uint64), np.zeros(room, dtype=np.int64)
     for key in known:
         slot = key % room
         while keys[slot] != 0:
             slot = (slot + 1) % room
-        keys[slot], verdicts[slot] = key, 1
+        keys[slot], verdicts[slot] = key, 1  # every observed neighbourhood is admitted at every level
     return NeighbourhoodRules(
-        level=STRICTNESS.index(grammar.strictness) if grammar.strictness in STRICTNESS else len(STRICTNESS),
+        patterns=grammar_patterns(grammar, len(weights)),
+        is_exact=grammar.strictness == "multiset",
         keys=keys,
         verdicts=verdicts,
         filled=np.array([len(known)]),
-        sizes=has_size,
-        set_weights=set_weights,
-        sets=np.array(sorted(sets), dtype=np.uint64),
-        local=local,
-        pair_starts=starts[:-1].copy(),
-        pairs=pairs,
     )
 
 

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS, admits
 from stages.shape.kit import Docking, Grammar, Strictness
 from stages.strings.compiled_grammar import compile_grammar, compile_patterns, patterns_json
-from stages.strings.completion import tokens_to_complete
+from stages.strings.completion import NO_COMPLETION, tokens_to_complete
 from stages.strings.decoder import decode
 from stages.strings.encoder import encode
-from stages.strings.grammar_arrays import NO_COMPLETION
 from stages.strings.grammar_mask import NO_TOKEN, GrammarMask, follows_grammar, masks_along
 from stages.strings.mask_state import END_TOKEN
 from stages.strings.tokens import StringError, make_alphabet

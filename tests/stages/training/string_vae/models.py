@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from stages.strings.compiled_grammar import compile_grammar, patterns_json
-from stages.strings.grammar_arrays import CompiledGrammar
+from stages.strings.compiled_grammar import CompiledGrammar, compile_grammar, patterns_json
 from stages.strings.grammar_mask import masks_along
 from stages.training.loop import TrainState, train
 from stages.training.string_vae.batches import StringCorpus
