@@ -143,7 +143,7 @@ doctor: setup  ## Try everything that Shapemill needs on this machine, with the 
 
 # Working on it ------------------------------------------------------------------------------------------------------
 
-.PHONY: test chaos style lint bench kits config-docs release lock
+.PHONY: test chaos style lint bench kits kernels config-docs release lock
 test: style  ## Check style and types and run the tests, on WORKERS cores
 	@$(PYTHON) -m mypy > types.tmp & types=$$!; code=0; \
 	$(PYTHON) -m pytest --numprocesses "$$WORKERS" --dist loadfile --no-loadscope-reorder || code=$$?; \
@@ -160,6 +160,8 @@ bench: setup-dev  ## Measure every stage and every piece against a public peer, 
 	$(PYTHON) -m tests.bench
 kits: setup  ## Write the shipped exemplars from their source
 	$(PYTHON) datasets/exemplars/source
+kernels: setup  ## Record the kernels that stages use, which a first run compiles ahead
+	$(PYTHON) -m pipeline.make_kernel_list .venv/kernels configs/default.yaml
 config-docs: setup  ## Write the tables of config keys in configs/sections from the code
 	$(SHAPEMILL) config-docs
 release: setup  ## Join the fragments of changes/ into the changelog, set VERSION and tag it

@@ -19,6 +19,7 @@ from typing import Annotated
 
 import typer
 
+from pipeline.compilation_note import show_compilation
 from pipeline.config import nearest_word
 from pipeline.errors import ConfigError, Fatal
 from pipeline.options import (
@@ -179,6 +180,7 @@ def main(package: str = "stages") -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+    show_compilation("shapemill")
     try:
         command_line(package, *(["eval"] if package == "stages" else []))(obj=package, prog_name="shapemill")
     except ModuleNotFoundError as error:

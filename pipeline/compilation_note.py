@@ -1,4 +1,4 @@
-"""Note of a shard whose worker compiles kernels, for the progress of the run.
+"""Note of a shard whose worker compiles kernels, for the progress of the run; and lines of a command that compiles.
 
 It imports no Numba, which would take the driver of a run half a second.
 """
@@ -9,8 +9,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from pipeline.display import Display
+
+RECORD_VARIABLE = "SHAPEMILL_RECORD_KERNELS"
+"""Environment variable: the file in which workers record the kernels that they use (`pipeline/kernel_record.py`)."""
+
 _files: list[Path] = []
 """Note of the shard that this process makes, if any."""
+
+_displays: list[Display] = []
+"""Where this process shows that it compiles, if it is that of a command."""
 
 
 @contextmanager
@@ -24,8 +32,15 @@ def compilation_noted_in(file: Path) -> Iterator[None]:
         delete_note(_files.pop())
 
 
+def show_compilation(command: str) -> None:
+    """Show from now on, under the name of a command, that this process compiles kernels."""
+    _displays.append(Display(command))
+
+
 def note_compilation(compiled: int) -> None:
     """Note that a kernel is compiled now, and how many this process has compiled before."""
+    for display in _displays:
+        display.show(f"compiling kernels, once on this machine: {compiled} done")
     for file in _files:
         with suppress(OSError):
             file.write_text(f"{compiled} 1", encoding="utf-8")
@@ -33,10 +48,17 @@ def note_compilation(compiled: int) -> None:
 
 def note_end_of_compilation(compiled: int) -> None:
     """Note that nothing is compiled now, where a note says otherwise."""
+    for display in _displays:
+        display.close()
     for file in _files:
         with suppress(OSError):
             if file.exists():
                 file.write_text(f"{compiled} 0", encoding="utf-8")
+
+
+def stage_of_note() -> str:
+    """Return the stage whose shard this process makes; empty without one."""
+    return _files[-1].parents[1].name if _files else ""
 
 
 def read_compilation_note(file: Path) -> tuple[int, bool]:

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 from pipeline.config import Config
 from pipeline.disk_space import byte_size
+from pipeline.display import duration_text
 from pipeline.errors import ConfigError
-from pipeline.event_log import duration_text
 from pipeline.inventory import Inventory
 from pipeline.paths import DatasetPaths
 from pipeline.registry import upstream

@@ -2,32 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import NoReturn
 
-from tqdm import tqdm
-
+from pipeline.display import Display, duration_text
+from pipeline.kernel_list import CompilationProgress
 from pipeline.time_left import TimeLeft
 
-_LINE_SECONDS = 20.0
-"""Between two lines where there is no terminal."""
-
-_COMPILATION_LINE_SECONDS = 5.0
-"""Before the first line that says that kernels are compiled."""
-
-
-def duration_text(seconds: float) -> str:
-    """Return a duration for people: `8s`, `4m10s`, `2h05m`."""
-    rounded = round(seconds)
-    if rounded < 60:
-        return f"{rounded}s"
-    if rounded < 3600:
-        return f"{rounded // 60}m{rounded % 60:02d}s"
-    return f"{rounded // 3600}h{rounded % 3600 // 60:02d}m"
+_MAX_NAMES_SHOWN = 2
 
 
 @dataclass(frozen=True)
@@ -42,6 +27,7 @@ class Progress:
     samples: number of samples in finished shards
     rejects: number of items that finished shards refused
     kernels: number of kernels that the workers have compiled; None while they compile nothing
+    running: shards that are being made
     """
 
     planned: int
@@ -52,28 +38,22 @@ class Progress:
     samples: int
     rejects: int
     kernels: int | None = None
+    running: tuple[str, ...] = ()
 
 
 class EventLog:
-    """Bar, lines and log of one stage's run."""
+    """Display and log of one stage's run."""
 
     def __init__(self, stage: str, log: Path) -> None:
         self._stage = stage
         self._log = log
-        self._start = time.monotonic()
-        self._last_line = self._start
-        self._line_said_compiling = False
+        self._display = _LoggedDisplay(stage, self.note)
         self._left = TimeLeft()
-        self._bar: tqdm[NoReturn] | None = None
+        self._compilation_left = TimeLeft()
 
     def say(self, text: str) -> None:
         """Write a line to the terminal and to the log."""
-        self.note(text)
-        text = f"{self._stage}: {text}"
-        if self._bar is not None:
-            self._bar.write(text, file=sys.stderr)
-        else:
-            print(text, file=sys.stderr, flush=True)
+        self._display.say(text)
 
     def note(self, text: str) -> None:
         """Write lines to the log alone; a log that cannot be written stops nothing."""
@@ -86,29 +66,32 @@ class EventLog:
 
     def show(self, progress: Progress) -> None:
         """Show the progress: in the bar, or by a line now and then."""
-        now = time.monotonic()
-        left = self._left.after(progress.worked, progress.work, now)
-        text = progress_text(progress, now - self._start, left)
-        if sys.stderr.isatty():
-            if self._bar is None:
-                self._bar = tqdm(bar_format=self._stage, dynamic_ncols=True, leave=False)
-            # Without a number of samples the number of shards grows, and a bar would run backwards.
-            bar = "{percentage:3.0f}% |{bar:20}| " if progress.work else ""
-            self._bar.bar_format = f"{self._stage:<14}{bar}{{desc}}"
-            self._bar.total, self._bar.n = progress.work, progress.worked
-            self._bar.set_description_str(text)
-            return
-        begins = progress.kernels is not None and not self._line_said_compiling
-        if now - self._last_line >= (_COMPILATION_LINE_SECONDS if begins else _LINE_SECONDS):
-            self._last_line = now
-            self._line_said_compiling |= begins
-            self.say(text)
+        left = self._left.after(progress.worked, progress.work, time.monotonic())
+        # Without a number of samples the number of shards grows, and a bar would run backwards.
+        self._display.show(progress_text(progress, self._display.elapsed, left), progress.worked, progress.work)
+
+    def show_compilation(self, progress: CompilationProgress) -> None:
+        """Show how far the compilation of kernels is, as `show` does."""
+        left = self._compilation_left.after(progress.worked, progress.work, time.monotonic())
+        text = f"compiling kernels, once on this machine: {progress.done:,} of {progress.total:,}"
+        text += "" if left is None else f", about {duration_text(left)} left"
+        self._display.show(text, progress.worked, progress.work)
 
     def close(self) -> None:
         """Remove the bar."""
-        if self._bar is not None:
-            self._bar.close()
-            self._bar = None
+        self._display.close()
+
+
+class _LoggedDisplay(Display):
+    """A display whose lines are written to the log, too."""
+
+    def __init__(self, name: str, note: Callable[[str], None]) -> None:
+        super().__init__(name)
+        self._note = note
+
+    def say(self, text: str) -> None:
+        self._note(text)
+        super().say(text)
 
 
 def progress_text(progress: Progress, seconds: float, left: float | None) -> str:
@@ -118,6 +101,9 @@ def progress_text(progress: Progress, seconds: float, left: float | None) -> str
     else:
         items = [f"{progress.done:,.1f}"]
     items[0] += f" of {progress.planned:,} shards"
+    if progress.running and not progress.work:
+        more = ", …" if len(progress.running) > _MAX_NAMES_SHOWN else ""
+        items[0] += f" ({', '.join(progress.running[:_MAX_NAMES_SHOWN])}{more})"
     if progress.samples and not progress.work:
         items.append(f"{progress.samples:,} samples")
     if progress.rejects:
@@ -126,7 +112,7 @@ def progress_text(progress: Progress, seconds: float, left: float | None) -> str
         items.append(f"{progress.failed} quarantined")
     if progress.kernels is not None:
         done = f" ({progress.kernels:,} done)" if progress.kernels else ""
-        items.append(f"compiling kernels once on this machine{done}")
+        items.append(f"compiling kernels, once on this machine{done}")
     items.append(f"{duration_text(seconds)} elapsed")
     if left is not None:
         items.append(f"about {duration_text(left)} left")

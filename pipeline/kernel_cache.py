@@ -256,6 +256,11 @@ _numba_compile = dispatcher.Dispatcher.compile
 dispatcher.Dispatcher.compile = _compile
 
 
+def is_cached(kernel: dispatcher.Dispatcher, arguments: tuple[types.Type, ...]) -> bool:
+    """Whether a kernel of the project is compiled for these types of arguments."""
+    return Path(_entry(kernel._cache, arguments, kernel.targetctx.codegen())._index_path).is_file()
+
+
 # Keys ---------------------------------------------------------------------------------------------------------------
 
 

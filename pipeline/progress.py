@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping
 
 from pipeline.compilation_note import read_compilation_note
 from pipeline.disk_space import byte_size
-from pipeline.event_log import Progress, duration_text
+from pipeline.display import duration_text
+from pipeline.event_log import Progress
 from pipeline.inventory import StageInventory
 from pipeline.paths import StagePaths
 
@@ -26,6 +27,7 @@ def stage_progress(state: StageInventory, running: Iterable[str], failed: int) -
         samples=sum(record.samples for record in records.values()),
         rejects=sum(sum(record.rejects.values()) for record in records.values()),
         kernels=sum(count for count, _ in notes) if any(compiles for _, compiles in notes) else None,
+        running=tuple(sorted(running)),
     )
 
 

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import fcntl
+import os
 import time
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from pipeline.compilation_note import RECORD_VARIABLE
 from pipeline.config import Config
 from pipeline.disk_space import byte_size, check_space
+from pipeline.display import duration_text
 from pipeline.errors import ConfigError, Fatal
-from pipeline.event_log import EventLog, duration_text
+from pipeline.event_log import EventLog
 from pipeline.failures import Failures
 from pipeline.finish import finish_stage, publish
 from pipeline.integrity import withdraw_corrupted
 from pipeline.inventory import Inventory, StageInventory
+from pipeline.kernel_list import KernelList, compile_ahead
 from pipeline.paths import DatasetPaths, fatal_cause, remove
 from pipeline.progress import closing_line, shard_count_text, stage_progress
 from pipeline.prune import prune_inputs
@@ -95,7 +99,7 @@ def run_stages(
     works here), and Fatal when everything had to stop. Complete files and their records stay for the next run.
     """
     names, results = list(names), dict[str, RunResult]()
-    shared = _Shared(stages, paths, Inventory(config, stages, paths), workers, RunOptions(**options).cluster)
+    shared = _Shared(names, stages, paths, Inventory(config, stages, paths), workers, RunOptions(**options).cluster)
     shared.inventory.note_code(names)
     try:
         for name in names:
@@ -113,8 +117,16 @@ class _Shared:
     """What the stages of a run share: plans and records, and the workers, which start with the first shard."""
 
     def __init__(
-        self, stages: Mapping[str, Stage], paths: DatasetPaths, inventory: Inventory, count: int, cluster: str
+        self,
+        names: Sequence[str],
+        stages: Mapping[str, Stage],
+        paths: DatasetPaths,
+        inventory: Inventory,
+        count: int,
+        cluster: str,
     ) -> None:
+        self._names = names
+        self._kernels_compiled = False
         self.stages = stages
         self.paths = paths
         self.inventory = inventory
@@ -127,6 +139,24 @@ class _Shared:
         if self._workers is None:
             self._workers = _cluster_workers(self._cluster) if self._cluster else _workers(self._count, self.paths)
         return self._workers
+
+    def compile_kernels(self, log: EventLog) -> None:
+        """Compile the kernels that the stages of the run use, before its first shard."""
+        if self._kernels_compiled or self._cluster or RECORD_VARIABLE in os.environ:
+            return
+        self._kernels_compiled = True
+        config, listed = self.inventory.config, KernelList.read()
+        producers = [name for name, stage in self.stages.items() if stage.requested_samples(config)]
+        indices = listed.indices(producers, self._names)
+        if not indices:
+            return
+        from pipeline.workers import Workers
+
+        assert isinstance(self.workers, Workers)
+        start = time.monotonic()
+        compiled = compile_ahead(listed, indices, self.workers, log.show_compilation)
+        if compiled:
+            log.say(f"{compiled} kernels compiled in {duration_text(time.monotonic() - start)}, once on this machine")
 
     def stop_workers(self, kill: bool) -> None:
         """End all workers: at once, or after their current jobs."""
@@ -188,6 +218,7 @@ class _Run:
         self._delete_unfinished(state)
         if state.missing:
             self._check_environment()
+            self._shared.compile_kernels(self._log)
             for line in rebuild_reasons(state):
                 self._log.say(line)
             remove(state.paths.manifest)

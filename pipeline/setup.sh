@@ -83,6 +83,26 @@ groups = [project["optional-dependencies"][group] for group in sys.argv[1:]]
 print(*facts["build-system"]["requires"], *project["dependencies"], *(name for group in groups for name in group), sep="\n")
 END
 grep '^--' requirements.lock >> "$requirements"
+count() { grep -c "$1" .venv/install.log || true; }
+
+# Installs with pip, and says every five seconds how far it is; pip itself says nothing while it unpacks.
+pip_install() {
+    .venv/bin/python -m pip install --disable-pip-version-check --no-compile --progress-bar off "$@" > .venv/install.log 2>&1 &
+    pip=$!
+    seconds=0
+    while kill -0 "$pip" 2>/dev/null; do
+        sleep 1
+        seconds=$((seconds + 1))
+        if [ $((seconds % 5)) = 0 ]; then
+            found=$(count '^Collecting\|^Requirement already')
+            new=$(find .venv/lib -maxdepth 3 -name '*.dist-info' -newer .venv/requirements.txt | wc -l)
+            echo "set-up: $found packages found, $(count '^ *Downloading\|^ *Using cached\|^Processing') fetched," \
+                "$new installed, ${seconds}s elapsed"
+        fi
+    done
+    wait "$pip" || fail "$(tail -n 20 .venv/install.log)" "pip failed; all that it said is in .venv/install.log"
+}
+
 echo "installing $(grep -c '^[^-]' "$requirements") packages and what they need into .venv; the first time takes minutes"
-.venv/bin/python -m pip install -q --disable-pip-version-check --constraint requirements.lock --requirement "$requirements"
-.venv/bin/python -m pip install -q --disable-pip-version-check --no-deps --no-build-isolation --editable .
+pip_install --constraint requirements.lock --requirement "$requirements"
+pip_install --no-deps --no-build-isolation --editable .

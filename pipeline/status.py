@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 from pipeline.config import Config
 from pipeline.disk_space import byte_size
-from pipeline.event_log import duration_text
+from pipeline.display import duration_text
 from pipeline.inventory import Inventory, StageInventory
 from pipeline.paths import DatasetPaths, read_json
 from pipeline.rebuild_reasons import rebuild_reasons

@@ -16,7 +16,7 @@ from typing import BinaryIO, Literal
 import numpy as np
 
 from pipeline.code import transitive_imports
-from pipeline.compilation_note import compilation_noted_in
+from pipeline.compilation_note import RECORD_VARIABLE, compilation_noted_in
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal, Rejected, ShardFailed
 from pipeline.package_groups import missing_group
@@ -35,6 +35,7 @@ from pipeline.records import ShardRecord, fingerprint, read_record
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Shard, Task
 
+_records_kernels = False
 _PROGRESS_SECONDS = 0.5
 """Between two notes of a shard's progress."""
 
@@ -80,6 +81,7 @@ class Report:
 def make_shard(job: Job) -> Report:
     """Make and commit one shard. Never raises: an exception becomes the status of the report."""
     _forget_peak_memory()
+    _record_kernels()
     task, start = _ShardTask(job), time.process_time()
     try:
         with compilation_noted_in(job.paths.stage(job.stage).compilation_note(job.shard.name)):
@@ -102,6 +104,16 @@ def make_shard(job: Job) -> Report:
             return Report(job.shard.name, "refused", str(error), trace)
         message = str(error) if isinstance(error, ShardFailed) else f"{type(error).__name__}: {error}"
         return Report(job.shard.name, "failed", message, trace)
+
+
+def _record_kernels() -> None:
+    """Record the kernels that this process uses, where `make kernels` asks for it."""
+    global _records_kernels
+    if not _records_kernels and RECORD_VARIABLE in os.environ:
+        from pipeline.kernel_record import record_kernels
+
+        record_kernels(Path(os.environ[RECORD_VARIABLE]))
+        _records_kernels = True
 
 
 def _forget_peak_memory() -> None:

@@ -11,7 +11,7 @@ import faulthandler
 import os
 import signal
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
 from typing import Any
@@ -76,7 +76,7 @@ class _Worker:
         self._executor: ProcessPoolExecutor | None = None
         self._made = 0
 
-    def submit(self, job: Job) -> Future[Report]:
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         if self._executor is not None and self._made >= _SHARDS_PER_PROCESS:
             self.stop(kill=False)
         if self._executor is None:
@@ -90,7 +90,7 @@ class _Worker:
                     env=_ENVIRONMENT,
                 )
         self._made += 1
-        future: Future[Report] = self._executor.submit(make_shard, job)
+        future: Future[Any] = self._executor.submit(function, *arguments)
         return future
 
     def stop(self, kill: bool) -> None:
@@ -124,6 +124,7 @@ class Workers:
         self._count = count
         self._idle = [_Worker(output) for _ in range(count)]
         self._busy: dict[Future[Report], tuple[list[_Worker], Job]] = {}
+        self._calls: dict[Future[Any], _Worker] = {}
 
     @property
     def jobs(self) -> list[Job]:
@@ -140,7 +141,28 @@ class Workers:
         Raises IndexError when there is no room.
         """
         taken = [self._idle.pop() for _ in range(self._needed(job))]
-        self._busy[taken[0].submit(job)] = (taken, job)
+        self._busy[taken[0].submit(make_shard, job)] = (taken, job)
+
+    @property
+    def idle(self) -> int:
+        """Number of idle workers."""
+        return len(self._idle)
+
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Start a call of a function on an idle worker. Raises IndexError without one."""
+        worker = self._idle.pop()
+        future = worker.submit(function, *arguments)
+        self._calls[future] = worker
+        return future
+
+    def ended_calls(self, timeout: float) -> Iterator[Future[Any]]:
+        """Yield the calls that end within `timeout` seconds; those whose worker died have an exception."""
+        for future in wait(self._calls, timeout=timeout, return_when=FIRST_COMPLETED).done:
+            worker = self._calls.pop(future)
+            if future.exception() is not None:
+                worker.stop(kill=True)
+            self._idle.append(worker)
+            yield future
 
     def _needed(self, job: Job) -> int:
         return min(job.shard.threads, self._count)
@@ -169,6 +191,8 @@ class Workers:
 
     def stop(self, kill: bool) -> None:
         """End all workers: at once, or after their current jobs."""
-        for worker in [*self._idle, *(worker for taken, _ in self._busy.values() for worker in taken)]:
+        busy = [worker for taken, _ in self._busy.values() for worker in taken]
+        for worker in [*self._idle, *busy, *self._calls.values()]:
             worker.stop(kill)
         self._busy.clear()
+        self._calls.clear()

@@ -15,6 +15,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from pipeline.compilation_note import RECORD_VARIABLE
+from pipeline.kernel_list import KernelList
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_files import load_kit
 from stages.shape.sample import read_samples
@@ -24,6 +26,8 @@ from tests.stages.strings.grammar_check import check_string
 from tests.stated import stated
 
 STAGES = ("exemplars", "variations", "validity", "strings", "points", "sketches", "package")
+
+RECORD = "kernels.jsonl"
 
 pytestmark = pytest.mark.slow
 
@@ -92,15 +96,26 @@ def digests(out: Path) -> dict[str, str]:
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("dataset")
     config = write_config(folder)
-    make(config, folder / "one", 1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(RECORD_VARIABLE, str(folder / RECORD))
+        make(config, folder / "one", 1)
     return config, folder / "one"
 
 
-def test_two_workers_make_the_same_folder(made: tuple[Path, Path]) -> None:
+def test_two_workers_make_the_same_folder_in_one_run(made: tuple[Path, Path]) -> None:
     config, one = made
     two = one.with_name("two")
-    make(config, two, 2)
+    code, printed = shapemill("run", "--config", config, "--out", two, "--workers", 2)
+    assert code == 0, printed
     assert digests(two) == digests(one)
+
+
+def test_kernels_that_the_dataset_uses_are_listed(made: tuple[Path, Path]) -> None:
+    lines = (made[1].with_name(RECORD)).read_text(encoding="utf-8").splitlines()
+    used = {json.dumps(json.loads(line)["kernel"]) for line in lines}
+    unlisted = used - {json.dumps([kernel.name, kernel.arguments]) for kernel in KernelList.read().kernels}
+    assert len(used) > 100
+    assert len(unlisted) < len(used) / 10, f"run `make kernels`: {sorted(unlisted)}"
 
 
 def test_kill_in_every_stage_and_another_run_make_the_same_folder(made: tuple[Path, Path]) -> None:

@@ -9,7 +9,6 @@ from typing import Any
 
 from pipeline.config import Config
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.package.compose import compose_dataset
 from stages.package.layout import (
     CARD,
     CHECKSUMS,
@@ -116,6 +115,8 @@ def _merged(plan: Plan) -> list[Shard]:
 def run_shard(task: Task) -> Outcome:
     """Make one shard of the plan."""
     if task.shard.name == DATASET_SHARD:
+        from stages.package.compose import compose_dataset
+
         return compose_dataset(task)
     if task.shard.name == PREVIEW_SHARD:
         from stages.package.preview import draw_preview

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from pipeline.display import ticking
 from pipeline.errors import ConfigError
 from pipeline.options import (
     DEFAULT_CONFIG,
@@ -44,6 +45,7 @@ def verify(
     corrupted = False
     if folder is None:
         stages, loaded, paths = load_dataset(context, config, out, seed)
-        corrupted = print_corrupted(stages, loaded, paths)
+        with ticking("verify", "comparing files with their records"):
+            corrupted = print_corrupted(stages, loaded, paths)
         folder = out / loaded.name
     raise typer.Exit(print_findings(folder, count, seed or 0, workers) or int(corrupted))

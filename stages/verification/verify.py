@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.display import counting, ticking
 from pipeline.randomness import decision_rng
 from stages.package.layout import MANIFEST, VERIFIER
 from stages.verification.files import (
@@ -48,7 +49,8 @@ def verify_dataset(folder: Path, samples: int | None, seed: int, workers: int = 
     samples: number of samples rechecked by independent means; None: all
     """
     findings = Findings()
-    known = check_files(folder, findings)
+    with ticking("verify", "comparing checksums"):
+        known = check_files(folder, findings)
     if known is None:
         return findings
     manifest, whole = known
@@ -66,11 +68,14 @@ def verify_dataset(folder: Path, samples: int | None, seed: int, workers: int = 
         first += shard["samples"]
     rows: list[SampleRow] = []
     tally: ClassCounts = ClassCounts()
-    for shard_findings, shard_rows, counts in _check_shards(work, workers):
-        findings.add(shard_findings)
-        rows += shard_rows
-        tally.update(counts)
-    _check_standalone(folder, samples, seed, workers, findings)
+    with counting("verify", sum(shard["samples"] for _, shard, *_ in work), "samples") as show:
+        for shard_findings, shard_rows, counts in _check_shards(work, workers):
+            findings.add(shard_findings)
+            rows += shard_rows
+            tally.update(counts)
+            show(len(rows))
+    with ticking("verify", "running a verifier of its own"):
+        _check_standalone(folder, samples, seed, workers, findings)
     check_splits(manifest, rows, findings)
     if len(work) == len(manifest["shards"]):
         check_classes(folder, tally, findings)

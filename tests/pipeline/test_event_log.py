@@ -8,6 +8,7 @@ import pty
 import subprocess
 import sys
 import termios
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 
 from pipeline.config import Config, StrictModel
+from pipeline.display import ticking
 from pipeline.event_log import EventLog, Progress, progress_text
 from pipeline.paths import DatasetPaths
 from pipeline.run import run_stage
@@ -71,24 +73,45 @@ def test_progress_counts_samples_where_the_plan_has_their_number() -> None:
     )
     grows = Progress(planned=8, done=6.4, failed=0, work=0, worked=0.0, samples=0, rejects=0)
     assert progress_text(grows, 41.0, None) == "6.4 of 8 shards, 41s elapsed"
+    named = replace(grows, running=("castle", "temple", "tower"))
+    assert progress_text(named, 41.0, None) == "6.4 of 8 shards (castle, temple, …), 41s elapsed"
 
 
 def test_progress_says_that_kernels_are_compiled(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     idle = Progress(planned=4, done=0, failed=0, work=0, worked=0.0, samples=0, rejects=0)
     waiting, compiling = replace(idle, kernels=0), replace(idle, kernels=112)
-    assert progress_text(waiting, 9.0, None) == "0.0 of 4 shards, compiling kernels once on this machine, 9s elapsed"
+    assert progress_text(waiting, 9.0, None) == "0.0 of 4 shards, compiling kernels, once on this machine, 9s elapsed"
     assert "once on this machine (112 done), 9s" in progress_text(compiling, 9.0, None)
 
-    clock = iter([0.0, 4.0, 6.0, 7.0, 11.0, 12.0, 25.0, 27.0])
+
+def test_lines_are_at_most_five_seconds_apart_in_the_first_minute_and_twenty_later(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    now = 0.0
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("pipeline.event_log.time.monotonic", lambda: next(clock))
+        patch.setattr("pipeline.display.time.monotonic", lambda: now)
         log = EventLog("exemplars", tmp_path / "log")
-        for progress in (compiling, idle, waiting, idle, compiling, idle, compiling):
-            log.show(progress)
+        while now < 200.0:
+            log.show(Progress(planned=4, done=0, failed=0, work=0, worked=0.0, samples=0, rejects=0))
+            now += 0.5
     lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 2, "one line when it begins, then a line now and then"
-    assert lines[0].endswith("compiling kernels once on this machine, 7s elapsed")
-    assert "(112 done), 27s" in lines[1]
+    assert [line.split(", ")[-1] for line in lines[:3]] == ["5s elapsed", "10s elapsed", "15s elapsed"]
+    assert [line.split(", ")[-1] for line in lines[11:14]] == ["1m00s elapsed", "1m20s elapsed", "1m40s elapsed"]
+    assert lines[0] == "exemplars: 0.0 of 4 shards, 5s elapsed"
+    logged = (tmp_path / "log").read_text(encoding="utf-8").splitlines()
+    assert [line.partition(" ")[2] for line in logged] == lines
+
+
+def test_command_that_says_nothing_shows_the_time_that_passes(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pipeline.display._REFRESH_SECONDS", 0.01)
+    monkeypatch.setattr("pipeline.display.FIRST_LINE_SECONDS", 0.05)
+    with ticking("inspect", "looking for contacts"):
+        time.sleep(0.3)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) >= 2
+    assert set(lines) == {"inspect: looking for contacts, 0s elapsed"}
 
 
 def seen_on_a_terminal(*arguments: object) -> str:
@@ -124,7 +147,7 @@ def test_a_terminal_shows_a_bar_with_samples_while_it_works_and_none_afterwards(
 
 
 def test_stage_without_a_plan_prints_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    idle = Stage("idle", 1, StrictModel, (), lambda _: [], lambda _: Outcome(0), lambda _: 0)
+    idle = Stage("idle", __name__, StrictModel, (), lambda _: [], lambda _: Outcome(0), lambda _: 0)
     config = Config("toys", "1.0.0", 0, {"idle": StrictModel()}, tmp_path / "toys.yaml")
     assert run_stage("idle", {"idle": idle}, config, DatasetPaths(tmp_path, "toys"), workers=1).left == 0
     assert capfd.readouterr() == ("", "")

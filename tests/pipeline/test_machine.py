@@ -64,6 +64,30 @@ def test_set_up_prints_the_exact_command_where_apt_may_not_or_cannot(tmp_path: P
     assert not (tmp_path / "project/.venv").exists()
 
 
+FAKE_PYTHON = """#!/bin/sh
+case "$*" in
+    *"pip install"*) echo "Collecting numpy"; echo "  Downloading numpy.whl"; sleep 6; echo "no space left"; exit 1 ;;
+    "-") echo numpy ;;
+esac
+"""
+
+
+def test_set_up_says_how_far_it_is_while_pip_works_and_what_pip_said_when_it_fails(tmp_path: Path) -> None:
+    project = project_with_missing_library(tmp_path / "project")
+    (project / "pipeline/libraries.txt").write_text("# library, package\n", encoding="utf-8")
+    (project / "requirements.lock").write_text("--no-binary :none:\n", encoding="utf-8")
+    (project / ".venv/bin").mkdir(parents=True)
+    (project / ".venv/bin/python").write_text(FAKE_PYTHON, encoding="utf-8")
+    (project / ".venv/bin/python").chmod(0o755)
+    done = subprocess.run(["sh", "pipeline/setup.sh"], cwd=project, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "set-up: 1 packages found, 1 fetched, 0 installed, 5s elapsed" in done.stdout
+    assert done.stderr.splitlines()[-2:] == [
+        "no space left",
+        "pip failed; all that it said is in .venv/install.log",
+    ]
+
+
 @pytest.mark.slow
 def test_doctor_finds_a_library_that_does_not_load_and_names_the_package(tmp_path: Path) -> None:
     (tmp_path / "fcl.py").write_text(

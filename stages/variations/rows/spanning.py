@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.kit import PartMesh
@@ -95,6 +94,8 @@ class Span:
         behind = self.previous[at_end]
         if (self.mates[at_start] < 0).any() or (behind < 0).any():
             return False
+        from scipy.spatial import cKDTree
+
         middles = self.points[at_start].mean(axis=1) + self.shift
         gaps, _ = cKDTree(middles).query(self.points[at_end].mean(axis=1))
         return bool((gaps <= VERTEX_REACH * self.tolerance).all())

@@ -52,6 +52,7 @@ def run_assignment(task: Task) -> Outcome:
     measures: dict[str, Any] = {}
     for kit, (name, pool, ancestry, selected) in enumerate(zip(kits, pools, ancestries, chosen, strict=True)):
         measures[name] = _measures(task, name, pool, selected)
+        task.progress(kit + 1, len(kits))
         variants = selected.variants.tolist()
         keys = {variant: sample_key(name, number) for number, variant in enumerate(variants)}
         named = ancestry.named(keys, dict(zip(variants, selected.split_of.tolist(), strict=True)))
