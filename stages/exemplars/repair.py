@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from stages.exemplars.coincident_patches import flat_patches
 from stages.exemplars.orientation import face_outward, flipped_faces
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.connected_faces import connected_corners, connected_faces
@@ -43,8 +44,10 @@ def repair_mesh(
     used = np.unique(faces)
     whole = _distinct_corners(vertices, faces)
     solid = connected_faces(vertices, faces[whole], np.zeros(len(whole), np.int32))
-    alone = _without_reversed_solids(vertices, faces[whole], solid)
-    unique = whole[alone][_without_duplicates(*_weld(vertices, faces[whole[alone]], solid[alone]))]
+    patch, outline = flat_patches(vertices, faces[whole], solid)
+    alone = _without_repeated_solids(vertices, faces[whole], solid, outline)
+    distinct = alone[_without_duplicates(*_weld(vertices, faces[whole[alone]], solid[alone]))]
+    unique = whole[distinct[_without_repeated_patches(patch, outline, solid, distinct)]]
     solid_of = np.full(len(faces), -1, dtype=np.int32)
     solid_of[whole] = solid
     points, manifold = _cut_apart(vertices, faces[unique], solid_of[unique])
@@ -127,16 +130,36 @@ def _cut_apart(vertices: FloatArray, faces: IntArray, solid: IntArray) -> tuple[
     return vertices[faces.ravel()[first[order]]], rank[inverse].reshape(-1, 3)
 
 
-def _without_reversed_solids(vertices: FloatArray, faces: IntArray, solid: IntArray) -> np.ndarray:
-    """Return the indices of the faces without solids that repeat others face by face: two-sided exports of shells."""
+def _without_repeated_solids(vertices: FloatArray, faces: IntArray, solid: IntArray, outline: IntArray) -> np.ndarray:
+    """Return the indices of the faces without solids that repeat others: two-sided exports of shells.
+
+    outline: the number of each face's flat patch, which patches with equal outlines share. A face is repeated if an
+    earlier solid has a face with the same corners, or a patch with the same outline.
+    """
     _, position = np.unique(vertices, axis=0, return_inverse=True)
     _, same = np.unique(np.sort(position.reshape(-1)[faces], axis=1), axis=0, return_inverse=True)
-    same = same.reshape(-1)
-    earliest = np.full(same.max(initial=-1) + 1, len(faces))
-    np.minimum.at(earliest, same, solid)
     repeats = np.ones(solid.max(initial=-1) + 1, dtype=bool)
-    repeats[solid[earliest[same] == solid]] = False
+    is_first = np.ones(len(faces), dtype=bool)
+    for group in (same.reshape(-1), outline):
+        earliest = np.full(group.max(initial=-1) + 1, len(faces))
+        np.minimum.at(earliest, group, solid)
+        is_first &= earliest[group] == solid
+    repeats[solid[is_first]] = False
     return np.flatnonzero(~repeats[solid])
+
+
+def _without_repeated_patches(patch: IntArray, outline: IntArray, solid: IntArray, kept: np.ndarray) -> np.ndarray:
+    """Return the indices into `kept` without flat patches whose outline an earlier whole patch of their solid has.
+
+    kept: the faces that are left of those with the numbers `patch`, `outline` and `solid`.
+    """
+    is_whole = np.bincount(patch[kept], minlength=len(patch)) == np.bincount(patch, minlength=len(patch))
+    _, group = np.unique(np.column_stack([solid, outline]), axis=0, return_inverse=True)
+    group = group.reshape(-1)
+    first = np.full(group.max(initial=-1) + 1, len(patch))
+    whole = kept[is_whole[patch[kept]]]
+    np.minimum.at(first, group[whole], patch[whole])
+    return np.flatnonzero(first[group[kept]] >= patch[kept])
 
 
 def _crowded_edges(faces: IntArray) -> int:

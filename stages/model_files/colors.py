@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable, Mapping
+from typing import Literal
 
 import numpy as np
 
+from stages.model_files.other_content import content_fault
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 IMAGE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TGA", "TIFF", "DDS", "PPM")
 """The formats that are tried, whatever the file's name: for others Pillow starts programs (EPS) or runs long."""
+
+Wrap = Literal["repeat", "mirror", "clamp"]
+"""What a texture shows outside its borders: itself again, its mirror image, or the pixels of the border."""
+_WRAPS: Mapping[Wrap, Callable[[FloatArray], FloatArray]] = {
+    "repeat": lambda at: at % 1.0,
+    "mirror": lambda at: 1.0 - np.abs(1.0 - at % 2.0),
+    "clamp": lambda at: np.clip(at, 0.0, 1.0),
+}
+MAX_ROUNDING = 1.001
+"""Factor by which colours exceed their range through rounding."""
 
 
 def linear_from_srgb(colors: ByteArray) -> FloatArray:
@@ -30,11 +43,26 @@ def color_bytes(colors: FloatArray) -> ByteArray:
 
 
 def unit_colors(colors: np.ndarray) -> FloatArray:
-    """Return red, green and blue of `colors` (n, 3 or 4), floats or whole numbers, in [0, 1]."""
+    """Return red, green and blue of all `colors` (n, 3 or 4) of a file in [0, 1].
+
+    Bytes range to 255. Wider numbers range to the least of 255, 65,535 and the largest number of their type that none
+    of them exceeds; floats also to 1. Bytes with a sign are bytes that were written without asking for one.
+    """
     rgb = np.asarray(colors)[:, :3]
-    if rgb.dtype.kind in "ui":
-        return rgb / float(np.iinfo(rgb.dtype).max)
-    return rgb.astype(np.float64)
+    if rgb.dtype.itemsize == 1:
+        return rgb.view(np.uint8) / 255.0
+    values = np.nan_to_num(rgb.astype(np.float64))
+    limits = [255.0, 65535.0, float(np.iinfo(rgb.dtype).max) if rgb.dtype.kind in "ui" else np.inf]
+    if rgb.dtype.kind == "f":
+        limits.insert(0, 1.0)
+    largest = values.max(initial=0.0) / MAX_ROUNDING
+    limit = next(limit for limit in limits if largest <= limit)
+    return values / (limit if np.isfinite(limit) else max(largest, 1.0))
+
+
+def wrap_coordinates(uv: FloatArray, wrap_u: Wrap, wrap_v: Wrap) -> FloatArray:
+    """Return texture coordinates (n, 2) in [0, 1), or up to 1 where they are clamped."""
+    return np.stack([_WRAPS[wrap](np.nan_to_num(uv[:, axis])) for axis, wrap in enumerate((wrap_u, wrap_v))], axis=1)
 
 
 def decode_image(content: bytes) -> ByteArray:
@@ -47,6 +75,8 @@ def decode_image(content: bytes) -> ByteArray:
     except Image.DecompressionBombError:
         raise OSError(f"it has more than {2 * (Image.MAX_IMAGE_PIXELS or 0):,} pixels") from None
     except UnidentifiedImageError:
+        if (other := content_fault(content)) is not None:
+            raise OSError(f"it {other}") from None
         raise OSError(f"it is not one of {', '.join(IMAGE_FORMATS)}") from None
     except OSError:
         raise
@@ -54,16 +84,19 @@ def decode_image(content: bytes) -> ByteArray:
         raise OSError("it is damaged") from None
 
 
-def sample_texture(image: ByteArray, uv: FloatArray, faces: IntArray) -> ByteArray:
+def sample_texture(
+    image: ByteArray, uv: FloatArray, faces: IntArray, wrap_u: Wrap = "repeat", wrap_v: Wrap = "repeat"
+) -> ByteArray:
     """Return the pixel of `image` (h, w, 3) under the centroid of each face, uint8 (f, 3).
 
-    uv: float64 (n, 2), origin at the lower left of the image, repeating outside [0, 1].
+    uv: float64 (n, 2), origin at the lower left of the image.
     faces: int32 (f, 3), indices into uv.
+    wrap_u, wrap_v: what is outside [0, 1].
     """
     height, width = image.shape[:2]
-    centroid = np.nan_to_num(uv[faces].mean(axis=1))
-    column = np.floor((centroid[:, 0] % 1.0) * width).astype(np.int64)
-    row = np.floor(((1.0 - centroid[:, 1]) % 1.0) * height).astype(np.int64)
+    middle = uv[faces].mean(axis=1)
+    column, row = (wrap_coordinates(middle * (1.0, -1.0) + (0.0, 1.0), wrap_u, wrap_v) * (width, height)).T
+    column, row = np.floor(column).astype(np.int64), np.floor(row).astype(np.int64)
     pixels: ByteArray = image[np.minimum(row, height - 1), np.minimum(column, width - 1)]
     return pixels
 

@@ -16,9 +16,9 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.model_files.colors import color_bytes, decode_image, face_paint, sample_texture, unit_colors
+from stages.model_files.dae_primitives import polygon_triangles, vertex_positions, without_unreadable_primitives
 from stages.model_files.enclosure import Enclosure, Outside
 from stages.model_files.markup import check_markup
-from stages.model_files.polygons import triangulate
 from stages.model_files.scene import GREY, INVALID, ModelScene, Placement, SceneNode, Surface, type_label
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
@@ -44,7 +44,10 @@ def read_dae(path: Path, enclosure: Enclosure) -> ModelScene:
     enclosure.at = "its asset or one of its libraries"
     try:
         document = collada.Collada(io.BytesIO(content), ignore=[collada.common.DaeError])
-        return _Reader(path, enclosure, document).scene()
+        mended, warnings = without_unreadable_primitives(document)
+        if mended is not None:
+            document = collada.Collada(mended, ignore=[collada.common.DaeError])
+        return _Reader(path, enclosure, document, warnings).scene()
     except (ArithmeticError, AttributeError, LookupError, SyntaxError, TypeError, ValueError, collada.common.DaeError):
         raise ConfigError(
             f"{path}: not a whole COLLADA file ({enclosure.at} {INVALID}); copy or export it again"
@@ -52,11 +55,11 @@ def read_dae(path: Path, enclosure: Enclosure) -> ModelScene:
 
 
 class _Reader:
-    def __init__(self, path: Path, enclosure: Enclosure, document: Any) -> None:
+    def __init__(self, path: Path, enclosure: Enclosure, document: Any, warnings: list[str]) -> None:
         self.path = path
         self.enclosure = enclosure
         self.document = document
-        self.warnings: list[str] = []
+        self.warnings = warnings
         self.images: dict[str, ByteArray | None] = {}
         self.tree: list[SceneNode] = []
 
@@ -138,12 +141,15 @@ class _Reader:
                 corners = self.corners(primitive)
                 if corners is None:
                     continue
-                points, triangles = np.asarray(primitive.vertex, dtype=np.float64), corners[0]
+                points, (table, rows) = vertex_positions(primitive), corners
+                triangles = table[rows, primitive.sources["VERTEX"][0][0]].astype(np.int32)
+                if triangles.min(initial=0) < 0 or triangles.max(initial=-1) >= len(points):
+                    raise ValueError("a face has a vertex that does not exist")
                 target = bound.get(primitive.material)
                 name = getattr(target, "name", None) or getattr(target, "id", None) or primitive.material
                 if name is not None and name not in names:
                     names.append(name)
-                own_colors, own_paint = self.face_colors(primitive, target, corners[1])
+                own_colors, own_paint = self.face_colors(primitive, target, table, rows)
                 vertices.append(points)
                 faces.append(triangles + np.int32(offset))
                 colors.append(own_colors)
@@ -161,41 +167,43 @@ class _Reader:
             paint=np.concatenate(paint) if painted else None,
         )
 
-    def corners(self, primitive: Any) -> tuple[IntArray, IntArray] | None:
-        """Return faces as vertex indices and as rows of the index table; None for lines and empty primitives."""
+    def corners(self, primitive: Any) -> tuple[np.ndarray, IntArray] | None:
+        """Return the index table (n, inputs) and triangles as its rows; None for lines and empty primitives."""
         from collada.polylist import Polylist
         from collada.triangleset import TriangleSet
 
-        if primitive.vertex is None:
+        if not len(vertex_positions(primitive)):
             return None
         if isinstance(primitive, TriangleSet):
-            rows = np.arange(3 * len(primitive.index), dtype=np.int32).reshape(-1, 3)
-        elif isinstance(primitive, Polylist):
-            rows = triangulate(primitive.vertex, primitive.vertex_index, primitive.vcounts)[0]
-        else:
-            self.warnings.append("lines are left out")
-            return None
-        return np.asarray(primitive.vertex_index).ravel()[rows].astype(np.int32), rows
+            table = np.asarray(primitive.index).reshape(-1, primitive.nindices)
+            return table, np.arange(len(table), dtype=np.int32).reshape(-1, 3)
+        if isinstance(primitive, Polylist):
+            table, rows, warnings = polygon_triangles(primitive, primitive.vcounts)
+            self.warnings += warnings
+            return table, rows
+        self.warnings.append("lines are left out")
+        return None
 
-    def face_colors(self, primitive: Any, material: Any, rows: IntArray) -> tuple[ByteArray, ByteArray | None]:
+    def face_colors(
+        self, primitive: Any, material: Any, table: np.ndarray, rows: IntArray
+    ) -> tuple[ByteArray, ByteArray | None]:
         colors = np.tile(np.array(GREY, np.uint8), (len(rows), 1))
         paint = None
         if primitive.sources.get("COLOR"):
             offset, *_, source = primitive.sources["COLOR"][0]
-            index = np.asarray(primitive.index).reshape(-1, primitive.nindices)[:, offset]
-            vertex_colors = color_bytes(unit_colors(source.data[index]))
+            vertex_colors = color_bytes(unit_colors(source.data[table[:, offset]]))
             paint = face_paint(vertex_colors, rows)
             colors = np.rint(vertex_colors[rows].mean(axis=1)).astype(np.uint8)
         diffuse = getattr(getattr(material, "effect", None), "diffuse", None)
         if isinstance(diffuse, tuple):
             if paint is None:
                 colors[:] = color_bytes(np.array(diffuse[:3], dtype=np.float64))
-        elif diffuse is not None and len(primitive.texcoordset):
+        elif diffuse is not None and primitive.sources.get("TEXCOORD"):
             image = self.image(diffuse.sampler.surface.image.path)
             if image is not None:
-                uv = np.asarray(primitive.texcoordset[0], dtype=np.float64)[:, :2]
-                index = np.asarray(primitive.texcoord_indexset[0]).ravel()
-                colors = sample_texture(image, uv[index], rows)
+                offset, *_, source = primitive.sources["TEXCOORD"][0]
+                uv = np.asarray(source.data, dtype=np.float64)[:, :2]
+                colors = sample_texture(image, uv[table[:, offset]], rows)
         return colors, paint
 
     def image(self, name: str) -> ByteArray | None:

@@ -6,7 +6,7 @@ import base64
 import binascii
 import re
 from pathlib import Path
-from urllib.parse import unquote
+from urllib.parse import unquote, unquote_to_bytes
 
 from pipeline.errors import ConfigError
 
@@ -81,9 +81,11 @@ class Enclosure:
     def _inline(self, uri: str, element: str) -> bytes:
         header, comma, payload = uri.partition(",")
         try:
-            if not comma or not header.endswith(";base64"):
-                raise binascii.Error("not base64")
-            return base64.b64decode(payload, validate=True)
+            if not comma:
+                raise binascii.Error("no content")
+            if not header.endswith(";base64"):
+                return unquote_to_bytes(payload)
+            return base64.b64decode("".join(payload.split()), validate=True)
         except binascii.Error:
             raise ConfigError(
                 f"{self.model}: {element} has a data URI that is not valid base64; export the model again, as .glb"

@@ -6,7 +6,7 @@ breaks a node with several materials into parts with random names, and loses wha
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.model_files.colors import (
+    Wrap,
     decode_image,
     face_paint,
     linear_from_srgb,
@@ -36,13 +37,15 @@ from stages.model_files.scene import (
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 _MODE_TRIANGLES, _MODE_STRIP, _MODE_FAN = 4, 5, 6
+_WRAPS: Mapping[int, Wrap] = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
 
 
 def read_gltf(path: Path, enclosure: Enclosure) -> ModelScene:
     """Return the scene of a `.glb` or `.gltf` file; placements are in depth-first order of its node tree.
 
-    Several primitives of a mesh are one surface. Skins, morph targets, cameras, lights and animations are left out.
-    Raises ConfigError for a file that is cut off, malformed or compressed.
+    Several primitives of a mesh are one surface. Meshes have the shape of their default morph weights and, with a skin,
+    of its joints; hidden nodes, cameras, lights and animations are left out. Raises ConfigError for a file that is cut
+    off, malformed or compressed, or requires an extension that is not read.
     """
     try:
         return _Reader(GltfFile(path, enclosure)).scene()
@@ -60,12 +63,17 @@ class _Reader:
         self.warnings: list[str] = []
         self.images: dict[int, ByteArray | None] = {}
         self.tree: list[SceneNode] = []
+        self.hidden = 0
+        self.parents: dict[int, int] | None = None
 
     def scene(self) -> ModelScene:
         nodes = list(self.walk())
-        used = sorted({self.header["nodes"][index]["mesh"] for index, _, _ in nodes})
-        surfaces = [self.surface(index) for index in used]
-        surface_of = {mesh: index for index, mesh in enumerate(used)}
+        if self.hidden:
+            self.warnings.append(f"{self.hidden:,} hidden nodes are left out, with what is below them")
+        shapes = {index: self.shape_of(index) for index, _, _ in nodes}
+        used = sorted(set(shapes.values()))
+        surfaces = [self.surface(*shape) for shape in used]
+        surface_of = {shape: index for index, shape in enumerate(used)}
         placements = []
         for index, pose, row in nodes:
             self.file.enclosure.at = f"node {index}"
@@ -73,10 +81,8 @@ class _Reader:
             mesh_name = self.name("mesh", node["mesh"])
             node_name = self.name("node", index)
             name = node_name or mesh_name or f"node{index}"
-            if "skin" in node:
-                self.warnings.append(f"node {name!r} has a skin; it is left out and the mesh is taken unposed")
             label = type_label(name) if type_label(name) != name else mesh_name or node_name
-            placements.append(Placement(name, label, surface_of[node["mesh"]], pose, row))
+            placements.append(Placement(name, label, surface_of[shapes[index]], pose, row))
         return ModelScene(
             "nodes",
             tuple(surfaces),
@@ -116,10 +122,13 @@ class _Reader:
                     f"{self.file.path}: node {node.get('name', index)!r} is instanced on the GPU "
                     "(EXT_mesh_gpu_instancing), which is not read; export it again with one node for each instance"
                 )
+            if node.get("extensions", {}).get("KHR_node_visibility", {}).get("visible", True) is False:
+                self.hidden += 1
+                continue
             row = len(self.tree)
             self.tree.append(SceneNode(self.name("node", index) or f"node{index}", parent_row))
             if "mesh" in node:
-                yield index, pose, row
+                yield index, (pose if self.shape_of(index)[1] < 0 else np.eye(4)), row
             stack.extend((child, pose, row) for child in reversed(node.get("children", [])))
 
     def name(self, kind: Literal["node", "mesh", "material"], index: int) -> str | None:
@@ -130,7 +139,14 @@ class _Reader:
             return None
         return name or None
 
-    def surface(self, index: int) -> Surface:
+    def shape_of(self, node_index: int) -> tuple[int, int, tuple[float, ...]]:
+        """Return what gives a node's mesh its shape: mesh, skin (-1 for none) and morph weights."""
+        node = self.header["nodes"][node_index]
+        mesh = self.header["meshes"][node["mesh"]]
+        weights = node.get("weights") or mesh.get("weights") or ()
+        return int(node["mesh"]), int(node.get("skin", -1)), tuple(map(float, weights))
+
+    def surface(self, index: int, skin: int, weights: tuple[float, ...]) -> Surface:
         self.file.enclosure.at = f"mesh {index}"
         mesh = self.header["meshes"][index]
         name = self.name("mesh", index) or f"mesh{index}"
@@ -140,12 +156,13 @@ class _Reader:
         offset = 0
         for number, primitive in enumerate(mesh["primitives"]):
             element = self.file.enclosure.at = f"mesh {name!r}, primitive {number}"
-            if primitive.get("targets"):
-                self.warnings.append(f"mesh {name!r} has morph targets; they are left out")
             triangles = self.triangles(primitive, element)
             if triangles is None:
                 continue
             own_vertices, own_faces = triangles
+            own_vertices = own_vertices + self.morph(primitive, weights, element)
+            if skin >= 0:
+                own_vertices = self.skinned(skin, primitive["attributes"], own_vertices, element)
             linear, own_paint = self.face_colors(primitive, own_faces, element)
             colors.append(srgb_from_linear(linear))
             paint.append(colors[-1] if own_paint is None else own_paint)
@@ -186,6 +203,8 @@ class _Reader:
             raise Malformed(f"{element} has a face on vertex {corners.max()} of {len(vertices)}")
         if mode == _MODE_TRIANGLES:
             faces = corners[: len(corners) // 3 * 3].reshape(-1, 3)
+            if further := len(corners) % 3:
+                self.warnings.append(f"{element} has {further} corners after its last triangle; they are left out")
         else:
             faces = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
             if mode == _MODE_STRIP:
@@ -193,6 +212,67 @@ class _Reader:
             else:
                 faces[:, 0] = corners[0]
         return vertices, faces.astype(np.int32)
+
+    def morph(self, primitive: dict[str, Any], weights: tuple[float, ...], element: str) -> FloatArray | float:
+        """Return by how much the default weights of its morph targets move the vertices of a primitive."""
+        moved: FloatArray | float = 0.0
+        for weight, target in zip(weights, primitive.get("targets", ()), strict=False):
+            if weight and "POSITION" in target:
+                moved = moved + weight * self.file.accessor(target["POSITION"], element).astype(np.float64)
+        return moved
+
+    def skinned(self, skin: int, attributes: dict[str, int], vertices: FloatArray, element: str) -> FloatArray:
+        """Return the vertices of a primitive in the world, moved by the joints of its skin.
+
+        Each moves by the weighted mean of its joints' world matrices times their inverse bind matrices; the transform
+        of the node that holds the mesh does not count. Vertices without weights stay where they are.
+        """
+        joints = self.joint_matrices(skin, element)
+        total = np.zeros((len(vertices), 4, 4))
+        sums = np.zeros(len(vertices))
+        number = 0
+        while f"JOINTS_{number}" in attributes:
+            index = self.file.accessor(attributes[f"JOINTS_{number}"], element).astype(np.int64)
+            weights = self.file.accessor(attributes[f"WEIGHTS_{number}"], element)
+            if weights.dtype.kind == "u":
+                weights = weights / np.iinfo(weights.dtype).max
+            weights = np.nan_to_num(weights.astype(np.float64))
+            if index.max(initial=0) >= len(joints):
+                raise Malformed(f"{element} has a vertex on joint {index.max()} of {len(joints)}")
+            for column in range(index.shape[1]):
+                total += weights[:, column, None, None] * joints[index[:, column]]
+            sums += weights.sum(axis=1)
+            number += 1
+        if not (sums > 0).all():
+            without = np.count_nonzero(~(sums > 0))
+            self.warnings.append(f"{element} has {without:,} vertices without a joint of its skin; they stay unposed")
+        total[sums > 0] /= sums[sums > 0, None, None]
+        total[~(sums > 0)] = np.eye(4)
+        moved: FloatArray = np.einsum("nij,nj->ni", total[:, :3, :3], vertices) + total[:, :3, 3]
+        return moved
+
+    def joint_matrices(self, skin: int, element: str) -> FloatArray:
+        """Return the world matrix of each joint of a skin times its inverse bind matrix, float64 (j, 4, 4)."""
+        stated = self.header["skins"][skin]
+        worlds = np.array([self.world(joint) for joint in stated["joints"]]).reshape(-1, 4, 4)
+        if "inverseBindMatrices" not in stated:
+            return worlds
+        inverse = self.file.accessor(stated["inverseBindMatrices"], element).astype(np.float64)
+        bound: FloatArray = worlds @ inverse[: len(worlds)].reshape(-1, 4, 4).transpose(0, 2, 1)
+        return bound
+
+    def world(self, index: int) -> FloatArray:
+        """Return the world matrix of a node, whether or not the scene shows it."""
+        nodes = self.header["nodes"]
+        if self.parents is None:
+            self.parents = {child: number for number, node in enumerate(nodes) for child in node.get("children", [])}
+        matrix = _local_matrix(nodes[index])
+        for _ in range(len(nodes)):
+            if index not in self.parents:
+                return matrix
+            index = self.parents[index]
+            matrix = _local_matrix(nodes[index]) @ matrix
+        raise Malformed(f"node {index} is below itself")
 
     def face_colors(
         self, primitive: dict[str, Any], faces: IntArray, element: str
@@ -225,7 +305,8 @@ class _Reader:
             return linear
         placing = texture.get("extensions", {}).get("KHR_texture_transform", {})
         coordinates = f"TEXCOORD_{placing.get('texCoord', texture.get('texCoord', 0))}"
-        image = self.image(self.header["textures"][texture["index"]])
+        stated = self.header["textures"][texture["index"]]
+        image = self.texture(stated)
         if image is None or coordinates not in attributes:
             return linear
         uv = self.file.accessor(attributes[coordinates], element).astype(np.float64)
@@ -233,14 +314,24 @@ class _Reader:
         spin = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
         uv = uv * placing.get("scale", (1.0, 1.0)) @ spin.T + placing.get("offset", (0.0, 0.0))
         uv[:, 1] = 1.0 - uv[:, 1]
-        return linear * linear_from_srgb(sample_texture(image, uv, faces))
+        sampler = self.header["samplers"][stated["sampler"]] if "sampler" in stated else {}
+        wrap_u, wrap_v = (_WRAPS.get(sampler.get(key, 0), "repeat") for key in ("wrapS", "wrapT"))
+        textured: FloatArray = linear * linear_from_srgb(sample_texture(image, uv, faces, wrap_u, wrap_v))
+        return textured
 
-    def image(self, texture: dict[str, Any]) -> ByteArray | None:
-        """Return the pixels of a texture, decoded once; None, with a warning, without a readable image."""
-        extensions = [*texture.get("extensions", {}).values(), texture]
-        index = next((holder["source"] for holder in extensions if holder.get("source") is not None), None)
-        if index is None:
-            return None
+    def texture(self, stated: dict[str, Any]) -> ByteArray | None:
+        """Return the pixels of the first readable image of a texture: those of extensions, then the fallback."""
+        before = len(self.warnings)
+        for holder in [*stated.get("extensions", {}).values(), stated]:
+            if holder.get("source") is not None:
+                image = self.image(holder["source"])
+                if image is not None:
+                    del self.warnings[before:]  # an image that has a readable fallback is not missed
+                    return image
+        return None
+
+    def image(self, index: int) -> ByteArray | None:
+        """Return the pixels of an image, decoded once; None, with a warning, for one that is not readable."""
         if index not in self.images:
             image = self.header["images"][index]
             try:

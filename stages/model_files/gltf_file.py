@@ -11,12 +11,24 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.model_files.enclosure import Enclosure
+from stages.model_files.other_content import content_fault
 from stages.model_files.scene import Malformed
 
 COMPRESSED = "export it again without compression"
 
+READ_EXTENSIONS = {
+    "KHR_mesh_quantization", "KHR_texture_transform", "KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif",
+    "MSFT_texture_dds", "KHR_node_visibility", "KHR_lights_punctual", "EXT_lights_image_based", "KHR_animation_pointer",
+    "KHR_xmp", "KHR_xmp_json_ld", "KHR_techniques_webgl", "KHR_draco_mesh_compression", "EXT_meshopt_compression",
+    "KHR_meshopt_compression", "EXT_mesh_gpu_instancing", "EXT_mesh_manifold", "FB_ngon_encoding",
+    "KHR_node_hoverability", "KHR_node_selectability", "KHR_interactivity",
+}  # fmt: skip
+"""Extensions that are read, that change no shape and no colour, or that have a message of their own where they are."""
+APPEARANCE_PREFIX = "KHR_materials_"
+"""Extensions of materials change how light is reflected, not the base colour."""
+
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 class GltfFile:
@@ -34,6 +46,7 @@ class GltfFile:
         version = str(self.header.get("asset", {}).get("version", ""))
         if not version.startswith("2."):
             raise ConfigError(f"{path}: glTF version {version or 'unknown'}; only 2.x is read, export it again as 2.0")
+        _check_required(path, self.header.get("extensionsRequired", []))
         for index, buffer in enumerate(self.header.get("buffers", [])):
             enclosure.at = f"buffer {index}"
             if "uri" in buffer:
@@ -76,7 +89,9 @@ class GltfFile:
     def view(self, index: int, element: str) -> tuple[bytes, int]:
         """Return bytes and stride (0 for none) of a buffer view."""
         view = self.header["bufferViews"][index]
-        buffer = self.buffer(view["buffer"], element, "EXT_meshopt_compression" in view.get("extensions", {}))
+        buffer = self.buffer(
+            view["buffer"], element, any(name.endswith("_meshopt_compression") for name in view.get("extensions", {}))
+        )
         start, length = view.get("byteOffset", 0), view["byteLength"]
         if start < 0 or length < 0 or start + length > len(buffer):
             raise ConfigError(
@@ -90,13 +105,16 @@ class GltfFile:
             uri = self.header["buffers"][index].get("uri")
             if uri is not None:
                 try:
-                    self.buffers[index] = self.enclosure.read(uri, f"buffer {index}", encoded=True)
+                    content = self.enclosure.read(uri, f"buffer {index}", encoded=True)
                 except FileNotFoundError:
                     raise ConfigError(
                         f"{self.path}: buffer {index} is the file {uri!r}, which is missing; put it next to the model"
                     ) from None
                 except OSError:
                     raise ConfigError(f"{self.path}: buffer {index}, the file {uri!r}, cannot be read") from None
+                if (other := content_fault(content)) is not None:
+                    raise ConfigError(f"{self.path}: buffer {index}, the file {uri[:80]!r}, {other}")
+                self.buffers[index] = content
             elif index == 0 and self.chunk is not None:
                 self.buffers[index] = self.chunk
             elif compressed:
@@ -104,6 +122,15 @@ class GltfFile:
             else:
                 raise ConfigError(f"{self.path}: buffer {index} has no content; export the file again")
         return self.buffers[index]
+
+
+def _check_required(path: Path, required: list[str]) -> None:
+    """Raise ConfigError for an extension without which the file may not be read, unless it is read or named later."""
+    for name in required:
+        if name not in READ_EXTENSIONS and not str(name).startswith(APPEARANCE_PREFIX):
+            raise ConfigError(
+                f"{path}: requires the glTF extension {str(name)[:80]!r}, which is not read; export it again without it"
+            )
 
 
 def _container(path: Path) -> tuple[dict[str, Any], bytes | None]:
@@ -123,14 +150,15 @@ def _container(path: Path) -> tuple[dict[str, Any], bytes | None]:
         text, rest = content[20 : 20 + length], 20 + length
         if len(text) < length:
             raise ConfigError(f"{path}: truncated GLB: its JSON chunk is cut off; copy or export it again")
-        if rest + 8 <= len(content):
+        while chunk is None and rest + 8 <= len(content):  # chunks of other kinds may come first
             size, kind = struct.unpack_from("<I4s", content, rest)
             if kind == b"BIN\0":
                 chunk = content[rest + 8 : rest + 8 + size]
+            rest += 8 + size
     else:
         text = content
     try:
-        header = json.loads(text)
+        header = json.loads(text.rstrip(b"\0 \t\r\n"))
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
         raise ConfigError(f"{path}: not a glTF file: its JSON breaks off in {where}; export it again") from None

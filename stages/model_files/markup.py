@@ -19,8 +19,6 @@ def check_markup(path: Path, content: bytes) -> None:
     Raises ConfigError for a file that is no plain XML, declares entities, nests deeper than 250 elements, or announces
     polygons of more corners than the file has bytes.
     """
-    if content[:2] == b"PK":
-        raise ConfigError(f"{path}: is a zip archive; unpack it and name the .dae file in it")
     checker = _Checker(path, len(content))
     try:
         checker.parser.Parse(content, True)

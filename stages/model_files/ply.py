@@ -6,6 +6,7 @@ on the wrong triangles where it splits polygons.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,6 +39,22 @@ _TYPES = {
     "float32": "f4",
     "float64": "f8",
 }
+_CORNER_LISTS = ("vertex_indices", "vertex_index", "vertex_indexes", "indices", "index")
+_STRIPS = ("tristrips", "tristrip", "triangle_strips")
+_COLOR_NAMES = tuple(
+    tuple(f"{prefix}{channel}{suffix}" for channel in channels)
+    for channels in (("red", "green", "blue"), ("r", "g", "b"))
+    for prefix, suffix in (
+        ("", ""),
+        ("diffuse_", ""),
+        ("vertex_", ""),
+        ("color_", ""),
+        ("", "_color"),
+        ("ambient_", ""),
+    )
+)
+_COLOR_LISTS = ("rgb", "rgba", "color", "colour", "colors", "colours")
+_HEADER = re.compile(rb"ply[ \t]*(\r\n|\n|\r)(.*?)\1[ \t]*end_header[ \t]*\1", re.DOTALL)
 _ENCODINGS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
@@ -73,21 +90,21 @@ def read_ply(path: Path, enclosure: Enclosure) -> ModelScene:
         elements, order, texture, start = _header(content, enclosure)
         read = _ascii if order == "" else _binary
         columns = read(content[start:], elements, order, enclosure)
+        warnings = _left_out(elements)
         vertex, face = columns.get("vertex", {}), columns.get("face", {})
         vertices = _rows("vertex", vertex, ("x", "y", "z")).astype(np.float64)
-        corners = face.get("vertex_indices") or face.get("vertex_index")
-        indices = lengths = np.empty(0, np.int64)
-        if corners is not None and corners.lengths is not None:
-            indices, lengths = corners.values.astype(np.int64), corners.lengths
+        indices, lengths = _polygons(face, columns, warnings)
         if len(indices) and (indices.min() < 0 or indices.max() >= len(vertices)):
             raise Malformed(f"a face on vertex {indices.max()} of {len(vertices)}")
-        of_faces, of_vertices = _colors("face", face), _colors("vertex", vertex)
+        of_faces, of_vertices = _colors("face", face, warnings), _colors("vertex", vertex, warnings)
+        if of_faces is not None and len(of_faces) < len(lengths):  # strips have no colours
+            grey = np.tile(np.array(GREY, np.uint8), (len(lengths) - len(of_faces), 1))
+            of_faces = np.concatenate([of_faces, grey])
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
         reason = error if isinstance(error, Malformed) else f"{enclosure.at} {INVALID}"
         raise ConfigError(f"{path}: not a whole PLY file ({reason}); copy or export it again") from None
     triangles, polygon = triangulate(vertices, indices, lengths)
     faces = indices[triangles].astype(np.int32)
-    warnings: list[str] = []
     paint: ByteArray | None = None
     face_colors: ByteArray = np.tile(np.array(GREY, np.uint8), (len(faces), 1))
     if of_faces is not None:
@@ -115,7 +132,7 @@ def read_ply_points(path: Path, enclosure: Enclosure) -> tuple[FloatArray, Float
         points = _rows("vertex", vertex, ("x", "y", "z")).astype(np.float64)
         axes = ("nx", "ny", "nz")
         normals = _rows("vertex", vertex, axes).astype(np.float64) if vertex.keys() >= set(axes) else None
-        return points, normals, _colors("vertex", vertex)
+        return points, normals, _colors("vertex", vertex, [])
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
         reason = error if isinstance(error, Malformed) else f"{enclosure.at} {INVALID}"
         raise ConfigError(f"{path}: not a whole PLY file ({reason}); copy or export it again") from None
@@ -123,13 +140,12 @@ def read_ply_points(path: Path, enclosure: Enclosure) -> tuple[FloatArray, Float
 
 def _header(content: bytes, enclosure: Enclosure) -> tuple[list[_Element], str, str | None, int]:
     """Return elements, byte order (empty for ASCII), texture file, and the offset after the header."""
-    end = content.find(b"end_header")
-    if not content.startswith(b"ply") or end < 0:
+    found = _HEADER.match(content)
+    if found is None:
         raise Malformed("no PLY header")
-    start = content.index(b"\n", end) + 1
     elements: list[_Element] = []
     order, texture = None, None
-    for line in content[:end].decode("utf-8", errors="replace").splitlines():
+    for line in re.split(r"\r\n|\n|\r", found[2].decode("utf-8", errors="replace")):
         words = line.split()
         enclosure.at = f"the header's line {line[:60]!r}"
         if words[:1] == ["format"]:
@@ -139,16 +155,16 @@ def _header(content: bytes, enclosure: Enclosure) -> tuple[list[_Element], str, 
         elif words[:1] == ["element"]:
             elements.append(_Element(words[1], int(words[2]), []))
         elif words[:2] == ["property", "list"]:
-            elements[-1].properties.append(_Property(words[4], _TYPES[words[3]], _TYPES[words[2]]))
+            elements[-1].properties.append(_Property(words[4].lower(), _TYPES[words[3]], _TYPES[words[2]]))
         elif words[:1] == ["property"]:
-            elements[-1].properties.append(_Property(words[2], _TYPES[words[1]], None))
+            elements[-1].properties.append(_Property(words[2].lower(), _TYPES[words[1]], None))
     # a row without properties takes no bytes, so nothing would limit its count
     elements = [element for element in elements if element.properties]
     if any(element.count < 0 for element in elements):
         raise Malformed("an element has a negative number of rows")
     if order is None:
         raise Malformed("no format line")
-    return elements, order, texture, start
+    return elements, order, texture, found.end()
 
 
 def _binary(body: bytes, elements: list[_Element], order: str, enclosure: Enclosure) -> dict[str, dict[str, _Column]]:
@@ -252,9 +268,81 @@ def _rows(element: str, columns: dict[str, _Column], names: tuple[str, ...]) -> 
     return np.stack([columns[name].values for name in names], axis=1)
 
 
-def _colors(element: str, columns: dict[str, _Column]) -> ByteArray | None:
-    names = ("red", "green", "blue")
-    return color_bytes(unit_colors(_rows(element, columns, names))) if columns.keys() >= set(names) else None
+def _left_out(elements: list[_Element]) -> list[str]:
+    """Return a sentence for each element that is not read."""
+    read = ("vertex", "face", *_STRIPS)
+    return [
+        f"element {element.name[:40]!r} with {element.count:,} rows is left out"
+        for element in elements
+        if element.count and element.name not in read
+    ]
+
+
+def _polygons(
+    face: dict[str, _Column], columns: dict[str, dict[str, _Column]], warnings: list[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of the faces, then of the triangles of strips; and the number of corners of each."""
+    corners = next((face[name] for name in _CORNER_LISTS if name in face), None)
+    indices = lengths = np.empty(0, np.int64)
+    if corners is not None and corners.lengths is not None:
+        indices, lengths = corners.values.astype(np.int64), corners.lengths
+    elif count := max((len(column.values) for column in face.values()), default=0):
+        warnings.append(
+            f"element 'face' has no list {' or '.join(_CORNER_LISTS[:2])}; its {count:,} values are left out"
+        )
+    if few := np.count_nonzero(lengths < 3):
+        warnings.append(f"{few:,} faces with fewer than three corners are left out")
+    for name in _STRIPS:
+        for column in columns.get(name, {}).values():
+            if column.lengths is not None and column.values.dtype.kind in "iu":
+                strips = np.split(column.values.astype(np.int64), np.cumsum(column.lengths)[:-1])
+                triangles = np.concatenate(
+                    [_strip_triangles(strip) for strip in strips] or [np.empty((0, 3), np.int64)]
+                )
+                indices = np.concatenate([indices, triangles.ravel()])
+                lengths = np.concatenate([lengths, np.full(len(triangles), 3)])
+    return indices, lengths
+
+
+def _strip_triangles(strip: np.ndarray) -> np.ndarray:
+    """Return the triangles of a strip, int64 (t, 3); a negative index begins another strip."""
+    triangles = np.stack([strip[:-2], strip[1:-1], strip[2:]], axis=1) if len(strip) > 2 else np.empty((0, 3), np.int64)
+    numbers = np.arange(len(strip))
+    restarts = np.maximum.accumulate(np.where(strip < 0, numbers + 1, 0))
+    is_odd = (numbers[: len(triangles)] - restarts[: len(triangles)]) % 2 == 1
+    triangles[is_odd] = triangles[is_odd][:, [1, 0, 2]]
+    kept: np.ndarray = triangles[(triangles >= 0).all(axis=1)]
+    return kept
+
+
+def _colors(element: str, columns: dict[str, _Column], warnings: list[str]) -> ByteArray | None:
+    """Return the colours of an element, by any usual name; None, with a warning, for what seems to be colours."""
+    for names in _COLOR_NAMES:
+        if columns.keys() >= set(names):
+            return color_bytes(unit_colors(_rows(element, columns, names)))
+    for name in _COLOR_LISTS:
+        column = columns.get(name)
+        if column is not None and column.lengths is None and column.values.dtype.itemsize in (4, 8):
+            return _unpacked_colors(column.values)
+        if column is not None and column.lengths is not None and len(column.lengths):
+            width = int(column.lengths[0])
+            if width in (3, 4) and (column.lengths == width).all():
+                return color_bytes(unit_colors(column.values.reshape(-1, width)))
+    named = [
+        name for name in columns if any(word in name for word in ("red", "green", "blue", "color", "colour", "rgb"))
+    ]
+    if named:
+        listed = ", ".join(named)[:80]
+        warnings.append(
+            f"properties {listed} of element {element} are no red, green and blue that are known; they are left out"
+        )
+    return None
+
+
+def _unpacked_colors(values: np.ndarray) -> ByteArray:
+    """Return the colours in the lower three bytes of 32 bits, which may be stored as a float (Point Cloud Library)."""
+    words = values.astype(np.float32).view(np.uint32) if values.dtype.kind == "f" else values.astype(np.uint32)
+    return np.stack([words >> 16 & 255, words >> 8 & 255, words & 255], axis=1).astype(np.uint8)
 
 
 def _textured(

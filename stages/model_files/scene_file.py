@@ -17,6 +17,7 @@ from stages.model_files.enclosure import Enclosure
 from stages.model_files.gltf import read_gltf
 from stages.model_files.limits import ReadLimits
 from stages.model_files.off import read_off
+from stages.model_files.other_content import HEAD_BYTES, content_fault
 from stages.model_files.ply import read_ply
 from stages.model_files.scene import ModelScene, Placement, SceneNode, Surface, plain_name, plain_text
 from stages.model_files.stl import read_stl
@@ -57,6 +58,10 @@ def read_scene(path: Path) -> ModelScene:
         raise ConfigError(f"{path}: may not be read; give this user permission to read it (chmod u+r)")
     if path.stat().st_size == 0:
         raise ConfigError(f"{path}: the file is empty; copy or export it again")
+    with open(path, "rb") as stream:
+        other = content_fault(stream.read(HEAD_BYTES))
+    if other is not None:
+        raise ConfigError(f"{path}: {other}")
     enclosure = Enclosure(path)
     try:
         scene = reader(path, enclosure)

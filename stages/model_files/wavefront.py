@@ -1,4 +1,4 @@
-"""Wavefront OBJ with its MTL: named objects in file order, n-gons, materials, textures, vertex colours.
+"""Wavefront OBJ with its MTL: objects in file order, n-gons, materials, textures, vertex colours.
 
 trimesh's reader is not used here: it groups faces by material, which breaks up objects and their order. It also reads
 one material library only, counts negative indices from the end of the file, and splits n-gons into fans.
@@ -6,7 +6,7 @@ one material library only, counts negative indices from the end of the file, and
 
 from __future__ import annotations
 
-import codecs
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,65 +14,87 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.model_files.colors import color_bytes, decode_image, face_paint, sample_texture
-from stages.model_files.enclosure import Enclosure, Outside
+from stages.model_files.colors import color_bytes, face_paint, sample_texture, unit_colors
+from stages.model_files.enclosure import Enclosure
 from stages.model_files.polygons import triangulate
 from stages.model_files.scene import GREY, ModelScene, Placement, Surface, type_label
-from stages.shape.arrays import ByteArray
+from stages.model_files.wavefront_materials import WavefrontMaterial, read_libraries
+from stages.model_files.wavefront_text import TextLine, decode_text, text_lines
+from stages.shape.arrays import ByteArray, IntArray
 
-_MAP_OPTIONS = {"-mm": 2, "-o": 3, "-s": 3, "-t": 3}
-
-
-@dataclass
-class _Material:
-    color: ByteArray = field(default_factory=lambda: np.array(GREY, np.uint8))
-    image: ByteArray | None = None
+_WITHOUT_SHAPE = {
+    "vn", "s", "mg", "bevel", "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj", "ctech", "stech",
+}  # fmt: skip
+"""Keywords that change how a model is rendered, and not which faces and colours it has."""
+_FREE_FORM = "free-form curves and surfaces"
+_LEFT_OUT = {
+    "p": "points",
+    "l": "lines",
+    **dict.fromkeys(("vp", "cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm", "trim"), _FREE_FORM),
+    **dict.fromkeys(("hole", "scrv", "sp", "end", "con"), _FREE_FORM),
+    **dict.fromkeys(("bsp", "bzp", "cdc", "cdp", "res"), _FREE_FORM),
+    **dict.fromkeys(("maplib", "usemap"), "texture maps outside materials"),
+    **dict.fromkeys(("call", "csh"), "commands"),
+}
+_MRGB_LETTERS = 8
+"""Letters of each colour in ZBrush's comments: mask, red, green, blue."""
 
 
 @dataclass
 class _Lines:
-    """The content of the lines of an OBJ, before triangulation."""
+    """The content of the lines of an OBJ, before triangulation.
+
+    colors: vertex and numbers of each coloured vertex.
+    states: object number, object name, group and material of each face; the number counts `o` lines.
+    forward: face corners whose vertices were not yet listed, with the line.
+    """
 
     positions: list[list[float]] = field(default_factory=list)
-    colors: list[list[float]] = field(default_factory=list)
+    colors: list[tuple[int, list[float]]] = field(default_factory=list)
+    brushed: list[str] = field(default_factory=list)
     texture: list[list[float]] = field(default_factory=list)
     corners: list[int] = field(default_factory=list)
     texture_corners: list[int] = field(default_factory=list)
     counts: list[int] = field(default_factory=list)
-    states: list[tuple[str | None, str | None, str | None]] = field(default_factory=list)
-    libraries: list[str] = field(default_factory=list)
-    skipped: set[str] = field(default_factory=set)
+    states: list[tuple[int, str | None, str | None, str | None]] = field(default_factory=list)
+    libraries: list[TextLine] = field(default_factory=list)
+    left_out: Counter[str] = field(default_factory=Counter)
+    unknown: dict[str, list[int]] = field(default_factory=dict)
+    forward: list[tuple[int, TextLine]] = field(default_factory=list)
 
 
 def read_wavefront(path: Path, enclosure: Enclosure) -> ModelScene:
-    """Return the scene of an `.obj` file: a placement for each object (`o`; `g` if there is at most one `o`).
+    """Return the scene of an `.obj` file: a placement for each `o` line (for each `g` if there is at most one `o`).
 
     Raises ConfigError, with the line, for an invalid number or index.
     """
     lines = _parse(path)
-    warnings = [f"{kind} are left out" for kind in sorted(lines.skipped)]
-    materials = _libraries(lines.libraries, enclosure, warnings)
+    warnings = [f"{count:,} {kind} are left out" for kind, count in sorted(lines.left_out.items())]
+    warnings += [
+        f"{len(numbers):,} lines that begin with {keyword[:40]!r}, the first of them line {numbers[0]}, are not read"
+        for keyword, numbers in lines.unknown.items()
+    ]
+    materials = read_libraries(lines.libraries, enclosure, warnings)
     vertices = np.array(lines.positions, dtype=np.float64).reshape(-1, 3)
     corners = np.array(lines.corners, dtype=np.int64)
     triangles, polygon = triangulate(vertices, corners, np.array(lines.counts, dtype=np.int64))
-    names = sorted({state[2] for state in lines.states if state[2] is not None})
+    names = sorted({state[3] for state in lines.states if state[3] is not None})
     index_of: dict[str | None, int] = {None: -1, **{name: index for index, name in enumerate(names)}}
-    material_of = np.array([index_of[state[2]] for state in lines.states], dtype=np.int32)
+    material_of = np.array([index_of[state[3]] for state in lines.states], dtype=np.int32)
     warnings += [
         f"material {name!r} is not in its library; its faces are grey" for name in names if name not in materials
     ]
     faces = corners[triangles].astype(np.int32)
     face_material = material_of[polygon]
-    paint = None
-    if lines.colors and len(lines.colors) == len(vertices):
-        paint = face_paint(color_bytes(np.array(lines.colors)), faces)
     uv = np.array(lines.texture, dtype=np.float64).reshape(-1, 2)
     uv_faces = np.array(lines.texture_corners, dtype=np.int64)[triangles]
+    paint, is_painted = _paint(lines, faces, warnings)
+    face_colors = _face_colors([materials.get(name) for name in names], face_material, uv, uv_faces, paint, is_painted)
     whole = Surface(
         name=path.stem,
         vertices=vertices,
         faces=faces,
-        face_colors=_face_colors([materials.get(name) for name in names], face_material, uv, uv_faces, paint),
+        face_colors=face_colors,
         materials=tuple(names),
         face_material=face_material,
         paint=paint,
@@ -91,157 +113,166 @@ def read_wavefront(path: Path, enclosure: Enclosure) -> ModelScene:
 
 def _parse(path: Path) -> _Lines:
     lines = _Lines()
-    content = path.read_bytes()
-    encoding = "utf-16" if content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig"
-    text = content.decode(encoding, errors="replace").replace("\\\r\n", " ").replace("\\\n", " ")
-    group: str | None = None
+    text = decode_text(path.read_bytes())
+    if "#MRGB" in text:
+        lines.brushed = [
+            line.split()[1] for line in text.splitlines() if line.startswith("#MRGB ") and line.split()[1:]
+        ]
+    number = 0
     current: str | None = None
+    group: str | None = None
     material: str | None = None
-    for number, line in enumerate(text.splitlines(), start=1):
-        keyword, _, rest = line.strip().partition(" ")
-        rest = rest.partition("#")[0].strip() if keyword in ("v", "vt", "f") else rest.strip()
+    for line in text_lines(text):
+        keyword, rest = line.keyword, line.rest
         try:
             if keyword == "v":
-                values = [float(word) for word in rest.split()]
-                lines.positions.append(values[:3] if len(values) >= 3 else [float("x")])
-                if len(values) == 6:
-                    lines.colors.append(values[3:])
+                _parse_vertex(lines, _numbers(rest))
             elif keyword == "vt":
-                lines.texture.append([float(word) for word in [*rest.split(), "0"][:2]])
-            elif keyword == "f":
-                _parse_face(lines, rest.split())
-                lines.states.append((current, group, material))
+                lines.texture.append([*_numbers(rest), 0.0, 0.0][:2])
+            elif keyword in ("f", "fo"):
+                _parse_face(lines, rest.partition("#")[0].split(), line)
+                lines.states.append((number, current, group, material))
+            elif keyword == "o":
+                number, current = number + 1, rest or None
+            elif keyword == "g":
+                group = rest or None
+            elif keyword == "usemtl":
+                material = rest or None
+            elif keyword == "mtllib":
+                lines.libraries.append(line)
+            elif keyword in _LEFT_OUT:
+                lines.left_out[_LEFT_OUT[keyword]] += 1
+            elif keyword not in _WITHOUT_SHAPE:
+                lines.unknown.setdefault(keyword, []).append(line.number)
         except ValueError:
-            raise ConfigError(
-                f"{path}, line {number}: {line.strip()[:60]!r} is no valid {keyword!r} line; export the file again"
-            ) from None
-        if keyword == "o":
-            current = rest or None
-        elif keyword == "g":
-            group = rest or None
-        elif keyword == "usemtl":
-            material = rest or None
-        elif keyword == "mtllib":
-            lines.libraries.append(rest)
-        elif keyword in ("p", "l", "curv", "surf"):
-            lines.skipped.add({"p": "points", "l": "lines"}.get(keyword, "free-form curves and surfaces"))
+            raise _invalid(path, line) from None
+    for index, line in lines.forward:
+        if index >= len(lines.positions):
+            raise _invalid(path, line)
     return lines
 
 
-def _parse_face(lines: _Lines, words: Sequence[str]) -> None:
-    """Append a face. Raises ValueError for an index that is zero, no number, or not yet listed."""
+def _invalid(path: Path, line: TextLine) -> ConfigError:
+    shown = f"{line.keyword} {line.rest}"[:60]
+    return ConfigError(
+        f"{path}, line {line.number}: {shown!r} is no valid {line.keyword!r} line; export the file again"
+    )
+
+
+def _numbers(rest: str) -> list[float]:
+    return [float(word) for word in rest.partition("#")[0].split()]
+
+
+def _parse_vertex(lines: _Lines, numbers: Sequence[float]) -> None:
+    """Append a vertex: x, y, z, then a weight, a colour, or both. Raises ValueError for fewer than three numbers."""
+    x, y, z, *more = numbers
+    if len(more) in (3, 4):
+        lines.colors.append((len(lines.positions), more))
+    elif len(more) > 1:
+        lines.left_out["colours of vertices that are not three or four numbers"] += 1
+    lines.positions.append([x, y, z])
+
+
+def _parse_face(lines: _Lines, words: Sequence[str], line: TextLine) -> None:
+    """Append a face. Raises ValueError for an index that is zero, no number, or before the first."""
     for word in words:
         vertex, _, rest = word.partition("/")
-        lines.corners.append(_index(vertex, len(lines.positions)))
         texture = rest.partition("/")[0]
+        index = _index(vertex, len(lines.positions))
+        if index >= len(lines.positions):
+            lines.forward.append((index, line))
+        lines.corners.append(index)
         lines.texture_corners.append(_index(texture, len(lines.texture)) if texture else -1)
     lines.counts.append(len(words))
+    if len(words) < 3:
+        lines.left_out["faces with fewer than three corners"] += 1
 
 
 def _index(word: str, count: int) -> int:
     number = int(word)
     index = number - 1 if number > 0 else count + number
-    if number == 0 or not 0 <= index < count:
+    if number == 0 or index < 0:
         raise ValueError(word)
     return index
 
 
-def _objects(states: Sequence[tuple[str | None, str | None, str | None]], stem: str) -> tuple[np.ndarray, list[str]]:
-    """Return the object of each polygon, and the objects' names in order of appearance."""
-    by_object, by_group = ({state[key] for state in states} for key in (0, 1))
-    key = 1 if len(by_object) < 2 <= len(by_group) else 0
-    names: dict[str, int] = {}
-    owner = [names.setdefault(state[key] or state[1 - key] or stem, len(names)) for state in states]
-    return np.array(owner, dtype=np.int64), list(names)
+def _objects(states: Sequence[tuple[int, str | None, str | None, str | None]], stem: str) -> tuple[IntArray, list[str]]:
+    """Return the object of each polygon, and the objects' names in order of appearance.
+
+    Every `o` line begins an object, whatever its name. Groups of one name are one object.
+    """
+    objects, groups = {state[0] for state in states}, {state[2] for state in states}
+    by_group = len(objects) < 2 <= len(groups)
+    numbers: dict[int | str | None, int] = {}
+    names: list[str] = []
+    owner = []
+    for number, current, group, _ in states:
+        key = group if by_group else number
+        if key not in numbers:
+            numbers[key] = len(names)
+            names.append((group or current if by_group else current or group) or stem)
+        owner.append(numbers[key])
+    return np.array(owner, dtype=np.int32), names
 
 
-def _libraries(libraries: Sequence[str], enclosure: Enclosure, warnings: list[str]) -> dict[str, _Material]:
-    materials: dict[str, _Material] = {}
-    for line in libraries:
-        # the line may hold one name with blanks, or several names
-        for names in ([line], line.split()):
-            try:
-                contents = [enclosure.read(name, "mtllib") for name in names]
-            except Outside:
-                warnings.append(
-                    f"material library {line!r} is outside the folder of the model and is not opened; its "
-                    "faces are grey"
-                )
-                break
-            except OSError:
-                continue
-            for content in contents:
-                _parse_library(content.decode("utf-8", errors="replace"), enclosure, materials, warnings)
-            break
-        else:
-            warnings.append(f"material library {line!r} is missing; its faces are grey")
-    return materials
+def _paint(lines: _Lines, faces: IntArray, warnings: list[str]) -> tuple[ByteArray | None, np.ndarray]:
+    """Return the vertex colours as face paint, if any face has them, and the faces that have, bool (f,)."""
+    colors = np.tile(np.array(GREY, np.uint8), (len(lines.positions), 1))
+    is_colored = np.zeros(len(lines.positions), dtype=bool)
+    if lines.colors:
+        rows = [row for row, _ in lines.colors]
+        colors[rows] = color_bytes(unit_colors(_color_columns([numbers for _, numbers in lines.colors])))
+        is_colored[rows] = True
+    elif lines.brushed:
+        brushed = _brushed_colors("".join(lines.brushed))[: len(colors)]
+        colors[: len(brushed)] = brushed
+        is_colored[: len(brushed)] = True
+    is_painted = np.asarray(is_colored[faces].all(axis=1))
+    if not is_painted.any():
+        return None, is_painted
+    if not is_painted.all():
+        warnings.append(
+            f"only {np.count_nonzero(is_colored):,} of {len(colors):,} vertices have a colour; "
+            f"{np.count_nonzero(~is_painted):,} triangles have that of their material instead"
+        )
+    paint = face_paint(colors, faces)
+    paint[~is_painted] = GREY
+    return paint, is_painted
 
 
-def _parse_library(text: str, enclosure: Enclosure, materials: dict[str, _Material], warnings: list[str]) -> None:
-    material = _Material()
-    for line in text.splitlines():
-        keyword, _, rest = line.strip().partition(" ")
-        rest = rest.strip()
-        if keyword == "newmtl":
-            material = materials.setdefault(rest, _Material())
-        elif keyword == "Kd":
-            try:
-                red, green, blue = (float(word) for word in rest.split()[:3])
-                material.color = color_bytes(np.array([red, green, blue]))
-            except ValueError:
-                warnings.append(f"material colour 'Kd {rest}' is not red, green, blue; its faces are grey")
-        elif keyword.lower() == "map_kd":
-            name = _map_file(rest)
-            try:
-                material.image = decode_image(enclosure.read(name, "map_Kd"))
-            except Outside:
-                warnings.append(
-                    f"texture {name!r} is outside the folder of the model and is not opened; its faces have the "
-                    "material's colour"
-                )
-            except FileNotFoundError:
-                warnings.append(f"texture {name!r} is missing; its faces have the material's colour")
-            except OSError as error:
-                warnings.append(f"texture {name!r} cannot be read: {error}")
+def _color_columns(numbers: Sequence[Sequence[float]]) -> np.ndarray:
+    """Return red, green and blue of what follows x, y, z: with alpha after them, or with a weight in front."""
+    four = np.array([row for row in numbers if len(row) == 4]).reshape(-1, 4)
+    has_alpha = len(four) and (np.ptp(four[:, 3]) == 0 and four[0, 3] in (1.0, 255.0))
+    has_weight = len(four) and not has_alpha and bool((four[:, 0] == 1.0).all())
+    return np.array([row[1:] if has_weight and len(row) == 4 else row[:3] for row in numbers])
 
 
-def _map_file(rest: str) -> str:
-    """Return the file name of a `map_Kd` line, after its options; it may hold blanks."""
-    words = rest.split()
-    while words and words[0].startswith("-"):
-        option, arguments = words[0], _MAP_OPTIONS.get(words[0], 1)
-        words = words[1:]
-        while words and arguments and (option not in _MAP_OPTIONS or _is_number(words[0])):
-            words, arguments = words[1:], arguments - 1
-    return rest[rest.find(words[0]) :] if words else ""
-
-
-def _is_number(word: str) -> bool:
+def _brushed_colors(letters: str) -> ByteArray:
+    """Return the colours of ZBrush's comments `#MRGB`, which list them for all vertices, uint8 (n, 3)."""
     try:
-        float(word)
+        content = bytes.fromhex(letters[: len(letters) // _MRGB_LETTERS * _MRGB_LETTERS])
     except ValueError:
-        return False
-    return True
+        return np.empty((0, 3), np.uint8)
+    return np.frombuffer(content, np.uint8).reshape(-1, 4)[:, 1:]
 
 
 def _face_colors(
-    materials: Sequence[_Material | None],
-    face_material: np.ndarray,
+    materials: Sequence[WavefrontMaterial | None],
+    face_material: IntArray,
     uv: np.ndarray,
     uv_faces: np.ndarray,
     paint: ByteArray | None,
+    is_painted: np.ndarray,
 ) -> ByteArray:
-    colors = np.tile(np.array(GREY, np.uint8), (len(face_material), 1))
-    if paint is not None:
-        colors[:] = paint
+    colors = np.tile(np.array(GREY, np.uint8), (len(face_material), 1)) if paint is None else paint.copy()
     for index, material in enumerate(materials):
         if material is None:
             continue
         has_material = face_material == index
-        if paint is None:
-            colors[has_material] = material.color
-        textured = has_material & (uv_faces >= 0).all(axis=1)
+        colors[has_material & ~is_painted] = material.color
+        textured = has_material & ((uv_faces >= 0) & (uv_faces < len(uv))).all(axis=1)
         if material.image is not None and textured.any():
-            colors[textured] = sample_texture(material.image, uv, uv_faces[textured])
+            placed = uv * material.scale + material.offset
+            colors[textured] = sample_texture(material.image, placed, uv_faces[textured], material.wrap, material.wrap)
     return colors

@@ -232,18 +232,17 @@ class TestNodes:
         np.testing.assert_allclose(found[part.faces].max(axis=(0, 1)), moved.max(axis=0), atol=2e-4)
         assert signed_volume(part.vertices, part.faces) > 0
 
-    def test_lines_points_skins_and_morphs_are_left_out_with_a_warning(self, tmp_path: Path) -> None:
+    def test_lines_points_and_flat_nodes_are_left_out_with_a_warning(self, tmp_path: Path) -> None:
         glb = Glb()
         cube = glb.primitive(box(), BOX_FACES)
         dots = {"attributes": {"POSITION": cube["attributes"]["POSITION"]}, "mode": 0}
         glb.node(name="dots", mesh=glb.mesh(dots, name="dots"))
         glb.node(name="dotted", mesh=glb.mesh(cube, {**dots, "mode": 1}, name="dotted"))
-        glb.node(name="moving", mesh=glb.mesh({**cube, "targets": [{}]}, name="moving"), skin=0)
         glb.node(name="flat", mesh=glb.mesh(cube), scale=[1, 0, 1])
         model = read_parts(glb.write(tmp_path / "m.glb"))
-        assert [part.name for part in model.parts] == ["dotted", "moving"]
+        assert [part.name for part in model.parts] == ["dotted"]
         text = " | ".join(model.warnings)
-        for word in ("points", "lines", "'dots' has no triangles", "morph", "skin", "'flat' is scaled to nothing"):
+        for word in ("points", "lines", "'dots' has no triangles", "'flat' is scaled to nothing"):
             assert word in text
 
     @pytest.mark.parametrize(("mode", "order"), [(5, [0, 1, 3, 2]), (6, [0, 1, 2, 3])])
@@ -443,12 +442,14 @@ f 1 2 \\
         path.write_text("o everything\n" + path.read_text(encoding="utf-8").replace("\no ", "\ng "), encoding="utf-8")
         assert [part.name for part in read_parts(path).parts] == list(BOXES)
 
-    def test_object_that_is_taken_up_again_is_one_part(self, tmp_path: Path) -> None:
+    @pytest.mark.parametrize(("keyword", "names"), [("o", [*BOXES, "base#2"]), ("g", list(BOXES))])
+    def test_object_of_one_name_begins_again_and_group_goes_on(
+        self, tmp_path: Path, keyword: str, names: list[str]
+    ) -> None:
         path = write_obj(tmp_path / "m.obj", BOXES)
-        path.write_text(path.read_text(encoding="utf-8") + "o base\nf 1 2 3\n", encoding="utf-8")
-        model = read_parts(path)
-        assert [part.name for part in model.parts] == list(BOXES)
-        assert len(model.parts[0].faces) == 13
+        text = path.read_text(encoding="utf-8").replace("\no ", f"\n{keyword} ")
+        path.write_text(text + f"{keyword} base\nf 1 2 3\n", encoding="utf-8")
+        assert [part.name for part in read_parts(path).parts] == names
 
     def test_concave_polygons_are_not_filled_beyond_their_outline(self, tmp_path: Path) -> None:
         outline = [(0, 0), (5, 0), (5, 3), (4, 3), (4, 1), (3, 1), (3, 2), (2, 2), (2, 1), (1, 1), (1, 3), (0, 3)]

@@ -1,0 +1,182 @@
+"""MTL: the colours and textures of an OBJ's materials, in every legal form."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stages.model_files.colors import Wrap, color_bytes, decode_image, srgb_from_linear
+from stages.model_files.enclosure import Enclosure, Outside
+from stages.model_files.other_content import content_fault
+from stages.model_files.scene import GREY
+from stages.model_files.wavefront_text import TextLine, decode_text, text_lines
+from stages.shape.arrays import ByteArray, FloatArray
+
+_OPTION_NUMBERS = {"-mm": 2, "-o": 3, "-s": 3, "-t": 3}
+"""Largest number of values of the options of maps; the other options take one word."""
+_LINEAR_FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+MAX_BRIGHT_COLOR = 4.0
+"""Up to here colours beyond 1 are bright; larger ones range to 255."""
+
+
+@dataclass
+class WavefrontMaterial:
+    """A material.
+
+    color: uint8 (3,) sRGB.
+    image: uint8 (h, w, 3), the texture.
+    scale, offset: of texture coordinates, (2,).
+    """
+
+    color: ByteArray = field(default_factory=lambda: np.array(GREY, np.uint8))
+    image: ByteArray | None = None
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
+    wrap: Wrap = "repeat"
+
+
+def read_libraries(
+    lines: Sequence[TextLine], enclosure: Enclosure, warnings: list[str]
+) -> dict[str, WavefrontMaterial]:
+    """Return the materials of all `mtllib` lines, by name; warn of what is missing or not read."""
+    materials: dict[str, WavefrontMaterial] = {}
+    for line in {line.full: line for line in lines}.values():
+        for content in _library_contents(line, enclosure, warnings):
+            if (other := content_fault(content)) is not None:
+                warnings.append(f"material library {line.rest!r} {other}; its faces are grey")
+                continue
+            _Library(enclosure, materials, warnings).read(decode_text(content))
+    return materials
+
+
+def _library_contents(line: TextLine, enclosure: Enclosure, warnings: list[str]) -> list[bytes]:
+    """Return the files that one line names: one name, which may hold blanks, or several names."""
+    for name in line.file_names():
+        try:
+            return [enclosure.read(_unquoted(name), "mtllib")]
+        except (Outside, OSError):
+            continue
+    contents, missing = [], []
+    words = line.rest.split()
+    for name in words:
+        try:
+            contents.append(enclosure.read(name, "mtllib"))
+        except Outside:
+            warnings.append(
+                f"material library {name!r} is outside the folder of the model and is not opened; its faces are grey"
+            )
+        except OSError:
+            missing.append(name)
+    if len(missing) == len(words):
+        missing = [line.rest]
+    warnings += [f"material library {name!r} is missing; its faces are grey" for name in missing]
+    return contents
+
+
+class _Library:
+    def __init__(self, enclosure: Enclosure, materials: dict[str, WavefrontMaterial], warnings: list[str]) -> None:
+        self.enclosure = enclosure
+        self.materials = materials
+        self.warnings = warnings
+        self.diffuse: dict[str, FloatArray] = {}
+        self.ambient: dict[str, FloatArray] = {}
+
+    def read(self, text: str) -> None:
+        name = ""
+        ambient_maps: dict[str, TextLine] = {}
+        for line in text_lines(text):
+            keyword = line.keyword.lower()
+            if keyword == "newmtl":
+                name = line.rest
+                self.materials[name] = WavefrontMaterial()
+            elif keyword in ("kd", "ka"):
+                color = self.color(line)
+                if color is not None:
+                    (self.diffuse if keyword == "kd" else self.ambient)[name] = color
+            elif keyword == "map_kd":
+                self.read_map(self.materials.setdefault(name, WavefrontMaterial()), line)
+            elif keyword == "map_ka":
+                ambient_maps[name] = line
+        for name, line in ambient_maps.items():
+            if name in self.materials and self.materials[name].image is None and name not in self.diffuse:
+                self.read_map(self.materials[name], line)
+        colors = {**self.ambient, **self.diffuse}  # what has no diffuse colour shows its ambient one
+        largest = max((float(color.max()) for color in colors.values()), default=0.0)
+        limit = 255.0 if largest > MAX_BRIGHT_COLOR else 1.0
+        if limit > 1.0:
+            self.warnings.append(f"colours of materials reach {largest:g} and are taken to range from 0 to 255")
+        for name, color in colors.items():
+            self.materials.setdefault(name, WavefrontMaterial()).color = color_bytes(color / limit)
+
+    def color(self, line: TextLine) -> FloatArray | None:
+        """Return the colour of a line: one number or three, as sRGB or as CIE XYZ; None, with a warning, for others."""
+        words = line.rest.split()
+        is_xyz = words[:1] == ["xyz"]
+        try:
+            if words[:1] == ["spectral"]:
+                raise ValueError("spectral")
+            numbers = [float(word) for word in words[is_xyz : is_xyz + 3]]
+            values = np.array(numbers * 3 if len(numbers) == 1 else numbers)
+            if values.shape != (3,) or not np.isfinite(values).all():
+                raise ValueError("no colour")
+        except ValueError:
+            if line.keyword.lower() == "kd":
+                kind = "a spectral curve, which is not read" if words[:1] == ["spectral"] else "not red, green, blue"
+                self.warnings.append(f"material colour '{line.keyword} {line.rest}' is {kind}; its faces are grey")
+            return None
+        return srgb_from_linear(_LINEAR_FROM_XYZ @ values) / 255.0 if is_xyz else values
+
+    def read_map(self, material: WavefrontMaterial, line: TextLine) -> None:
+        """Read the texture of a `map_Kd` line, with its placing; warn if that fails."""
+        names = dict.fromkeys(_map_file(rest, material) for rest in line.file_names())
+        for number, name in enumerate(names, start=1):
+            try:
+                material.image = decode_image(self.enclosure.read(name, "map_Kd"))
+                return
+            except Outside:
+                self.warnings.append(
+                    f"texture {name!r} is outside the folder of the model and is not opened; its faces have the "
+                    "material's colour"
+                )
+                return
+            except FileNotFoundError:
+                if number == len(names):
+                    self.warnings.append(f"texture {name!r} is missing; its faces have the material's colour")
+            except OSError as error:
+                self.warnings.append(f"texture {name!r} cannot be read: {error}")
+                return
+
+
+def _map_file(rest: str, material: WavefrontMaterial) -> str:
+    """Return the file name of a map, which may hold blanks; the options in front of it go into `material`."""
+    words = list(re.finditer(r"\S+", rest))
+    while words and words[0][0].startswith("-") and not _is_number(words[0][0]):
+        option = words.pop(0)[0].lower()
+        values: list[float] = []
+        if option in _OPTION_NUMBERS:
+            while len(words) > 1 and len(values) < _OPTION_NUMBERS[option] and _is_number(words[0][0]):
+                values.append(float(words.pop(0)[0]))
+        elif words:
+            if option == "-clamp" and words[0][0].lower() == "on":
+                material.wrap = "clamp"
+            words.pop(0)
+        if option == "-s" and values:
+            material.scale = (values[0], values[1] if len(values) > 1 else 1.0)
+        elif option == "-o" and values:
+            material.offset = (values[0], values[1] if len(values) > 1 else 0.0)
+    return _unquoted(rest[words[0].start() :]) if words else ""
+
+
+def _unquoted(name: str) -> str:
+    return name[1:-1] if len(name) > 2 and name[0] == name[-1] == '"' else name
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
