@@ -23,8 +23,19 @@ LIMITS = (
     "The shapes are synthetic. They do not represent real objects, and no person has reviewed them.",
     "Stability is computed by statics with one density everywhere. Nothing was simulated or built.",
     "Meshes have at most one colour per face, and no textures, materials or normals.",
-    "Points cover the whole surface of every part, even where it is hidden inside another part, unlike a scan.",
 )
+POINT_LIMIT = (
+    "Points cover the whole surface of every part, even where it is hidden inside another part, unlike a scan."
+)
+LOADED = ("points.npy", "labels.npy", "color0.png", "depth0.png", "txt")
+"""Members that the example of loading reads, where samples have them."""
+PICTURED = {f"{kind}0.png" for kind in ("color", "depth", "normals", "instances", "classes")}
+PICTURES = """
+# an image with all its bits: `.decode("pil")` would leave 8 of 16
+import io
+from PIL import Image
+image = Image.open(io.BytesIO(sample["{}"]))
+"""
 
 
 @dataclass(frozen=True)
@@ -85,6 +96,9 @@ def card(
     classes: rows of `classes.json`
     """
     splits = list(dict.fromkeys(str(shard["split"]) for shard in shards))
+    names = [str(member["name"]) for member in members]
+    points = "points.npy" in names
+    pictured = " and their ".join(["Shapes, their points" if points else "Shapes", *_pictured(names)])
     header = {
         "license": str(facts["license"]).lower(),
         "pretty_name": facts["title"],
@@ -100,7 +114,7 @@ def card(
     }
     sections = [
         f"# {facts['title']}",
-        f"![Shapes, their points and their sketches]({PREVIEW})",
+        f"![{pictured}]({PREVIEW})",
         str(facts["description"]),
         "## Contents",
         split_table(splits, shards),
@@ -113,19 +127,23 @@ def card(
         "## A sample",
         member_table(members),
         f"`{SCHEMA}` describes each field of the JSON. No key holds a dot, no value is null or empty, and each sample "
-        "has all members and all fields. Instances of points and the two rows of `contacts.npy` and `joints.npy` are "
-        "indices into the record's `parts`. `lineage.parents` names the sources of a sample.",
+        f"has all members and all fields. {'Instances of points and the' if points else 'The'} two rows of "
+        "`contacts.npy` and `joints.npy` are indices into the record's `parts`. `lineage.parents` names the sources of "
+        "a sample.",
         "## Coordinates",
         f"Right-handed, y up; mesh, poses, bounds and contacts share one frame. {text.coordinates} The ground of a "
         "shape is the plane through its lowest point, `bounds[0][1]` in the record. A part's `pose` maps its own "
-        "coordinates to those of the shape, and is the matrix of its node in the GLB. Points have the coordinates of "
-        "the mesh, or are moved and scaled by `points.centre` and `points.scale`. Vertex colours are linear, as in "
-        "glTF.",
+        "coordinates to those of the shape, and is the matrix of its node in the GLB. "
+        + (
+            "Points have the coordinates of the mesh, or are moved and scaled by `points.centre` and `points.scale`. "
+            * points
+        )
+        + "Vertex colours are linear, as in glTF.",
         "## Intended use and limitations",
         USES,
-        "\n".join(f"- {limit}" for limit in (*LIMITS, *text.limits)),
+        "\n".join(f"- {limit}" for limit in (*LIMITS, *([POINT_LIMIT] if points else []), *text.limits)),
         "## Loading",
-        _loading(facts, splits, shards),
+        _loading(facts, splits, shards, names),
         "## How it was made",
         f"By Shapemill: {text.made} `{MANIFEST}` holds the whole config and the versions of code and libraries.",
         *([reject_table(text.rejects)] if text.rejects else []),
@@ -143,21 +161,34 @@ def card(
     return f"---\n{front}---\n\n" + "\n\n".join(sections) + "\n"
 
 
-def _loading(facts: Mapping[str, Any], splits: Sequence[str], shards: Sequence[Mapping[str, Any]]) -> str:
+def _pictured(names: Sequence[str]) -> list[str]:
+    """Return what the preview shows besides shapes and points."""
+    has_views = bool(PICTURED & set(names)) or "view0.exr" in names
+    return (["sketches"] if "sketch0.png" in names else []) + (["views"] if has_views else [])
+
+
+def _loading(
+    facts: Mapping[str, Any], splits: Sequence[str], shards: Sequence[Mapping[str, Any]], names: Sequence[str]
+) -> str:
     name, split = facts["name"], splits[0]
     count = sum(1 for shard in shards if shard["split"] == split)
     stem = str(shards[0]["path"]).rpartition("-")[0]
     pattern = f"{name}/{stem}-{{{0:06d}..{count - 1:06d}}}.tar"
+    loaded = [member for member in LOADED if member in names]
+    read = ", ".join([f'sample["{member}"]' for member in loaded] + ['sample["json"]["parts"]'])
+    batch = ", ".join(f'"{member}"' for member in [*loaded, "contacts.npy"][:2] if member != "txt")
+    pictures = PICTURES.format(next(name for name in names if name in PICTURED)) if set(names) & PICTURED else ""
+    recorded = (loaded[0] if loaded else "glb").partition(".")[0]
     return f"""```python
 # WebDataset, also below a torch DataLoader
 import webdataset
 samples = webdataset.WebDataset("{pattern}", shardshuffle=False).decode()
 for sample in samples:
-    sample["points.npy"], sample["labels.npy"], sample["txt"], sample["json"]["parts"]
-
+    {read}
+{pictures}
 # torch
 from torch.utils.data import DataLoader
-loader = DataLoader(samples.to_tuple("points.npy", "labels.npy").batched(16), batch_size=None, num_workers=4)
+loader = DataLoader(samples.to_tuple({batch}).batched(16), batch_size=None, num_workers=4)
 
 # Hugging Face
 import datasets
@@ -166,7 +197,7 @@ samples = datasets.load_dataset("{name}", split="{split}")
 # Croissant: each member is a record set of `key` and `content` (an array as the bytes of its .npy);
 # `<member>-of-samples` has `split` and `kit` too; `samples` is the index
 import mlcroissant
-records = mlcroissant.Dataset("{name}/{CROISSANT}").records("points-of-samples")
+records = mlcroissant.Dataset("{name}/{CROISSANT}").records("{recorded}-of-samples")
 
 # the mesh of a sample
 import io, trimesh

@@ -55,14 +55,15 @@ def compose_dataset(task: Task) -> Outcome:
     shards, facts, members = params["shards"], params["facts"], params["members"]
     rows = read_rows(task.input("package", f"{shard['name']}.jsonl") for shard in shards)
     tallies: dict[str, SourceTally] = {}
+    kinds = column_kinds(params["schema"]["properties"])
     with task.output(f"{task.shard.name}.parquet") as stream:
         index = HashingStream(stream)
-        write_index(SourceTally.tallied(rows, tallies), cast(BinaryIO, index))
+        write_index(SourceTally.tallied(rows, tallies), kinds, cast(BinaryIO, index))
     indexed: dict[str, Any] = {
         "path": f"../{index_path(task.config)}",
         "bytes": index.written,
         "sha256": index.digest(),
-        "columns": column_kinds(),
+        "columns": kinds,
     }
     sources_by_name = language_of(params["producer"]).decoder(task).sources
     of_shards = ((shard["split"], _read(task, f"{shard['name']}.classes.json")) for shard in shards)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -32,20 +32,22 @@ LOCATION_COLUMNS = {"shard": "string", "offset": "int64", "bytes": "int64"}
 ROWS_PER_GROUP = 65_536
 
 
-def columns() -> dict[str, IndexColumn]:
-    """Return all columns that come from a record, by name."""
-    return RECORD_COLUMNS | {name: column for added in members().values() for name, column in added.columns.items()}
+def columns(fields: Container[str]) -> dict[str, IndexColumn]:
+    """Return the columns that come from records with these fields, by name."""
+    declared = (added.columns for added in members().values())
+    known = RECORD_COLUMNS | {name: column for own in declared for name, column in own.items()}
+    return {name: column for name, column in known.items() if column.place[0] in fields}
 
 
-def column_kinds() -> dict[str, str]:
-    """Return the Arrow type of every column of the index, by name."""
-    return {name: column.kind for name, column in columns().items()} | LOCATION_COLUMNS
+def column_kinds(fields: Container[str]) -> dict[str, str]:
+    """Return the Arrow type of every column of the index of records with these fields, by name."""
+    return {name: column.kind for name, column in columns(fields).items()} | LOCATION_COLUMNS
 
 
 def index_row(record: Mapping[str, Any], path: str, offset: int, size: int) -> dict[str, Any]:
     """Return the row of a sample with `size` bytes at `offset` of the shard at `path`."""
     row: dict[str, Any] = {}
-    for name, column in columns().items():
+    for name, column in columns(record).items():
         value: Any = record
         for step in column.place:
             value = value[step]
@@ -65,12 +67,14 @@ def read_rows(files: Iterable[Path]) -> Iterator[dict[str, Any]]:
             yield from map(json.loads, lines)
 
 
-def write_index(rows: Iterable[Mapping[str, Any]], stream: BinaryIO) -> None:
-    """Write rows as Parquet, one row group in memory at a time; equal rows give equal bytes."""
+def write_index(rows: Iterable[Mapping[str, Any]], kinds: Mapping[str, str], stream: BinaryIO) -> None:
+    """Write rows as Parquet, one row group in memory at a time; equal rows give equal bytes.
+
+    kinds: Arrow type of each column
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    kinds = column_kinds()
     schema = pa.schema([(name, pa.type_for_alias(kind)) for name, kind in kinds.items()])
     rest = iter(rows)
     with pq.ParquetWriter(stream, schema, compression="zstd") as writer:

@@ -43,7 +43,10 @@ def merge_shard(task: Task) -> Outcome:
             for sample, added, fields in _samples(task, collection, task.shard.params["stages"]):
                 shape = collection.shape(sample)
                 shape = replace(shape, assembly=replace(shape.assembly, poses=rounded(shape.assembly.poses)))
-                members = {"glb": glb_bytes(shape), TEXT: sample.text.encode(), **added}
+                members = {"glb": glb_bytes(shape)}
+                if sample.text or TEXT in added:
+                    members[TEXT] = sample.text.encode()
+                members |= added
                 record = describe_sample(sample, collection.language.name, shape, members, fields)
                 members["json"] = json_bytes(record)
                 if member_names and list(members) != member_names:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from stages.shape.collection.members import TEXT
 from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.geometry.pose import rounded
@@ -25,6 +26,8 @@ def describe_sample(
     """
     parts = replace(shape.assembly, edges=pairs_of(members[CONTACTS]))
     pieces = piece_count(parts)
+    # the first of several strings is the canonical one
+    text = sample.text or members.get(TEXT, b"").decode().split("\n", 1)[0]
     return {
         "key": sample.key,
         "split": sample.split,
@@ -53,8 +56,7 @@ def describe_sample(
             "types": len(set(shape.part_labels.tolist())),
         },
         "bounds": rounded(shape_bounds(shape)).tolist(),
-        # the first of several strings is the canonical one
-        "text": sample.text or members["txt"].decode().split("\n", 1)[0],
+        **({"text": text} if text else {}),
         **added,
     }
 

@@ -7,12 +7,13 @@ in `producer.py`. Every field is required, no other is allowed, and none may be 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from pipeline.config import Config
 from stages.shape.collection.discovery import language_of, members, producers
+from stages.shape.collection.members import TEXT
 
 if TYPE_CHECKING:
     from jsonschema.protocols import Validator
@@ -21,16 +22,18 @@ SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 MAX_FAULTS_LISTED = 5
 
 
-def record_schema(config: Config, producer: str, stages: Iterable[str]) -> dict[str, Any]:
+def record_schema(config: Config, producer: str, stages: Collection[str]) -> dict[str, Any]:
     """Return the schema of the records of a dataset, by its producer and the stages that add fields."""
-    declared = members()
+    declared, language = members(), language_of(producer)
     added = {name: dict(field.schema) for stage in stages for name, field in declared[stage].fields(config).items()}
     own = {
         **_own_fields(),
         "producer": {"const": producer, "description": "the stage that made the sample"},
-        "language": {"const": language_of(producer).name, "description": "format of the sample's text or assembly"},
+        "language": {"const": language.name, "description": "format of the sample's text or assembly"},
         "lineage": _lineage({name: field.schema for name, field in producers()[producer].lineage(config).items()}),
     }
+    if language.graphs and not any(item.name == TEXT for stage in stages for item in declared[stage].of(config)):
+        del own["text"]
     return {
         "$schema": SCHEMA_DIALECT,
         "title": f"{config.name}: the record of a sample",

@@ -20,6 +20,8 @@ MAX_COSINE_ERROR = 1e-3
 
 def point_faults(sample: PackagedSample) -> Iterator[str]:
     """Yield a sentence for points that are not on their part, and for normals that are not its own."""
+    if "points" not in sample.record:
+        return
     described = sample.record["points"]
     points = sample.arrays["points.npy"].astype(np.float64) / described["scale"] + described["centre"]
     normals = sample.arrays["normals.npy"].astype(np.float64)

@@ -6,12 +6,12 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from pipeline.config import StrictModel
+from stages.shape.collection.optional_section import OptionalSection
 
 SampledSurface = Literal["all", "visible"]
 
 
-class PointsConfig(StrictModel):
+class PointsConfig(OptionalSection):
     """How many points each sample gets, and where they lie."""
 
     uniform: int = Field(
@@ -41,7 +41,7 @@ class PointsConfig(StrictModel):
     @model_validator(mode="after")
     def _some_points(self) -> PointsConfig:
         if self.uniform + self.farthest == 0:
-            raise ValueError("uniform and farthest are both 0: a cloud needs points")
+            raise ValueError("uniform and farthest are both 0: a cloud needs points; `points: false` makes no clouds")
         if self.farthest > self.pool:
             raise ValueError(f"farthest ({self.farthest}) is more than pool ({self.pool}) holds")
         return self

@@ -7,11 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 
 from pipeline.shards import array_bytes, json_bytes
-from pipeline.stage import Outcome, Plan, Stage, Task
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.points.settings import PointsConfig
 from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.sample import Sample
+
+
+def plan(plan: Plan) -> list[Shard]:
+    """Plan one shard for each shard of the collection, unless points are turned off."""
+    return collection_shards(plan) if plan.config.section(PointsConfig).enabled else []
 
 
 def run_shard(task: Task) -> Outcome:
@@ -46,6 +51,8 @@ def run_shard(task: Task) -> Outcome:
 def estimate_bytes(plan: Plan) -> int:
     """Return the bytes of all clouds: 28 a point, and the tar's headers and padding."""
     config = plan.config.section(PointsConfig)
+    if not config.enabled:
+        return 0
     return sample_count(plan) * (28 * (config.uniform + config.farthest) + 6144)
 
 
@@ -54,7 +61,7 @@ STAGE = Stage(
     module=__name__,
     config=PointsConfig,
     inputs=(PRODUCERS,),
-    plan=collection_shards,
+    plan=plan,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,
 )

@@ -34,7 +34,7 @@ def sketch_faults(sample: PackagedSample) -> Iterator[str]:
     it.
     """
     corners = np.array(list(itertools.product(*np.transpose(sample.record["bounds"]))))
-    for index, camera in enumerate(sample.record["sketches"]):
+    for index, camera in enumerate(sample.record.get("sketches", ())):
         name = f"sketch{index}.png"
         for fault in _drawing_faults(sample.members[name], camera, corners, sample):
             yield f"{name} {fault}"

@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from pipeline.config import StrictModel
+from stages.shape.collection.optional_section import OptionalSection
 from stages.shape.views.buffers import RendererName
 
 
@@ -98,7 +99,7 @@ class Augmentation(StrictModel):
         return self
 
 
-class SketchesConfig(StrictModel):
+class SketchesConfig(OptionalSection):
     """How many drawings each sample gets, from where, and in what style."""
 
     size: int = Field(224, ge=16, le=2048, description="side of the square picture; unit: pixels")
@@ -111,10 +112,9 @@ class SketchesConfig(StrictModel):
             SketchView(name="right", azimuth=35.0, elevation=15.0),
             SketchView(name="high", azimuth=25.0, elevation=55.0),
         ),
-        min_length=1,
         max_length=64,
         strict=False,
-        description="one drawing each, `sketch0.png`, `sketch1.png`, ...",
+        description="one drawing each, `sketch0.png`, `sketch1.png`, ...; empty: no drawings",
     )
     strokes: StrokeOptions = Field(StrokeOptions(), description="what is drawn, and how heavily")
     augment: Augmentation = Field(Augmentation(), description="chances of changes after drawing")

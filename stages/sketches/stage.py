@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pipeline.config import Config
 from pipeline.errors import ShardFailed
 from pipeline.shards import json_bytes
-from pipeline.stage import Outcome, Plan, Stage, Task
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.sample import Sample
@@ -20,6 +20,12 @@ from stages.shape.views.scene import Scene, scene_of
 from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.image import augment
 from stages.sketches.settings import SketchesConfig
+
+
+def plan(plan: Plan) -> list[Shard]:
+    """Plan one shard for each shard of the collection, unless sketches are turned off or have no views."""
+    section = plan.config.section(SketchesConfig)
+    return collection_shards(plan) if section.enabled and section.views else []
 
 
 def run_shard(task: Task) -> Outcome:
@@ -80,6 +86,8 @@ def check_machine(config: Config) -> None:
 def estimate_bytes(plan: Plan) -> int:
     """Return the bytes of all drawings: about a fifth of a byte a pixel, and the tar's headers and padding."""
     config = plan.config.section(SketchesConfig)
+    if not config.enabled:
+        return 0
     return int(sample_count(plan) * len(config.views) * (0.2 * config.size**2 + 1024))
 
 
@@ -88,7 +96,7 @@ STAGE = Stage(
     module=__name__,
     config=SketchesConfig,
     inputs=(PRODUCERS,),
-    plan=collection_shards,
+    plan=plan,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,
     report=report,

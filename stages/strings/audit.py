@@ -11,6 +11,7 @@ from pipeline.paths import DatasetPaths
 from stages.shape.arrays import IntArray, TypeArray
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.discovery import languages
+from stages.shape.collection.members import TEXT
 from stages.shape.collection.packaged import PackagedSample
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_files import load_kit
@@ -28,6 +29,8 @@ def string_faults(sample: PackagedSample) -> Iterator[str]:
     types = sample.shape.part_labels
     if graph_digest(types, sample.contacts) != sample.record["graph"]:
         yield "its parts and contacts are another graph than its json names"
+        return
+    if TEXT not in sample.members:
         return
     edges, alphabet = _edges(sample), make_alphabet(sample.shape.labels)
     lines = sample.members["txt"].decode().splitlines()
@@ -54,6 +57,8 @@ def string_faults(sample: PackagedSample) -> Iterator[str]:
 def _contact_mismatches(sample: PackagedSample, places: DatasetPaths) -> Iterator[str]:
     """Check face contacts with the kit; it does not know those of stretched parts."""
     if not languages()[sample.record["language"]].graphs or _edges(sample) != "faces" or sample.shape.is_stretched:
+        return
+    if TEXT not in sample.members:
         return
     path = places.stage("exemplars").root / f"{sample.record['kit']}.json"
     kit = KitStrings(load_kit(path, path.with_suffix(".tar")), "faces")

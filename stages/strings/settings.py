@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from pipeline.config import StrictModel
+from stages.shape.collection.optional_section import OptionalSection
 
 Edges = Literal["all", "faces", "tree"]
 
@@ -20,7 +20,7 @@ EDGE_DESCRIPTIONS: dict[Edges, str] = {
 """What a string of each kind encodes."""
 
 
-class StringsConfig(StrictModel):
+class StringsConfig(OptionalSection):
     """Which strings each shape gets, and how many."""
 
     edges: Edges = Field(

@@ -28,7 +28,7 @@ BYTES_PER_STRING = 3000
 def plan(plan: Plan) -> list[Shard]:
     """Plan one shard for each shard of the collection and, when all are done, the corpus.
 
-    Samples without shape graphs have a text of their own, and no shard here.
+    Samples without shape graphs have a text of their own, and no shard here. Nor where strings are turned off.
     """
     shards = _graph_shards(plan)
     if not shards or any(plan.summary("strings", shard.name) is None for shard in shards):
@@ -103,6 +103,8 @@ def estimate_bytes(plan: Plan) -> int:
 
 
 def _graph_shards(plan: Plan) -> list[Shard]:
+    if not plan.config.section(StringsConfig).enabled:
+        return []
     return [shard for shard in collection_shards(plan) if language_of(shard.params["producer"]).graphs]
 
 

@@ -88,6 +88,8 @@ def check(config: Config) -> None:
     for model in config.section(TrainingConfig).models:
         where = f"{config.path}: training.models: {model.name}"
         if isinstance(model, KitModelConfig):
+            if model.learns_from == "strings" and not config.section(StringsConfig).enabled:
+                raise ConfigError(f"{where}: it learns from strings, which are turned off; remove strings: false")
             known = _categories(config, model) if model.learns_from == "programs" else kits
             unknown = [kit for kit in model.kits if kit not in known]
             if unknown or not known:

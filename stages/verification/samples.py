@@ -14,6 +14,7 @@ from stages.package.glb import glb_bytes
 from stages.package.record import piece_count
 from stages.shape.collection.discovery import audits
 from stages.shape.collection.language import RebuildShape
+from stages.shape.collection.members import TEXT
 from stages.shape.collection.packaged import PackagedSample
 from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.geometry.pose import rounded
@@ -89,7 +90,7 @@ def sample_faults(sample: PackagedSample) -> Iterator[str]:
         yield _glb_fault(sample)
     if np.abs(np.array(record["bounds"]) - rounded(shape_bounds(shape))).max() > 1e-9 * sample.size:
         yield "its bounds are not those of its parts"
-    if not sample.members["txt"].decode().startswith(record["text"]):
+    if TEXT in sample.members and not sample.members[TEXT].decode().startswith(record["text"]):
         yield "its txt and its json hold different texts"
     for audit in audits().values():
         yield from _guarded(audit.faults, sample)

@@ -32,6 +32,7 @@ from stages.shape.sample import Sample, read_samples, write_sample
 from stages.shape.views.scene import scene_of
 from stages.sketches.settings import SketchesConfig, SketchView
 from stages.sketches.stage import drawings
+from stages.sketches.stage import plan as plan_sketches
 from stages.strings.settings import StringsConfig
 from stages.validity.stage import STAGE as VALIDITY
 from stages.views.settings import RingCameras, ViewsConfig
@@ -152,6 +153,10 @@ def _make_collection(task: Task) -> Outcome:
     return Outcome(2, {"split": split, "samples": 2})
 
 
+def _plan_strings(plan: Plan) -> list[Shard]:
+    return collection_shards(plan) if plan.config.section(StringsConfig).enabled else []
+
+
 def _make_strings(task: Task) -> Outcome:
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for sample in read_samples(task.input("variations", f"{task.shard.name}.tar")):
@@ -182,11 +187,11 @@ TOY_STAGES: Mapping[str, Stage] = named_inputs(
             "exemplars", __name__, ExemplarsConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes
         ),
         Stage("variations", __name__, ToyConfig, ("exemplars",), _plan_collection, _make_collection, _no_bytes),
-        Stage("strings", __name__, StringsConfig, (PRODUCERS,), collection_shards, _make_strings, _no_bytes),
+        Stage("strings", __name__, StringsConfig, (PRODUCERS,), _plan_strings, _make_strings, _no_bytes),
         POINTS,
         VALIDITY,
         ABSTRACTION,
-        Stage("sketches", __name__, SketchesConfig, (PRODUCERS,), collection_shards, _make_sketches, _no_bytes),
+        Stage("sketches", __name__, SketchesConfig, (PRODUCERS,), plan_sketches, _make_sketches, _no_bytes),
         VIEWS,
         replace(PACKAGE, check=lambda _: None),
     ]

@@ -429,7 +429,8 @@ def forge(folder: Path, name: str, rng: np.random.Generator) -> str:
 def _row(key: str, shard: Mapping[str, Any], offset: int, members: Members) -> dict[str, Any]:
     record: Any = json.loads(members["json"])
     try:
-        return index_row(record, shard["path"], offset, tar_bytes(members))
+        row = index_row(record, shard["path"], offset, tar_bytes(members))
+        return {**dict.fromkeys(_columns()), **row}
     except (KeyError, TypeError):
         blank = {"key": key, "split": shard["split"], "shard": shard["path"], "offset": offset}
         return {**dict.fromkeys(_columns()), **blank, "bytes": tar_bytes(members)}
@@ -438,7 +439,8 @@ def _row(key: str, shard: Mapping[str, Any], offset: int, members: Members) -> d
 def _columns() -> list[str]:
     from stages.package.index import columns
 
-    return [*columns(), "shard", "offset", "bytes"]
+    fields = {"key", "split", "kit", "graph", "producer", "counts", "text", "physics"}
+    return [*columns(fields), "shard", "offset", "bytes"]
 
 
 def _shards(folder: Path) -> dict[str, dict[str, Members]]:
