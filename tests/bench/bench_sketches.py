@@ -27,13 +27,13 @@ def bench() -> Iterator[Measure]:
     """Drawings of 224 x 224 with 2 x 2 supersampling, PNG included, by backend; then the buffers alone."""
     views = [Camera(azimuth, elevation) for azimuth, elevation in ((-40.0, 25.0), (35.0, 15.0), (25.0, 55.0))]
     backends: list[RendererName] = ["egl", "raster"] if check_triangle("egl") is None else ["raster"]
-    triangles = int(_colonnade().triangle_first[-1])
+    triangles = int(colonnade().triangle_first[-1])
     size = f"{IMAGE_SIZE}x{IMAGE_SIZE}, {SUPERSAMPLE_SIDE}x{SUPERSAMPLE_SIDE}"
-    note = f"{size}, {triangles:,} triangles, {len(_colonnade())} parts"
+    note = f"{size}, {triangles:,} triangles, {len(colonnade())} parts"
     for backend in backends:
 
         def sketches(backend: RendererName = backend) -> int:
-            scene = _colonnade()
+            scene = colonnade()
             for view in views:
                 png_bytes(draw_sketch(scene, view, IMAGE_SIZE, SUPERSAMPLE_SIDE, StrokeOptions(), backend)[0])
             return len(views)
@@ -42,7 +42,7 @@ def bench() -> Iterator[Measure]:
     for backend in backends:
 
         def buffers(backend: RendererName = backend) -> int:
-            scene = _colonnade()
+            scene = colonnade()
             for view in views:
                 render_buffers(scene, view, (IMAGE_SIZE, IMAGE_SIZE), SUPERSAMPLE_SIDE, backend)
             return len(views)
@@ -61,7 +61,7 @@ def _pyrender_buffers(views: list[Camera]) -> float:
     pyrender = load_pyrender()
     import trimesh
 
-    scene = _colonnade()
+    scene = colonnade()
     kept = pyrender.Scene(ambient_light=np.ones(3))
     meshes = []
     for index in range(len(scene.meshes.centers)):
@@ -90,7 +90,7 @@ def _pyrender_buffers(views: list[Camera]) -> float:
     return speed
 
 
-def _colonnade() -> Scene:
+def colonnade() -> Scene:
     """Return two rows of round columns on plinths, under beams, as a new assembly."""
     poses, types = [], []
     for row in range(2):

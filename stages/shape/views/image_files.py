@@ -40,18 +40,22 @@ def png_bytes(drawing: ByteArray) -> bytes:
     return _written(drawing, "png", "uint8", {})
 
 
-def color_png_bytes(pixels: ByteArray) -> bytes:
-    """Return sRGB colours, uint8 (h, w, 3), or (h, w, 4) with alpha not multiplied in, as an 8-bit PNG."""
-    attributes = {"png:compressionLevel": PNG_LEVEL, "png:filter": FILTER_NONE, "oiio:UnassociatedAlpha": 1}
+def color_png_bytes(pixels: ByteArray, level: int = PNG_LEVEL) -> bytes:
+    """Return sRGB colours, uint8 (h, w, 3), or (h, w, 4) with alpha not multiplied in, as an 8-bit PNG.
+
+    level: effort of compression, 1 to 9
+    """
+    attributes = {"png:compressionLevel": level, "png:filter": FILTER_NONE, "oiio:UnassociatedAlpha": 1}
     return _written(pixels, "png", "uint8", attributes)
 
 
-def data_png_bytes(pixels: npt.NDArray[Any], smooth: bool = False) -> bytes:
+def data_png_bytes(pixels: npt.NDArray[Any], smooth: bool = False, level: int = PNG_LEVEL) -> bytes:
     """Return numbers that are no colours, uint8 or uint16 (h, w) or (h, w, 3), as a PNG of as many bits.
 
     smooth: whether neighbours mostly differ a little, as depths do
+    level: effort of compression, 1 to 9
     """
-    attributes = {"png:compressionLevel": PNG_LEVEL, "png:filter": FILTER_UP if smooth else FILTER_NONE}
+    attributes = {"png:compressionLevel": level, "png:filter": FILTER_UP if smooth else FILTER_NONE}
     return _written(pixels, "png", str(pixels.dtype), {**attributes, "oiio:ColorSpace": "raw"})
 
 
@@ -69,10 +73,13 @@ def webp_bytes(pixels: ByteArray, quality: int) -> bytes:
     return stream.getvalue()
 
 
-def exr_bytes(channels: Mapping[str, tuple[Float32Array, ChannelType]]) -> bytes:
-    """Return named channels, float32 (h, w) each, as an EXR that holds each in the type given."""
+def exr_bytes(channels: Mapping[str, tuple[Float32Array, ChannelType]], compression: str = EXR_COMPRESSION) -> bytes:
+    """Return named channels, float32 (h, w) each, as an EXR that holds each in the type given.
+
+    compression: a codec of EXR, as OpenImageIO names it
+    """
     pixels = np.stack([channel for channel, _ in channels.values()], axis=-1)
-    attributes = {"compression": EXR_COMPRESSION, "DateTime": EXR_TIME}
+    attributes = {"compression": compression, "DateTime": EXR_TIME}
     types = [kind for _, kind in channels.values()]
     return _written(pixels, "exr", types[0], attributes, list(channels), types)
 
