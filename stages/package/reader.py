@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.errors import ConfigError
+from pipeline.paths import write_file
 from pipeline.shards import bytes_array, read_shard
 from stages.shape.arrays import ByteArray
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from stages.views.reading import SampleView
 
 SPLITS = ("train", "val", "test")
+VIEW_SUFFIXES = (".png", ".jpg", ".webp", ".exr")
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,22 @@ class DatasetSample:
         from stages.views.reading import read_views
 
         return read_views(self.members, self.record.get("views", []))
+
+    def export_views(self, folder: Path) -> None:
+        """Write the images of all views and `transforms.json` into a folder, as NeRF tools read them.
+
+        Raises KeyError for a sample without colour images, and ValueError for one with orthographic cameras.
+        """
+        from stages.views.transforms import transforms_bytes
+
+        cameras = self.record.get("views", [])
+        suffix = next((name.partition(".")[2] for name in self.members if name.startswith("color0.")), None)
+        if suffix is None:
+            raise KeyError(f"{self.key} has no colour images; its members are {', '.join(self.members)}")
+        colors = [f"color{index}.{suffix}" for index in range(len(cameras))]
+        files = {name: content for name, content in self.members.items() if name.endswith(VIEW_SUFFIXES)}
+        for name, content in {**files, "transforms.json": transforms_bytes(cameras, colors)}.items():
+            write_file(folder / name, content)
 
     @property
     def text(self) -> str:

@@ -15,7 +15,6 @@ from stages.shape.views.camera_record import CAMERA_FIELDS
 from stages.shape.views.palette import label_colors
 from stages.shape.views.portrait import PAPER
 from stages.views.settings import ImageKind, ViewsConfig, view_count
-from stages.views.transforms import TRANSFORMS
 
 COLOR_SUFFIX = {"png": "png", "jpeg": "jpg", "webp": "webp"}
 IN_MULTICHANNEL: tuple[ImageKind, ...] = ("depth", "normals", "instances", "classes", "mask")
@@ -25,10 +24,7 @@ NOTHING_SEEN = "0 where nothing is seen"
 
 def _members(config: Config) -> tuple[Member, ...]:
     section = config.section(ViewsConfig)
-    views = [member for index in range(view_count(section)) for member in _of_view(section, index)]
-    if views and section.transforms:
-        views.append(Member(TRANSFORMS, "Cameras of the colour images, as NeRF tools read them."))
-    return tuple(views)
+    return tuple(member for index in range(view_count(section)) for member in _of_view(section, index))
 
 
 def _of_view(section: ViewsConfig, index: int) -> Iterator[Member]:

@@ -180,9 +180,6 @@ class ViewsConfig(StrictModel):
         False,
         description="whether depth, normals, ids and mask of a view are channels of one EXR, `view0.exr`",
     )
-    transforms: bool = Field(
-        False, description="whether each sample gets its cameras as `transforms.json`, as NeRF tools read them"
-    )
 
     @model_validator(mode="after")
     def _fits_together(self) -> ViewsConfig:
@@ -192,10 +189,6 @@ class ViewsConfig(StrictModel):
             raise ValueError("views without cameras has no images; add cameras, such as [{kind: ring, count: 8}]")
         if view_count(self) > MAX_VIEWS:
             raise ValueError(f"{view_count(self)} views are more than {MAX_VIEWS}")
-        if self.transforms and any(cameras.projection == "orthographic" for cameras in self.cameras):
-            raise ValueError("transforms.json has no orthographic cameras; leave out transforms")
-        if self.transforms and "color" not in self.images:
-            raise ValueError("transforms.json lists colour images; add color to images")
         return self
 
 

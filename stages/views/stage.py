@@ -15,7 +15,6 @@ from stages.shape.views.scene import scene_of
 from stages.views.cameras import sample_views
 from stages.views.render import ViewRenderer
 from stages.views.settings import ViewsConfig, view_count
-from stages.views.transforms import TRANSFORMS, transforms_bytes
 
 BYTES_PER_PIXEL = 0.5
 """Of one image, on average."""
@@ -58,9 +57,6 @@ def view_members(task: Task, config: ViewsConfig, key: str, shape: Shape) -> dic
         files, fields = view_files(config, renderer, lamp, shape.part_classes, index)
         members |= files
         described.append({"cameras": kind, **fields})
-    if config.transforms:
-        colors = [name for name in members if name.startswith("color")]
-        members[TRANSFORMS] = transforms_bytes(key, described, colors)
     return {"json": json_bytes({"views": described}), **members}
 
 

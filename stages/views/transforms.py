@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-TRANSFORMS = "transforms.json"
 
-
-def transforms_bytes(key: str, cameras: Sequence[Mapping[str, Any]], images: Sequence[str]) -> bytes:
+def transforms_bytes(cameras: Sequence[Mapping[str, Any]], images: Sequence[str]) -> bytes:
     """Return the JSON of a sample's cameras.
 
-    key: of the sample; the files of an unpacked shard are named `<key>.<image>`
     cameras: their fields in the record
-    images: member of each camera's colour image
+    images: file of each camera's colour image
 
-    Matrices are camera-to-world with OpenGL's axes: x right, y up, z backwards.
+    Matrices are camera-to-world with OpenGL's axes: x right, y up, z backwards. Raises ValueError for orthographic
+    cameras, which these tools do not know.
     """
+    if any(camera["projection"] != "perspective" for camera in cameras):
+        raise ValueError("transforms.json has no orthographic cameras")
     frames = []
     for camera, image in zip(cameras, images, strict=True):
         (across, _, cx), (_, down, cy), _ = camera["intrinsics"]
@@ -31,7 +31,7 @@ def transforms_bytes(key: str, cameras: Sequence[Mapping[str, Any]], images: Seq
             to_world[axis, 3] = -sum(float(pose[k, axis] * pose[k, 3]) for k in range(3))
         frames.append(
             {
-                "file_path": f"{key}.{image}",
+                "file_path": image,
                 "transform_matrix": (np.round(to_world, 9) + 0.0).tolist(),
                 "fl_x": across,
                 "fl_y": down,

@@ -1,4 +1,4 @@
-"""Views a CPU second: whole samples, rendering alone beside ray casters and OpenGL, and each format with its bytes."""
+"""Views a CPU second: whole samples, rendering alone against ray casters and OpenGL, and each format with its bytes."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def bench() -> Iterator[Measure]:
     for name, kind, encode in _formats(renderers, lamp):
         contents = encode()
         figure = len(contents) / _seconds(encode)
-        bytes_each = sum(map(len, contents)) / len(contents)
-        yield Measure(f"views, {kind} as {name}", "images", figure, note=f"{bytes_each / 1e3:.1f} kB an image")
+        mean_bytes = sum(map(len, contents)) / len(contents)
+        yield Measure(f"views, {kind} as {name}", "images", figure, note=f"{mean_bytes / 1e3:.1f} kB an image")
 
 
 def _seconds(work: Callable[[], Any], rounds: int = 3) -> float:
@@ -87,7 +87,7 @@ def _color(renderer: ViewRenderer, lamp: Lamp) -> Any:
 def _formats(renderers: list[ViewRenderer], lamp: Lamp) -> Iterator[tuple[str, str, Callable[[], list[bytes]]]]:
     """Yield format, kind of image, and a function that encodes it for each view."""
 
-    def each(encode: Callable[[Any], bytes], images: list[Any]) -> Callable[[], list[bytes]]:
+    def of_views(encode: Callable[[Any], bytes], images: list[Any]) -> Callable[[], list[bytes]]:
         return lambda: [encode(image) for image in images]
 
     surfaces = [renderer.surface(False) for renderer in renderers]
@@ -97,17 +97,17 @@ def _formats(renderers: list[ViewRenderer], lamp: Lamp) -> Iterator[tuple[str, s
     normals = [normal_bytes(surface.normals) for surface in surfaces]
     ids = [(surface.instances + 1).astype(np.uint16) for surface in surfaces]
     for level in (1, 4, 6, 9):
-        yield f"PNG {level}", "colour", each(partial(color_png_bytes, level=level), colors)
-        yield f"PNG {level}", "depth", each(partial(data_png_bytes, smooth=True, level=level), depths)
-        yield f"PNG {level}", "normals", each(partial(data_png_bytes, level=level), normals)
-        yield f"PNG {level}", "ids", each(partial(data_png_bytes, level=level), ids)
-    yield "PNG 4", "colour with alpha", each(color_png_bytes, clear)
-    yield "JPEG 90", "colour", each(partial(jpeg_bytes, quality=90), colors)
-    yield "WebP 90", "colour", each(partial(webp_bytes, quality=90), colors)
-    yield "WebP 90", "colour with alpha", each(partial(webp_bytes, quality=90), clear)
+        yield f"PNG {level}", "colour", of_views(partial(color_png_bytes, level=level), colors)
+        yield f"PNG {level}", "depth", of_views(partial(data_png_bytes, smooth=True, level=level), depths)
+        yield f"PNG {level}", "normals", of_views(partial(data_png_bytes, level=level), normals)
+        yield f"PNG {level}", "ids", of_views(partial(data_png_bytes, level=level), ids)
+    yield "PNG 4", "colour with alpha", of_views(color_png_bytes, clear)
+    yield "JPEG 90", "colour", of_views(partial(jpeg_bytes, quality=90), colors)
+    yield "WebP 90", "colour", of_views(partial(webp_bytes, quality=90), colors)
+    yield "WebP 90", "colour with alpha", of_views(partial(webp_bytes, quality=90), clear)
     for codec in ("zip", "zips", "piz", "pxr24", "dwaa"):
-        yield f"EXR {codec}", "depth", each(partial(_depth_exr, codec=codec), surfaces)
-        yield f"EXR {codec}", "depth, normals and ids", each(partial(_joined, codec=codec), surfaces)
+        yield f"EXR {codec}", "depth", of_views(partial(_depth_exr, codec=codec), surfaces)
+        yield f"EXR {codec}", "depth, normals and ids", of_views(partial(_joined, codec=codec), surfaces)
 
 
 def _depth_exr(surface: SeenSurface, codec: str) -> bytes:

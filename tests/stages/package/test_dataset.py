@@ -35,7 +35,7 @@ from tests.stages.package.toy import (
 
 MEMBERS = ["glb", "txt", "points.npy", "normals.npy", "labels.npy", "instances.npy", "sketch0.png", "sketch1.png"]
 MEMBERS += ["contacts.npy", "joints.npy"]
-MEMBERS += ["color0.png", "depth0.exr", "instances0.png", "transforms.json", "json"]
+MEMBERS += ["color0.png", "depth0.exr", "instances0.png", "json"]
 
 
 def digests(folder: Path) -> dict[str, str]:

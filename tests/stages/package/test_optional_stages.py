@@ -49,13 +49,16 @@ def test_samples_hold_what_was_asked_for_and_what_a_dataset_needs(folder: Path) 
     assert "text" not in index.column_names
 
 
-def test_it_is_verified_without_a_fault_and_its_views_are_read(folder: Path) -> None:
+def test_it_is_verified_without_a_fault_and_its_views_are_read(folder: Path, tmp_path: Path) -> None:
     findings = verify_dataset(folder, None, 0)
     assert findings.faults == {}, findings.lines()
     for sample in Dataset.open(folder):
         assert [view.color.shape for view in sample.views] == [(24, 24, 3)] * 2
         assert {-1} < set(sample.views[0].instances.ravel().tolist()) <= set(range(-1, len(sample.record["parts"])))
         assert sample.sketches == ()
+    sample.export_views(tmp_path / sample.key)
+    exported = json.loads((tmp_path / sample.key / "transforms.json").read_bytes())
+    assert all((tmp_path / sample.key / frame["file_path"]).is_file() for frame in exported["frames"])
 
 
 def test_the_card_speaks_of_what_there_is(folder: Path) -> None:

@@ -217,7 +217,6 @@ def toy_config(shards: int = 4) -> Config:
             height=24,
             images=("color", "depth", "instances"),
             depth_format="exr",
-            transforms=True,
         ),
         "package": PackageConfig(previewed=1),
     }

@@ -107,8 +107,6 @@ def test_given_poses_are_the_cameras_of_every_shape() -> None:
         ({"images": ["color"]}, "views without cameras"),
         ({"cameras": [{"kind": "ring"}], "images": ["mask", "mask"]}, "twice"),
         ({"cameras": [{"kind": "ring"}], "color": {"format": "jpeg", "background": "transparent"}}, "no transparency"),
-        ({"cameras": [{"kind": "ring", "projection": "orthographic"}], "transforms": True}, "no orthographic"),
-        ({"cameras": [{"kind": "ring"}], "transforms": True, "images": ["depth"]}, "add color"),
         ({"cameras": [{"kind": "random", "min_elevation": 5, "max_elevation": 0}]}, "above max_elevation"),
         ({"cameras": [{"kind": "poses", "poses": [[[1, 0, 0, 0]] * 4]}]}, r"poses\[0\] is no 4x4 matrix"),
         ({"cameras": [{"kind": "poses", "poses": [np.diag([1, 1, -1, 1]).tolist()]}]}, "no rotation"),
@@ -122,10 +120,12 @@ def test_what_makes_no_sense_is_refused(keys: dict[str, Any], message: str) -> N
 
 def test_nerf_transforms_map_the_camera_to_the_world_with_opengl_axes() -> None:
     recorded = cameras(kind="ring", count=3)
-    found = json.loads(transforms_bytes("a-1", recorded, [f"color{index}.png" for index in range(3)]))
+    found = json.loads(transforms_bytes(recorded, [f"color{index}.png" for index in range(3)]))
     for index, (frame, camera) in enumerate(zip(found["frames"], recorded, strict=True)):
-        assert frame["file_path"] == f"a-1.color{index}.png"
+        assert frame["file_path"] == f"color{index}.png"
         expected = np.linalg.inv(np.array(camera["world_to_camera"])) @ np.diag([1.0, -1.0, -1.0, 1.0])
         assert np.array(frame["transform_matrix"]) == pytest.approx(expected, abs=1e-8)
         assert frame["fl_x"] == camera["intrinsics"][0][0]
         assert 2 * math.atan(frame["w"] / 2 / frame["fl_x"]) == pytest.approx(frame["camera_angle_x"])
+    with pytest.raises(ValueError, match="no orthographic"):
+        transforms_bytes(cameras(kind="ring", count=1, projection="orthographic"), ["color0.png"])

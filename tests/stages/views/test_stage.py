@@ -21,7 +21,6 @@ KEYS = {
     "width": 40,
     "height": 32,
     "images": ["color", "depth", "instances", "drawing"],
-    "transforms": True,
 }
 
 
