@@ -130,10 +130,12 @@ class Inventory:
             code=self._code(state.stage, shard),
         )
 
-    def note_code(self, names: Iterable[str]) -> None:
-        """Read the code of some stages now: workers are kept from stage to stage, and stop where it changes later."""
-        for name in names:
-            self._code_of(self._stages[name].module)
+    def code_of(self, names: Iterable[str]) -> dict[str, str]:
+        """Return the digests of the modules of some stages, as they first were in this run.
+
+        Workers are kept from stage to stage: a shard whose code is another by then is not made.
+        """
+        return {module: digest for name in names for module, digest in self._code_of(self._stages[name].module).items()}
 
     def complete(self, name: str) -> bool:
         """Whether stage `name` and every stage it reads is done."""

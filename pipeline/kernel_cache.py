@@ -16,12 +16,9 @@ waits have none either. MAX_WAIT_SECONDS ends what this leaves: a stopped proces
 from __future__ import annotations
 
 import ast
-import atexit
 import fcntl
 import hashlib
 import os
-import shutil
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -35,15 +32,12 @@ from numba.core.compiler_lock import global_compiler_lock
 
 from pipeline.code import SourceTree, absolute_name, code_words, is_prose, read_note, write_note
 from pipeline.compilation_note import note_compilation, note_end_of_compilation
-
-UNUSED_DAYS = 30
-"""Entries that no process loads for this long are deleted."""
+from pipeline.kernel_folder import DAY_SECONDS, kernel_folder
 
 MAX_WAIT_SECONDS = 600.0
 """A process that has waited this long for another's kernel compiles it by itself."""
 
 _POLL_SECONDS = 0.05
-_DAY_SECONDS = 86_400.0
 _PACKAGES = ("pipeline", "stages", "eval")
 
 
@@ -67,44 +61,6 @@ class KernelLocator(caching._CacheLocator):  # type: ignore[misc]
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> KernelLocator | None:
         """Return a locator for a function of the project; None for others, which keep Numba's own."""
         return cls(py_func, py_file) if _file(py_func.__module__) == Path(py_file) else None
-
-
-def kernel_folder() -> Path:
-    """Return the folder of compiled kernels: NUMBA_CACHE_DIR, or `shapemill/kernels` in the user's cache.
-
-    Where that cannot be written, it is in the source tree, else a temporary folder that is deleted at exit.
-    """
-    if folder := os.environ.get("NUMBA_CACHE_DIR"):
-        return Path(folder)
-    return _default_folder()
-
-
-@cache
-def _default_folder() -> Path:
-    user_cache = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache")
-    for path in (user_cache / "shapemill/kernels", Path(__file__).parent / "__pycache__/kernels"):
-        with suppress(OSError, RuntimeError):  # RuntimeError: nobody knows the home folder
-            folder = path.expanduser()
-            folder.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=folder).close()
-            _prune(folder, time.time())
-            return folder
-    folder = Path(tempfile.mkdtemp(prefix="shapemill-kernels-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
-
-
-def _prune(folder: Path, now: float) -> None:
-    """Delete entries unused for UNUSED_DAYS, at most once a day."""
-    stamp = folder / ".pruned"
-    with suppress(OSError):
-        if now - stamp.stat().st_mtime < _DAY_SECONDS:
-            return
-    stamp.touch()
-    for entry in folder.glob("*/*.nb[ci]*"):
-        with suppress(OSError):
-            if now - entry.stat().st_mtime > UNUSED_DAYS * _DAY_SECONDS:
-                entry.unlink()
 
 
 # Entries ------------------------------------------------------------------------------------------------------------
@@ -148,7 +104,7 @@ def _load(store: caching.FunctionCache, signature: Any, context: Any) -> Any:
 def _load_entry(store: caching.FunctionCache, signature: Any, context: Any, index: Path) -> Any:
     try:
         compiled = _numba_load(store, signature, context)
-        if compiled is not None and time.time() - index.stat().st_mtime > _DAY_SECONDS:
+        if compiled is not None and time.time() - index.stat().st_mtime > DAY_SECONDS:
             for used in index.parent.glob(f"{index.stem}*"):
                 os.utime(used)
         return compiled

@@ -72,6 +72,10 @@ class KernelList:
                 waiting += self.kernels[index].calls
         return sorted(reached)
 
+    def names(self, indices: list[int]) -> dict[str, str]:
+        """Return names of kernels with the types of their arguments, for a digest."""
+        return {json.dumps([kernel.name, kernel.arguments]): "" for kernel in map(self.kernels.__getitem__, indices)}
+
     @cached_property
     def seconds(self) -> list[float]:
         """Recorded seconds of each kernel, which are rounded."""

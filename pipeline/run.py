@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from pipeline.code import code_digest
 from pipeline.compilation_note import RECORD_VARIABLE
 from pipeline.config import Config
 from pipeline.disk_space import byte_size, check_space
@@ -21,6 +22,7 @@ from pipeline.failures import Failures
 from pipeline.finish import finish_stage, publish
 from pipeline.integrity import withdraw_corrupted
 from pipeline.inventory import Inventory, StageInventory
+from pipeline.kernel_folder import all_compiled, note_all_compiled
 from pipeline.kernel_list import KernelList, compile_ahead
 from pipeline.paths import DatasetPaths, fatal_cause, remove
 from pipeline.progress import closing_line, shard_count_text, stage_progress
@@ -100,7 +102,7 @@ def run_stages(
     """
     names, results = list(names), dict[str, RunResult]()
     shared = _Shared(names, stages, paths, Inventory(config, stages, paths), workers, RunOptions(**options).cluster)
-    shared.inventory.note_code(names)
+    shared.inventory.code_of(names)  # before any worker starts
     try:
         for name in names:
             results[name] = _run_stage(name, shared, RunOptions(**options))
@@ -148,7 +150,8 @@ class _Shared:
         config, listed = self.inventory.config, KernelList.read()
         producers = [name for name, stage in self.stages.items() if stage.requested_samples(config)]
         indices = listed.indices(producers, self._names)
-        if not indices:
+        code = self.inventory.code_of(self._names) | listed.names(indices)
+        if not indices or all_compiled(code_digest(code)):
             return
         from pipeline.workers import Workers
 
@@ -157,6 +160,7 @@ class _Shared:
         compiled = compile_ahead(listed, indices, self.workers, log.show_compilation)
         if compiled:
             log.say(f"{compiled} kernels compiled in {duration_text(time.monotonic() - start)}, once on this machine")
+        note_all_compiled(code_digest(code))
 
     def stop_workers(self, kill: bool) -> None:
         """End all workers: at once, or after their current jobs."""
@@ -218,12 +222,12 @@ class _Run:
         self._delete_unfinished(state)
         if state.missing:
             self._check_environment()
-            self._shared.compile_kernels(self._log)
             for line in rebuild_reasons(state):
                 self._log.say(line)
             remove(state.paths.manifest)
             missing = len(self._mine(state))
             self._log.say(f"{shard_count_text(missing)} to make, {check_space(state, self._paths.out)}")
+            self._shared.compile_kernels(self._log)
             self._make_missing()
             state = self._inventory.stage(self._name)
         if not state.missing:

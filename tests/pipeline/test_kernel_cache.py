@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from pipeline import kernel_cache
-from pipeline.kernel_cache import _lock, _prune
+from pipeline.kernel_cache import _lock
+from pipeline.kernel_folder import prune_kernels
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -268,8 +269,8 @@ def test_entries_unused_for_a_month_are_pruned(tmp_path: Path) -> None:
     for name, days in {"old.nbi": 40, "old.1.nbc": 40, "old.1.nbc.tmp.12": 40, "used.nbi": 20, "note.txt": 40}.items():
         (folder / name).touch()
         os.utime(folder / name, (0, time.time() - 86_400 * days))
-    _prune(tmp_path, time.time())
+    prune_kernels(tmp_path, time.time())
     assert {path.name for path in folder.iterdir()} == {"used.nbi", "note.txt"}
     os.utime(folder / "used.nbi", (0, 0))
-    _prune(tmp_path, time.time())
+    prune_kernels(tmp_path, time.time())
     assert (folder / "used.nbi").exists(), "looked through once a day"

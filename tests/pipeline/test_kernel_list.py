@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -11,6 +12,7 @@ import numba
 import pytest
 from numba.core import types
 
+from pipeline.kernel_folder import DAY_SECONDS, UNUSED_DAYS, all_compiled, note_all_compiled, prune_kernels
 from pipeline.kernel_list import CompilationProgress, KernelList, ListedKernel, Schedule, _found, compile_ahead
 from pipeline.kernel_types import argument_type, argument_words
 from pipeline.make_kernel_list import merged, write_list
@@ -118,6 +120,21 @@ def test_listed_kernels_are_compiled_ahead_and_stale_entries_are_skipped(
     assert (seen[-1].done, seen[-1].total) == (3, 3)
     assert shop.run() == "31 8 7 compiled double width"
     assert compile_ahead(kernels, [0, 1, 2, 3], workers, seen.append) == 0
+
+
+def test_note_of_a_complete_cache_is_for_one_code_and_one_processor(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert not all_compiled("code")
+    note_all_compiled("code")
+    assert all_compiled("code")
+    assert not all_compiled("other code")
+    monkeypatch.setenv("NUMBA_CPU_NAME", "another")
+    assert not all_compiled("code")
+    monkeypatch.delenv("NUMBA_CPU_NAME")
+    prune_kernels(tmp_path, time.time() + (UNUSED_DAYS + 1) * DAY_SECONDS)
+    assert not all_compiled("code"), "the kernels that nobody has used since are deleted, too"
 
 
 def test_record_becomes_a_list_that_keeps_other_producers(tmp_path: Path) -> None:
