@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
-
 from pipeline.randomness import decision_rng
 from stages.autoconfig.closed_box import is_closed_box
 from stages.autoconfig.resolve import REQUIREMENT_KEYS, Resolution
@@ -160,7 +158,7 @@ def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
         wanted = -(-MAX_LAYOUTS_TRIED // count)
         layouts = drawn_layouts(shapes_of, exemplar.name, config, rows, wanted, streams, lambda _: None)
         others += sum(bool(layout.changes) for layout in layouts)
-        sides = np.ptp(shapes_of.layout(exemplar.name).boxes, axis=(0, 1))
+        sides = shapes_of.unwarped(exemplar.name, ()).lattice.sides
         texts: list[str] = []
         made: dict[str, Shape] = {}
         for draw in range(-(-TRIAL_DRAWS // count)):

@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.errors import ConfigError
 from stages.exemplars.cut_surface import cut_by_sections, cut_by_symmetry, search_size
 from stages.exemplars.model import STATED_IN_CONFIG
+from stages.exemplars.recurring_components import divide_objects
 from stages.exemplars.settings import Segmentation
 from stages.model_files.scene import ModelScene, Placement, Surface, UniqueNames
 from stages.shape.geometry.connected_faces import connected_faces
@@ -67,12 +68,15 @@ def count_parts(scene: ModelScene) -> dict[Segmentation, int]:
 def pick_segmentation(scene: ModelScene) -> tuple[Segmentation, str, ModelScene]:
     """Return the source that `auto` takes, one sentence that says why, and the scene with one placement for each part.
 
-    Two or more scene nodes or named objects are their author's parts. Otherwise materials are tried, then colours
+    Two or more scene nodes or named objects are their author's parts; components that recur within one of a few objects
+    become parts too. Otherwise materials are tried, then colours
     unless they are too many to be labels, then connected components. A mesh in one piece is cut where it repeats
     itself, unless its surface is so large for its size that the search would take long.
     """
     if len(scene.placements) > 1:
-        return scene.kind, f"{len(scene.placements)} {_WORDS[scene.kind]}", scene
+        counted = f"{len(scene.placements)} {_WORDS[scene.kind]}"
+        divided = divide_objects(scene)
+        return (scene.kind, counted, scene) if divided is None else (scene.kind, f"{counted}; {divided[1]}", divided[0])
     counts = count_parts(scene)
     passed = [f"one {_WORDS[scene.kind][:-1]}"]
     for source in SOURCES[2:]:

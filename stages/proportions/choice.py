@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,6 +11,7 @@ from stages.proportions.distinct_warps import DistinctWarps
 from stages.proportions.text import Proportions, ProportionShapes, Unwarped, read_proportions
 from stages.shape.arrays import FloatArray
 from stages.shape.graphs.canonical import graph_digest
+from stages.variations.rows.changes import change_json
 
 
 def chosen_texts(
@@ -48,7 +50,7 @@ def _by_layout(shapes: ProportionShapes, texts: Sequence[str]) -> list[tuple[Unw
 
 
 def _changes_key(proportions: Proportions) -> str:
-    return repr([(*change.normal, *change.shift, change.at, change.times) for change in proportions.changes])
+    return json.dumps([change_json(change) for change in proportions.changes])
 
 
 def _most_different(layouts: Sequence[Unwarped]) -> list[int]:
@@ -70,8 +72,8 @@ def _most_different(layouts: Sequence[Unwarped]) -> list[int]:
 
 def _features(layout: Unwarped, last_type: int) -> FloatArray:
     counts = np.bincount(layout.assembly.types, minlength=last_type + 1)
-    sides = np.array([knots[-1] - knots[0] for knots in layout.lattice.knots])
-    features: FloatArray = np.concatenate([np.log1p(counts), np.log(np.maximum(sides, 1e-12))])
+    sides = np.log(np.maximum(layout.lattice.sides, 1e-12))
+    features: FloatArray = np.concatenate([np.log1p(counts), sides])
     return features
 
 

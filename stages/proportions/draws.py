@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +15,9 @@ from stages.proportions.warp_check import warp_fault
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.judge import unmet_requirement
 from stages.shape.physics.settings import Requirements
+from stages.variations.rows.changes import Change
 from stages.variations.rows.draws import LayoutDraws
-from stages.variations.rows.slabs import RowChange
+from stages.variations.rows.turns import Turn
 from stages.variations.settings import RowsConfig
 
 TRIES_PER_LAYOUT = 4
@@ -28,6 +29,8 @@ MIN_OTHER_LAYOUTS = 8
 THIN_SHARE = 0.04
 """Lengths below this share of the longest side are the thickness of boards, which keep it as long as that is possible.
 """
+PLAIN_SHARE = 0.25
+"""Share of the shapes with other rows whose lengths are not multiplied at random."""
 MIN_COMPRESSION = 0.25
 """Factor below which boards become thinner too."""
 
@@ -36,7 +39,7 @@ MIN_COMPRESSION = 0.25
 class DrawnLayout:
     """A layout of an exemplar with the warps of it that were accepted."""
 
-    changes: tuple[RowChange, ...]
+    changes: tuple[Change, ...]
     unwarped: Unwarped
     distinct: DistinctWarps
 
@@ -67,7 +70,7 @@ def drawn_layouts(
     draws = LayoutDraws(shapes.layout(exemplar), rows)
     found: list[DrawnLayout] = []
     known = {draws.exemplar.key}
-    if not draws.rows:
+    if not draws.rows and not draws.circles:
         return [own]
     wanted = min(wanted, MAX_LAYOUTS)
     for number in range(TRIES_PER_LAYOUT * wanted):
@@ -104,23 +107,41 @@ def draw_proportions(
     """Return random proportions of a layout. sides: those of the box around the exemplar, float64 (3,)."""
     lattice = layout.unwarped.lattice
     warp = lattice.draw(rng, config.log_std, config.max_factor)
-    if layout.changes and rows.size == "keep":
-        warp = within_range(lattice, warp, sides, rows.size_range)
-    elif layout.changes:
-        x, y, z = (np.ones(len(factors)) for factors in warp)
-        warp = x, y, z
+    if not layout.changes:
+        return Proportions(exemplar, warp)
+    stiff = _stiff_axes(layout.changes) if rows.size == "keep" and rng.random() >= PLAIN_SHARE else {0, 1, 2}
+    x, y, z = (np.ones(len(factors)) if axis in stiff else factors for axis, factors in enumerate(warp))
+    warp = x, y, z
+    if rows.size == "keep":
+        warp = within_range(lattice, warp, sides, rows.size_range, _stiff_axes(layout.changes))
     return Proportions(exemplar, warp, layout.changes)
 
 
-def within_range(lattice: Lattice, warp: Warp, sides: FloatArray, limits: tuple[float, float]) -> Warp:
-    """Return a warp changed so that each side of the box around a shape is within a range of multiples of `sides`."""
+def _stiff_axes(changes: Sequence[Change]) -> set[int]:
+    """Return axes along which lengths stay: those of slanted rows, and across those that rows are about."""
+    stiff: set[int] = set()
+    for change in changes:
+        if isinstance(change, Turn):
+            stiff |= {0, 1, 2} - {change.axis}
+        elif np.count_nonzero(change.shift) > 1:
+            stiff |= set(np.flatnonzero(change.shift).tolist())
+    return stiff
+
+
+def within_range(
+    lattice: Lattice, warp: Warp, sides: FloatArray, limits: tuple[float, float], stiff: Collection[int] = ()
+) -> Warp:
+    """Return a warp changed so that each side of the box around a shape is within a range of multiples of `sides`.
+
+    stiff: axes that keep their factors
+    """
     fitted = []
     longest = max(float(knots[-1] - knots[0]) for knots in lattice.knots)
-    for knots, factors, side in zip(lattice.knots, warp, sides.tolist(), strict=True):
+    for axis, (knots, factors, side) in enumerate(zip(lattice.knots, warp, sides.tolist(), strict=True)):
         lengths = np.diff(knots) * factors
         length = float(lengths.sum())
         wanted = min(max(length, limits[0] * side), limits[1] * side)
-        if not len(lengths) or length <= 0 or np.isclose(wanted, length):
+        if axis in stiff or not len(lengths) or length <= 0 or np.isclose(wanted, length):
             fitted.append(factors)
             continue
         scaled = lengths > THIN_SHARE * longest

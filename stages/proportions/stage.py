@@ -12,8 +12,6 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from pipeline.config import Config
 from pipeline.errors import ConfigError, ShardFailed
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
@@ -143,7 +141,7 @@ def run_search(task: Task) -> Outcome:
         )
         for number, exemplar in enumerate(kit.exemplars)
     ]  # fmt: skip
-    sides = [np.ptp(shapes.layout(exemplar.name).boxes, axis=(0, 1)) for exemplar in kit.exemplars]
+    sides = [shapes.unwarped(exemplar.name, ()).lattice.sides for exemplar in kit.exemplars]
     texts: list[str] = []
     tries = 0
     while len(texts) < wanted and tries < config.oversample * wanted:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -13,13 +12,12 @@ from stages.proportions.warp import Lattice, Warp, lattice_of, warped
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import Assembly, Exemplar, Kit
 from stages.shape.shape import Shape, kit_shape
+from stages.variations.rows.changes import Change, change_json, changed, read_change
 from stages.variations.rows.layout import Layout, layout_of
-from stages.variations.rows.slabs import RowChange, SlabError, repeat
+from stages.variations.rows.slabs import SlabError
 
 AXES = ("x", "y", "z")
 ROWS_KEY = "rows"
-MAX_TIMES = 1000
-"""Most periods that one change of a text may insert."""
 MAX_CHANGES = 1000
 
 
@@ -33,25 +31,17 @@ class Proportions:
 
     exemplar: name of the exemplar
     warp: factors of the intervals along each axis, after the changes
-    changes: periods of rows that are inserted or removed, one after another
+    changes: changes of its rows, one after another
     """
 
     exemplar: str
     warp: Warp
-    changes: tuple[RowChange, ...] = ()
+    changes: tuple[Change, ...] = ()
 
 
 def proportion_text(proportions: Proportions) -> str:
     """Return the text of proportions."""
-    rows = [
-        {
-            "normal": change.normal.tolist(),
-            "shift": change.shift.tolist(),
-            "at": change.at,
-            "times": change.times,
-        }
-        for change in proportions.changes
-    ]
+    rows = [change_json(change) for change in proportions.changes]
     factors = {axis: values.tolist() for axis, values in zip(AXES, proportions.warp, strict=True)}
     changed = {ROWS_KEY: rows} if rows else {}
     return json.dumps({"exemplar": proportions.exemplar, **changed, **factors}, ensure_ascii=False)
@@ -64,22 +54,12 @@ def read_proportions(text: str) -> Proportions:
         if set(fields) - {ROWS_KEY} != {"exemplar", *AXES} or not isinstance(fields["exemplar"], str):
             raise ProportionError(f"proportions have the keys exemplar, x, y and z, and may have rows: {text[:80]}")
         x, y, z = (np.array(fields[axis], dtype=np.float64).reshape(-1) for axis in AXES)
-        changes = tuple(_change(row) for row in fields.get(ROWS_KEY, ())[:MAX_CHANGES])
+        changes = tuple(read_change(row) for row in fields.get(ROWS_KEY, ())[:MAX_CHANGES])
     except (ValueError, TypeError, KeyError) as error:
         if isinstance(error, ProportionError):
             raise
         raise ProportionError(f"not valid proportions: {error}") from None
     return Proportions(fields["exemplar"], (x, y, z), changes)
-
-
-def _change(row: dict[str, Any]) -> RowChange:
-    """Return a change of a row from its JSON. Raises ValueError, TypeError or KeyError."""
-    normal, shift = (np.array(row[key], dtype=np.float64).reshape(3) for key in ("normal", "shift"))
-    at, times = float(row["at"]), int(row["times"])
-    numbers = [*normal.tolist(), *shift.tolist(), at]
-    if not np.isfinite(numbers).all() or normal @ shift <= 0 or not (times == -1 or 0 < times <= MAX_TIMES):
-        raise ProportionError(f"a change of a row has a step along its normal, and 1 to {MAX_TIMES} or -1 times: {row}")
-    return RowChange(normal, shift, at, times)
 
 
 def exemplar_of(kit: Kit, name: str) -> Exemplar:
@@ -118,7 +98,7 @@ class ProportionShapes:
             self._layouts[name] = layout_of(self.kit, exemplar_of(self.kit, name))
         return self._layouts[name]
 
-    def unwarped(self, exemplar: str, changes: Sequence[RowChange]) -> Unwarped:
+    def unwarped(self, exemplar: str, changes: Sequence[Change]) -> Unwarped:
         """Return an exemplar with other rows. Raises ProportionError for changes that are not valid."""
         if not changes:
             if exemplar not in self._exemplars:
@@ -129,9 +109,9 @@ class ProportionShapes:
         layout = self.layout(exemplar)
         for change in changes:
             try:
-                layout = repeat(layout, change)
+                layout = changed(layout, change)
             except SlabError as error:
-                raise ProportionError(f"{exemplar}: the row at {change.at:g} cannot change: {error}") from None
+                raise ProportionError(f"{exemplar}: {json.dumps(change_json(change))} is not valid: {error}") from None
         return self.unwarped_layout(layout)
 
     def unwarped_layout(self, layout: Layout) -> Unwarped:

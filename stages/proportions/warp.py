@@ -75,6 +75,11 @@ class Lattice:
         x, y, z = warp
         return x, y, z
 
+    @property
+    def sides(self) -> FloatArray:
+        """Sides of the box around the exemplar, float64 (3,)."""
+        return np.array([knots[-1] - knots[0] for knots in self.knots])
+
     def images(self, warp: Sequence[FloatArray]) -> list[FloatArray]:
         """Return the moved knots of each axis.
 

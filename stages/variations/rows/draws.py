@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stages.variations.rows.changes import Change
 from stages.variations.rows.layout import Layout
 from stages.variations.rows.rows import Row, find_rows
 from stages.variations.rows.slabs import RowChange, SlabError, repeat
-from stages.variations.rows.steps import Step, longest_row, steps_of
+from stages.variations.rows.steps import longest_row, steps_of
+from stages.variations.rows.turns import MIN_SECTORS, find_circles, turned
 from stages.variations.settings import RowsConfig
 
 MAX_PARTS_FACTOR = 4.0
@@ -27,16 +29,26 @@ class LayoutDraws:
         self.exemplar, self.config = layout, config
         self.steps = steps_of(layout)
         self._rows: dict[bytes, list[Row]] = {}
-        self._limits = [self._limits_of(step) for step in self.steps]
+        self._limits = [self._limits_of(step.count) for step in self.steps]
+        self.circles = find_circles(layout)
 
     @property
     def rows(self) -> Sequence[Row]:
-        """The rows of the exemplar."""
+        """The rows of the exemplar along a line."""
         return self._rows_of(self.exemplar)
 
-    def draw(self, rng: np.random.Generator) -> tuple[tuple[RowChange, ...], Layout] | None:
+    def draw(self, rng: np.random.Generator) -> tuple[tuple[Change, ...], Layout] | None:
         """Return changes and the layout that they make, or None where no change was possible."""
-        layout, changes = self.exemplar, list[RowChange]()
+        layout, changes = self.exemplar, list[Change]()
+        if self.circles and rng.integers(len(self.circles) + len(self.rows)) < len(self.circles):
+            circle = self.circles[int(rng.integers(len(self.circles)))]
+            least, most = self._limits_of(circle.sectors)
+            count = int(rng.integers(max(least, MIN_SECTORS), most + 1))
+            if count != circle.sectors:
+                changes.append(circle.turn(count))
+                layout = turned(layout, circle.turn(count))
+            if not self.rows:
+                return (tuple(changes), layout) if changes else None
         for _ in range(int(rng.integers(1, self.config.max_changes + 1))):
             for _ in range(TRIES_PER_CHANGE):
                 changed = self._change(layout, rng)
@@ -88,9 +100,9 @@ class LayoutDraws:
                 return None
         return changed
 
-    def _limits_of(self, step: Step) -> tuple[int, int]:
-        """Return the minimum and the maximum length of rows with a step."""
-        least, most = int(self.config.min_count * step.count), int(self.config.max_count * step.count)
+    def _limits_of(self, count: int) -> tuple[int, int]:
+        """Return the minimum and the maximum length of a row of `count` parts in the exemplar."""
+        least, most = int(self.config.min_count * count), int(self.config.max_count * count)
         return max(least, 1), most
 
     def _rows_of(self, layout: Layout) -> list[Row]:

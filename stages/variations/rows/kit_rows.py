@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.kit import Kit
-from stages.variations.rows.layout import layout_of
+from stages.variations.rows.layout import Layout, layout_of
 from stages.variations.rows.rows import Row, find_rows
+from stages.variations.rows.turns import Circle, find_circles
 
 MAX_LABELS_SHOWN = 3
 
@@ -21,7 +22,7 @@ class KitRow:
     exemplar: name of the exemplar
     labels: number of parts of each label in one period, most frequent first
     count: parts of the row
-    direction: `along x`, `along y`, `along z` or `along a slope`
+    direction: `along x`, `along y`, `along z`, `along a slope`, or `about x`, `about y` or `about z`
     """
 
     exemplar: str
@@ -41,10 +42,17 @@ def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
     """Return the rows of all exemplars of a kit, the longest of each exemplar and direction first."""
     found: list[KitRow] = []
     for exemplar in kit.exemplars:
-        rows = sorted(find_rows(layout_of(kit, exemplar)), key=lambda row: (-row.count, len(row.copied), row.copied))
+        layout = layout_of(kit, exemplar)
+        rows = sorted(find_rows(layout), key=lambda row: (-row.count, len(row.copied), row.copied))
         described = [_described(kit, exemplar.name, row) for row in rows]
-        found += dict.fromkeys(described)
+        circles = [_turning(kit, exemplar.name, layout, circle) for circle in find_circles(layout)]
+        found += dict.fromkeys([*circles, *described])
     return tuple(found)
+
+
+def _turning(kit: Kit, exemplar: str, layout: Layout, circle: Circle) -> KitRow:
+    counts = Counter(kit.types[layout.types[part]].label for part in circle.orbits[:, 0].tolist())
+    return KitRow(exemplar, tuple(counts.most_common()), circle.sectors, f"about {'xyz'[circle.axis]}")
 
 
 def _described(kit: Kit, exemplar: str, row: Row) -> KitRow:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from stages.variations.rows.layout import Layout
 from stages.variations.rows.slabs import RowChange, Slab
 from stages.variations.rows.steps import ROUNDING_DECIMALS, Step, longest_row, steps_of
 
+MIN_ROW = 2
 MAX_PLANES = 160
 """Ends of slabs that are tried for each step and normal."""
 
@@ -56,7 +57,32 @@ def find_rows(layout: Layout, steps: Sequence[Step] | None = None) -> list[Row]:
             continue
         for normal in step.normals():
             rows += _rows_along(layout, number, step, count, normal, mates, previous)
-    return rows
+    return [row for row in rows if not any(_is_within(layout, row, whole) for whole in rows)]
+
+
+def _is_within(layout: Layout, row: Row, whole: Row) -> bool:
+    """Return whether a row of two parts is a pair inside each period of another row, such as the sides of a window."""
+    if row.count != MIN_ROW or row.step == whole.step or set(row.copied) >= set(whole.copied):
+        return False
+    units = _units(layout, whole.shift)
+    mates = layout.mates(row.shift)
+    first = np.flatnonzero(mates >= 0)
+    first = first[np.isin(layout.types[first], row.copied)]
+    return bool(len(first) and (units[first] >= 0).all() and (units[first] == units[mates[first]]).all())
+
+
+def _units(layout: Layout, shift: FloatArray) -> np.ndarray:
+    """Return the unit of each part that has a part one step before or after, int64 (n,), or -1.
+
+    A unit is a connected set of such parts that does not reach from one period into the next.
+    """
+    mates, previous = layout.mates(shift), layout.mates(-shift)
+    recurs = (mates >= 0) | (previous >= 0)
+    inner = layout.edges[recurs[layout.edges].all(axis=1)]
+    units = np.where(recurs, replace(layout, edges=inner).pieces(), -1)
+    first = np.flatnonzero(mates >= 0)
+    joined = np.unique(units[first[units[first] == units[mates[first]]]])
+    return np.where(np.isin(units, joined), -1, units)
 
 
 def _rows_along(

@@ -136,7 +136,7 @@ class Slab:
         if (behind < 0).any() or not within[behind].all():
             return "a contact across the end of the slab does not recur at its start"
         back = within[i] & before[j]
-        if (self.mates[i[back]] < 0).any():
+        if not self._leads_into(i[back], beyond):
             return "a contact at the start of the slab does not recur at its end"
         return None
 

@@ -124,3 +124,24 @@ def mirrored_row(pairs: int = 3) -> tuple[Kit, Layout]:
     brackets = [(name, pose(0.4 + 2.0 * number + 0.9 * (name == "right"), 0.0, 0.0)) for number in range(pairs)
                 for name in ("left", "right")]  # fmt: skip
     return layout(meshes, [("bar", pose(pairs * 1.0, -0.05, 0.0)), *brackets])
+
+
+def round_temple(columns: int = 8) -> tuple[Kit, Layout]:
+    """Columns, each with a base, between two round plates."""
+    turns = [trimesh.transformations.rotation_matrix(2 * np.pi * number / columns, [0, 1, 0]) for number in
+             range(columns)]  # fmt: skip
+    plate = trimesh.creation.cylinder(1.2, 0.1, sections=64).apply_transform(
+        trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0])
+    )
+    standing = [(name, turn @ pose(1.0, y, 0.0)) for turn in turns for name, y in (("base", 0.1), ("column", 0.65))]
+    meshes = {"plate": plate, "base": box(0.3, 0.1, 0.2), "column": box(0.2, 1.0, 0.1)}
+    return layout(meshes, [("plate", pose(0.0, 0.0, 0.0)), ("plate", pose(0.0, 1.2, 0.0)), *standing])
+
+
+def framed_windows(count: int = 3) -> tuple[Kit, Layout]:
+    """A wall with windows, each of two sides and a pane between them."""
+    sides = [("side", pose(1.8 * number + x, 1.0, 0.0)) for number in range(count) for x in (0.0, 1.0)]
+    panes = [("pane", pose(1.8 * number + 0.5, 1.0, 0.0)) for number in range(count)]
+    wall = ("wall", pose(0.9 * count - 0.4, 1.0, -0.1))
+    meshes = {"wall": box(1.8 * count + 0.4, 2.4, 0.1), "side": box(0.1, 1.0, 0.1), "pane": box(0.9, 1.0, 0.1)}
+    return layout(meshes, [wall, *sides, *panes])

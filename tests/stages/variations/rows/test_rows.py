@@ -12,12 +12,15 @@ import pytest
 from stages.proportions.warp_check import warp_fault
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Kit
+from stages.variations.rows.changes import change_json, read_change
+from stages.variations.rows.changes import changed as changed_by
 from stages.variations.rows.draws import LayoutDraws
 from stages.variations.rows.kit_rows import rows_of_kit
 from stages.variations.rows.layout import Layout
 from stages.variations.rows.rows import Row, find_rows
 from stages.variations.rows.slabs import RowChange, SlabError, repeat
 from stages.variations.rows.steps import steps_of
+from stages.variations.rows.turns import find_circles, turned
 from stages.variations.settings import RowsConfig
 from tests.stages.variations.rows import models
 
@@ -29,6 +32,7 @@ MODELS: dict[str, Callable[[], tuple[Kit, Layout]]] = {
     "truss": models.truss,
     "stair": models.stair,
     "mirrored row": models.mirrored_row,
+    "framed windows": models.framed_windows,
 }
 
 
@@ -169,7 +173,7 @@ def test_draws_depend_on_the_seed_alone_and_stay_in_range() -> None:
 
 
 def test_every_draw_of_every_model_passes_the_check() -> None:
-    for build in MODELS.values():
+    for build in (*MODELS.values(), models.round_temple):
         kit, layout = build()
         draws = LayoutDraws(layout, RowsConfig())
         drawn = [result for seed in range(4) if (result := draws.draw(np.random.default_rng(seed)))]
@@ -178,8 +182,33 @@ def test_every_draw_of_every_model_passes_the_check() -> None:
             check(kit, changed)
             again = layout
             for change in made:
-                again = repeat(again, change)
+                again = changed_by(again, change)
             assert again.key == changed.key
+
+
+def test_a_pair_inside_a_period_is_no_row() -> None:
+    kit, layout = models.framed_windows()
+    rows = find_rows(layout)
+    assert all(
+        Counter(kit.types[kind].label for kind in row.copied) == {"pane": 1, "side": 2}
+        for row in rows
+        if row.count == 3
+    )
+    assert not any(np.isclose(np.linalg.norm(row.shift), 1.0) for row in rows)
+
+
+@pytest.mark.parametrize("count", [3, 4, 5, 12])
+def test_columns_about_an_axis_change_their_number(count: int) -> None:
+    kit, layout = models.round_temple()
+    (circle,) = find_circles(layout)
+    assert (circle.axis, circle.sectors, len(circle.orbits)) == (1, 8, 2)
+    other = turned(layout, circle.turn(count))
+    assert counts(kit, other) == {"plate": 2, "base": count, "column": count}
+    check(kit, other)
+    (again,) = find_circles(other)
+    back = turned(other, again.turn(8))
+    assert back.key == layout.key
+    assert read_change(change_json(circle.turn(count))).count == count  # type: ignore[union-attr]
 
 
 def test_rows_are_described() -> None:

@@ -1,0 +1,51 @@
+"""Changes of a layout: periods of a row along a line, or another number of sectors about an axis; and their JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from stages.variations.rows.layout import Layout
+from stages.variations.rows.slabs import RowChange, repeat
+from stages.variations.rows.turns import Turn, turned
+
+Change = RowChange | Turn
+
+MAX_TIMES = 1000
+"""Most periods or sectors that one change may make."""
+
+
+def changed(layout: Layout, change: Change) -> Layout:
+    """Return a changed layout. Raises SlabError for a change that is not valid."""
+    return turned(layout, change) if isinstance(change, Turn) else repeat(layout, change)
+
+
+def change_json(change: Change) -> dict[str, Any]:
+    """Return a change as JSON."""
+    if isinstance(change, Turn):
+        centre, numbers = change.centre.tolist(), {"sectors": change.sectors, "count": change.count}
+        return {"axis": "xyz"[change.axis], "centre": centre, **numbers}
+    return {
+        "normal": change.normal.tolist(),
+        "shift": change.shift.tolist(),
+        "at": change.at,
+        "times": change.times,
+    }
+
+
+def read_change(stated: Mapping[str, Any]) -> Change:
+    """Return a change from its JSON. Raises ValueError, TypeError or KeyError."""
+    if "axis" in stated:
+        centre = np.array(stated["centre"], dtype=np.float64).reshape(3)
+        sectors, count = int(stated["sectors"]), int(stated["count"])
+        if stated["axis"] not in ("x", "y", "z") or not np.isfinite(centre).all() or not 0 < count <= MAX_TIMES:
+            raise ValueError(f"sectors are about axis x, y or z, and 1 to {MAX_TIMES}: {stated}")
+        return Turn("xyz".index(stated["axis"]), centre, sectors, count)
+    normal, shift = (np.array(stated[key], dtype=np.float64).reshape(3) for key in ("normal", "shift"))
+    at, times = float(stated["at"]), int(stated["times"])
+    numbers = [*normal.tolist(), *shift.tolist(), at]
+    if not np.isfinite(numbers).all() or normal @ shift <= 0 or not (times == -1 or 0 < times <= MAX_TIMES):
+        raise ValueError(f"a row changes by 1 to {MAX_TIMES} or -1 periods, with a step along its normal: {stated}")
+    return RowChange(normal, shift, at, times)
