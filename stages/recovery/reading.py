@@ -14,6 +14,7 @@ from stages.cloud_files.array_file import read_array_file
 from stages.cloud_files.number_table import InvalidTable
 from stages.cloud_files.read import CLOUD_SUFFIXES, read_cloud
 from stages.cloud_files.read import UNREAD_SUFFIXES as UNREAD_CLOUDS
+from stages.model_files.exact_vertices import exact_vertices
 from stages.model_files.read import read_model
 from stages.model_files.scene import ModelScene
 from stages.model_files.scene_file import READERS
@@ -94,9 +95,8 @@ def surface_points(model: ModelScene) -> FloatArray:
     """
     from stages.points.area_sampling import sample_surface
 
-    triangles = [surface.vertices[surface.faces] for surface in model.surfaces]
-    placed = [triangles[place.surface] @ place.pose[:3, :3].T + place.pose[:3, 3] for place in model.placements]
-    corners = np.concatenate(placed)
+    placed = zip(exact_vertices(model), model.placements, strict=True)
+    corners = np.concatenate([vertices[model.surfaces[place.surface].faces] for vertices, place in placed])
     low = corners.min(axis=(0, 1))
     size = float(np.ptp(corners, axis=(0, 1)).max()) or 1.0
     steps = np.rint((corners - low) / size * ORDER_STEPS).astype(np.int64)

@@ -114,6 +114,9 @@ def report(plan: Plan) -> Sequence[str]:
         rejected.update(plan.rejects("shapeassembly", shard))
     reasons = ", ".join(f"{count:,} {reason}" for reason, count in rejected.most_common())
     warnings = [f"warning: {sentence}" for sentence in missing_licenses(program_origins(plan))]
+    left_out = {entry.path: entry.source.sidecars for entry in config.hierarchies}
+    for path, count in left_out.items():
+        warnings += [f"warning: {path}: {count} `._` files of macOS were left out"] if count else []
     return [f"programs: {counts}; {summary['structures']:,} structures; rejected: {reasons or 'none'}", *warnings]
 
 

@@ -41,13 +41,17 @@ class HierarchyFiles(NamedFiles):
     path: Annotated[Path, AfterValidator(_existing)] = Field(description="A folder, searched recursively, or one file.")
     kind: HierarchyKind = Field(
         description="structurenet: .json files; partnet: result_after_merging.json files and objs/ in one folder; "
-        "grass: one .npz file; glb: .glb files, whose scene graph is the hierarchy."
+        "grass: one .npz file; model: model files (GLB, glTF, OBJ, PLY, STL, OFF, DAE), whose nodes, objects or "
+        "connected components are the parts; glb: of these the .glb files."
     )
     category: Category = Field(
         "any",
         description="Category whose rules flatten, collapse and order parts by PartNet labels; any: no rules.",
     )
-    up: Literal["y", "z"] = Field("y", description="The axis that points up in glb files; the others are y up.")
+    up: Literal["auto", "y", "z"] = Field(
+        "auto",
+        description="The axis that points up in model files; `auto` takes what the file says, else y. Others are y up.",
+    )
 
     @property
     def source(self) -> HierarchySource:

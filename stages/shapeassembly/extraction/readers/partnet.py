@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import Rejected
+from stages.model_files.exact_vertices import exact_vertices
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.hierarchy import (
     MAX_HIERARCHY_DEPTH,
@@ -18,6 +19,7 @@ from stages.shapeassembly.extraction.hierarchy import (
     check_limits,
 )
 from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
+from stages.shapeassembly.extraction.readers.model import scene_of
 
 
 def read_partnet(path: Path) -> PartHierarchy:
@@ -59,18 +61,14 @@ def _part(node: Any, folder: Path, location: str, depth: int) -> tuple[PartNode,
 
 
 def _points(mesh: Any, folder: Path, location: str) -> FloatArray:
-    """Return the vertices of one OBJ file, float64 (n, 3)."""
+    """Return the vertices on the faces of one OBJ file, float64 (n, 3)."""
     if not isinstance(mesh, str) or not mesh or set(mesh) & set("/\\\0") or mesh in {".", ".."}:
         raise Rejected(UNREADABLE, f"{location}: a mesh is named by a file of `objs`, without a folder: {mesh!r}")
     path = folder / f"{mesh}.obj"
+    if not path.is_file():
+        raise Rejected(UNREADABLE, f"{location}: objs/{mesh}.obj is not there; download the shape again")
     try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-        rows = [[float(number) for number in line.split()[1:4]] for line in lines if line.startswith("v ")]
-        points = np.array(rows, dtype=np.float64).reshape(-1, 3)
-    except FileNotFoundError:
-        raise Rejected(UNREADABLE, f"{location}: objs/{mesh}.obj is not there; download the shape again") from None
-    except ValueError:
-        raise Rejected(UNREADABLE, f"{location}: objs/{mesh}.obj has a vertex that is not three numbers") from None
-    if not len(points) or not np.isfinite(points).all():
-        raise Rejected(UNREADABLE, f"{location}: objs/{mesh}.obj has no vertices, or some that are not finite")
-    return points
+        scene = scene_of(path)
+    except Rejected as error:
+        raise Rejected(UNREADABLE, f"{location}: objs/{error.detail}") from None
+    return np.concatenate(exact_vertices(scene))

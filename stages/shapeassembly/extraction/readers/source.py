@@ -9,18 +9,25 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
-from pipeline.errors import Rejected
-from stages.shapeassembly.extraction.hierarchy import PartHierarchy
+from pipeline.errors import ConfigError, Rejected
+from stages.model_files.scene_file import READERS
+from stages.shape.input_file import check_input_file, without_sidecars
+from stages.shapeassembly.extraction.hierarchy import UNREADABLE, PartHierarchy
 from stages.shapeassembly.extraction.readers.child_process import read_grass_in_child, read_in_child
-from stages.shapeassembly.extraction.readers.glb import read_glb
 from stages.shapeassembly.extraction.readers.grass import GrassFile
+from stages.shapeassembly.extraction.readers.model import read_model_hierarchy
 from stages.shapeassembly.extraction.readers.partnet import read_partnet
 from stages.shapeassembly.extraction.readers.structurenet import read_structurenet
 from stages.shapeassembly.sources import cached_digest
 
-HierarchyKind = Literal["structurenet", "partnet", "grass", "glb"]
+HierarchyKind = Literal["structurenet", "partnet", "grass", "model", "glb"]
 
-_PATTERNS = {"structurenet": "*.json", "partnet": "result_after_merging.json", "glb": "*.glb"}
+_ENDINGS = {
+    "structurenet": (".json",),
+    "partnet": ("result_after_merging.json",),
+    "glb": (".glb",),
+    "model": tuple(READERS),
+}
 
 
 @dataclass(frozen=True)
@@ -28,12 +35,12 @@ class HierarchySource:
     """A folder or file of hierarchies.
 
     path: a folder, or one file; for `grass` an npz file with many shapes.
-    up: the axis that points up in `glb` files; other kinds are y up.
+    up: the axis that points up in model files; other kinds are y up.
     """
 
     path: Path
     kind: HierarchyKind
-    up: Literal["y", "z"]
+    up: Literal["auto", "y", "z"]
 
     def __len__(self) -> int:
         """Return the number of hierarchies, unreadable ones included; an unreadable npz file counts as one."""
@@ -54,6 +61,11 @@ class HierarchySource:
             except Rejected as error:
                 yield name, error
 
+    @property
+    def sidecars(self) -> int:
+        """The number of `._` files of macOS in the folder, which are left out."""
+        return without_sidecars(self._found())[1] if self.path.is_dir() and self.kind != "grass" else 0
+
     def digest(self, first: int, last: int) -> str:
         """Return the hex sha256 of names and bytes of what `read` reads."""
         digest = hashlib.sha256()
@@ -66,8 +78,12 @@ class HierarchySource:
     def _files(self) -> Sequence[Path]:
         if self.path.is_file():
             return (self.path,)
-        files = [file for file in self.path.rglob(_PATTERNS[self.kind]) if file.is_file() and not file.is_symlink()]
-        return sorted(files, key=self._name)
+        return sorted(without_sidecars(self._found())[0], key=self._name)
+
+    def _found(self) -> list[Path]:
+        endings = _ENDINGS[self.kind]
+        found = (file for file in self.path.rglob("*") if file.name.lower().endswith(endings))
+        return [file for file in found if file.is_file() and not file.is_symlink()]
 
     def _name(self, file: Path) -> str:
         return file.relative_to(self.path).as_posix() if self.path.is_dir() else file.name
@@ -77,8 +93,12 @@ class HierarchySource:
         return _known_grass(self.path, state.st_mtime_ns, state.st_size)
 
     def _read(self, file: Path) -> PartHierarchy:
+        try:
+            check_input_file(file)
+        except ConfigError as error:
+            raise Rejected(UNREADABLE, str(error).replace(str(file), file.name, 1)) from None
         readers = {"structurenet": read_structurenet, "partnet": read_partnet}
-        return read_in_child(readers.get(self.kind, lambda path: read_glb(path, self.up)), file)
+        return read_in_child(readers.get(self.kind, lambda path: read_model_hierarchy(path, self.up)), file)
 
 
 @lru_cache(maxsize=4)

@@ -16,8 +16,8 @@ from stages.shapeassembly.extraction.boxes import box_corners, boxes_match
 from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES
 from stages.shapeassembly.extraction.extract import ExtractedProgram, extract
 from stages.shapeassembly.extraction.hierarchy import Box, PartHierarchy, PartNode
-from stages.shapeassembly.extraction.readers.glb import read_glb
 from stages.shapeassembly.extraction.readers.grass import read_grass
+from stages.shapeassembly.extraction.readers.model import read_model_hierarchy
 from stages.shapeassembly.extraction.readers.structurenet import read_structurenet
 from stages.shapeassembly.extraction.settings import Cleaning, Gates
 from stages.shapeassembly.extraction.validity import execution_boxes
@@ -314,6 +314,6 @@ def test_most_noisy_chairs_have_a_program_and_the_others_a_reason() -> None:
     ],
 )
 def test_real_furniture_has_a_compact_program(name: str, leaves: int) -> None:
-    extraction = extracted(read_glb(SHARED / "exemplars" / name / "model.glb", "z"))
+    extraction = extracted(read_model_hierarchy(SHARED / "exemplars" / name / "model.glb", "z"))
     assert extraction.leaves <= leaves
     assert extraction.f_score > 99

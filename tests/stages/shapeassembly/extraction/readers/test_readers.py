@@ -8,10 +8,17 @@ import pytest
 import trimesh
 
 from pipeline.errors import Rejected
-from stages.shapeassembly.extraction.readers.glb import read_glb
+from stages.shapeassembly import print_program
+from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES
+from stages.shapeassembly.extraction.extract import extract
+from stages.shapeassembly.extraction.hierarchy import PartHierarchy, PartNode
 from stages.shapeassembly.extraction.readers.grass import read_grass
+from stages.shapeassembly.extraction.readers.model import read_model_hierarchy
 from stages.shapeassembly.extraction.readers.partnet import read_partnet
+from stages.shapeassembly.extraction.readers.source import HierarchySource
 from stages.shapeassembly.extraction.readers.structurenet import read_structurenet
+from stages.shapeassembly.extraction.settings import Gates
+from tests.stages.model_files.one_table import write_one_table
 
 SHARED = Path(__file__).resolve().parents[6] / "shared"
 UPRIGHT = [0.0, 0.0, 0.0, 2.0, 1.0, 3.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
@@ -117,16 +124,10 @@ def partnet(folder: Path) -> Path:
     slab = trimesh.creation.box((2.0, 0.1, 1.0))
     stick = trimesh.creation.box((0.1, 1.0, 0.2))
     turn = trimesh.transformations.rotation_matrix(np.radians(30), [0, 0, 1])
-    upper = stick.vertices[stick.vertices[:, 1] > 0]
-    lower = stick.vertices[stick.vertices[:, 1] < 0]
-    for name, points in (
-        ("original-1", slab.vertices),
-        ("new-0", upper @ turn[:3, :3].T),
-        ("new-1", lower @ turn[:3, :3].T),
-    ):
-        (objs / f"{name}.obj").write_text(
-            "".join(f"v {x} {y} {z}\n" for x, y, z in points) + "f 1 2 3\n", encoding="utf-8"
-        )
+    stick.apply_transform(turn)
+    upper, lower = stick.submesh([np.arange(6), np.arange(6, 12)])
+    for name, mesh in (("original-1", slab), ("new-0", upper), ("new-1", lower)):
+        (objs / f"{name}.obj").write_text(mesh.export(file_type="obj"), encoding="utf-8")
     top = {"name": "tabletop", "objs": ["original-1"]}
     leg = {"name": "leg", "objs": ["new-0", "new-1"]}
     tree = [{"name": "table", "id": 0, "children": [top, {"name": "table_base", "children": [leg]}]}]
@@ -168,7 +169,13 @@ def test_invalid_partnet_leaf_is_rejected(tmp_path: Path, change: dict[str, obje
 
 
 @pytest.mark.parametrize(
-    ("text", "words"), [("", "no vertices"), ("v a b c", "three numbers"), ("v nan 0 0", "finite")]
+    ("text", "words"),
+    [
+        ("", "empty"),
+        ("v a b c\nf 1 1 1\n", r"table/tabletop: objs/original-1\.obj, line 1"),
+        ("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "finite"),
+        ("version https://git-lfs.github.com/spec/v1\nsize 9\n", "git lfs pull|no triangles"),
+    ],
 )
 def test_invalid_partnet_mesh_is_rejected(tmp_path: Path, text: str, words: str) -> None:
     path = partnet(tmp_path)
@@ -195,7 +202,7 @@ def glb(folder: Path) -> Path:
 
 
 def test_glb_nodes_are_parts_turned_y_up(tmp_path: Path) -> None:
-    shape = read_glb(glb(tmp_path), "z")
+    shape = read_model_hierarchy(glb(tmp_path), "z")
     parts = {part.label: part for part in shape.root.children}
     assert set(parts) == {"body", "drawer"}
     assert parts["body"].box.size.tolist() == pytest.approx([1, 2, 1])
@@ -203,12 +210,58 @@ def test_glb_nodes_are_parts_turned_y_up(tmp_path: Path) -> None:
     assert parts["drawer"].children[1].box.center.tolist() == pytest.approx([0.65, 0.5, 0.0])
 
 
+def boxes_of(part: PartNode) -> list[list[float]]:
+    return [[*part.box.center, *part.box.size], *(row for child in part.children for row in boxes_of(child))]
+
+
+def test_one_table_in_every_format_is_one_hierarchy_and_one_program(tmp_path: Path) -> None:
+    files = write_one_table(tmp_path)
+    assert len(files) == 11
+    shapes = {file.name: read_model_hierarchy(file, "auto") for file in files}
+    plain = boxes_of(shapes["plain.glb"].root)
+    programs = set()
+    for name, shape in shapes.items():
+        np.testing.assert_allclose(boxes_of(shape.root), plain, atol=1e-12, err_msg=name)
+        labels = [part.label for part in shape.root.children]
+        named = name.endswith((".glb", ".gltf", ".obj"))
+        if name != "scene.dae":  # whose nodes are named by the writer
+            assert labels == (["leg"] * 4 + ["top"] if named else ["part"] * 5)
+        programs.add(print_program(extract(shape, CATEGORY_RULES["any"], Gates()).program))
+    assert len(programs) == 1
+    assert plain[-1] == pytest.approx([0, 0.73, 0, 1.2, 0.06, 0.8])  # from the ground up
+
+
+def test_folder_of_models_is_read_without_sidecars_and_pointers(tmp_path: Path) -> None:
+    glb(tmp_path)
+    (tmp_path / "CHEST.OBJ").write_bytes(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (tmp_path / "._cabinet.glb").write_bytes(b"\x00\x05\x16\x07")
+    (tmp_path / "clone.glb").write_bytes(b"version https://git-lfs.github.com/spec/v1\nsize 9\n")
+    source = HierarchySource(tmp_path, "model", "auto")
+    (_, chest), (_, cabinet), (name, clone) = source.read(0, len(source))
+    assert isinstance(chest, PartHierarchy)
+    assert isinstance(cabinet, PartHierarchy)
+    assert isinstance(clone, Rejected)
+    assert (name, clone.reason) == ("clone.glb", "unreadable hierarchy")
+    assert "clone.glb: this is a Git LFS pointer" in clone.detail
+    assert source.sidecars == 1
+    assert len(HierarchySource(tmp_path, "glb", "auto")) == 2
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="needs the shared material")
+def test_tables_of_the_cases_are_one_hierarchy() -> None:
+    cases = (*(SHARED / "cases" / "h").iterdir(), SHARED / "cases" / "table-negative.obj")
+    first, *others = (boxes_of(read_model_hierarchy(path, "auto").root) for path in cases)
+    assert first[0] == pytest.approx([0, 0.38, 0, 1.2, 0.76, 0.8])
+    for other in others:
+        np.testing.assert_allclose(other, first, atol=2e-5)
+
+
 def test_invalid_or_empty_glb_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "bad.glb"
     for content in (b"", b"glTF" + b"\0" * 40, b"{}"):
         path.write_bytes(content)
         with pytest.raises(Rejected, match=r"bad\.glb"):
-            read_glb(path, "y")
+            read_model_hierarchy(path, "y")
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="needs the shared material")
@@ -221,4 +274,4 @@ def test_every_shared_hierarchy_is_read() -> None:
         part.label for part in read_structurenet(SHARED / "partgraphs/structurenet_example_boxshape.json").root.children
     }
     assert labels == {"chair_back", "chair_seat", "chair_base"}
-    assert len(read_glb(SHARED / "exemplars/h10_shop_building/model.glb", "y").root.children) > 0
+    assert len(read_model_hierarchy(SHARED / "exemplars/h10_shop_building/model.glb", "y").root.children) > 0
