@@ -13,7 +13,11 @@ from stages.programs.parameters import ParameterError, Value
 from stages.programs.program import Program, build_shape
 from stages.programs.sampling import Sampler
 from stages.programs.schema import Values
+from stages.shape.arrays import FloatArray
 from stages.shape.views.palette import srgb_to_linear
+
+PLACED_NODE = "placed"
+"""Name of the node that moves a whole shape."""
 
 
 def named_values(program: Program, name: str) -> dict[str, Value]:
@@ -57,16 +61,23 @@ def random_shapes(program: Program, count: int, seed: int) -> list[dict[str, Val
     return [sampler.find(None, rng) for _ in range(count)]
 
 
-def shape_glb(program: Program, values: Values) -> bytes:
-    """The shape at `values` as GLB: one node per part at its pose, named by label and number, in its colour."""
+def shape_glb(program: Program, values: Values, placement: FloatArray | None = None) -> bytes:
+    """The shape at `values` as GLB: one node per part at its pose, named by label and number, in its colour.
+
+    placement: float64 (4, 4), moves all parts by a node above them; scaling and rotating, without mirroring.
+    """
     import trimesh
 
     shape = build_shape(program, values)
     scene = trimesh.Scene()
+    parent = None
+    if placement is not None:
+        parent = PLACED_NODE
+        scene.graph.update(frame_to=parent, matrix=placement)
     for name, mesh, pose in zip(shape.part_names, shape.meshes, shape.assembly.poses, strict=True):
         color = np.append(srgb_to_linear(mesh.face_colors[0]), 1.0)
         material = trimesh.visual.material.PBRMaterial(baseColorFactor=color, metallicFactor=0.0, roughnessFactor=0.7)
         visual = trimesh.visual.TextureVisuals(material=material)
         part = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False, visual=visual)
-        scene.add_geometry(part, node_name=name, geom_name=name, transform=pose)
+        scene.add_geometry(part, node_name=name, geom_name=name, parent_node_name=parent, transform=pose)
     return scene.export(file_type="glb")

@@ -23,11 +23,15 @@ MAX_POINTS_SHOWN = 4096
 
 
 def write_recovery(folder: Path, source: RecoveryInput, result: RecoveryResult) -> list[Path]:
-    """Write `<name>.json`, `<name>.glb` in the program's coordinates, and `<name>.png`."""
+    """Write `<name>.json`, `<name>.glb` and `<name>.png`.
+
+    The GLB of a cloud or a mesh is in the coordinates of the input, with its size and up axis. That of a drawing is in
+    the program's.
+    """
     text = json.dumps({"input": source.name, **result.as_json()}, indent=1, ensure_ascii=False) + "\n"
     return [
         write_file(folder / f"{source.name}.json", text.encode()),
-        write_file(folder / f"{source.name}.glb", shape_glb(result.program, result.values)),
+        write_file(folder / f"{source.name}.glb", shape_glb(result.program, result.values, result.placement)),
         write_file(folder / f"{source.name}.png", picture_png(recovery_picture(source, result))),
     ]
 
