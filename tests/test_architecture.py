@@ -153,6 +153,33 @@ def test_nothing_executes_what_it_reads() -> None:
     assert faults(executing, CODE) == []
 
 
+READERS = {
+    "trimesh.load": (),
+    "trimesh.load_scene": (),
+    "trimesh.load_mesh": (),
+    "np.loadtxt": ("stages/cloud_files/",),
+    "np.genfromtxt": (),
+    "o3d.io.read_point_cloud": ("stages/cloud_files/",),
+    "o3d.io.read_triangle_mesh": (),
+    "collada.Collada": ("stages/model_files/",),
+    "Image.open": ("stages/model_files/", "stages/recovery/drawing_file.py"),
+}
+"""Calls that parse models, clouds and pictures, and the files that may make them."""
+
+
+def parses_by_itself(path: Path) -> Iterator[str]:
+    """Yield calls of parsers outside `read_model`, `read_cloud` and `read_drawing`; samples are in memory."""
+    for name, call in calls(parsed(path)):
+        allowed_files = READERS.get(name)
+        in_memory = call.args and ast.unparse(call.args[0]).startswith("io.BytesIO(")
+        if allowed_files is not None and not in_memory and not relative(path).startswith(allowed_files or ("-",)):
+            yield f"line {call.lineno}: {name}"
+
+
+def test_files_of_users_are_parsed_by_their_one_reader() -> None:
+    assert faults(parses_by_itself, CODE) == []
+
+
 def defaulted_streams(path: Path) -> Iterator[str]:
     for node in ast.walk(parsed(path)):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
