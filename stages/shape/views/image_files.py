@@ -20,7 +20,7 @@ from pipeline.errors import ShardFailed
 from stages.shape.arrays import ByteArray, Float32Array
 
 PNG_LEVEL = 4
-"""Effort of compression: 6 takes a third longer and saves a few percent."""
+"""Effort of compression: 6 takes up to half as long again and saves a tenth (`python -m tests.bench views`)."""
 FILTER_NONE, FILTER_UP = 8, 32
 """Filters of rows, as libpng numbers them: none, and the difference to the row above.
 
@@ -30,7 +30,7 @@ WEBP_EFFORT = 2
 EXR_TIME = "1970:01:01 00:00:00"
 """Time in an EXR's header, which OpenImageIO would take from the clock."""
 EXR_COMPRESSION = "zip"
-"""Lossless, and every reader knows it."""
+"""Lossless, and every reader knows it; pxr24 is half as large, and some readers do not know it."""
 
 ChannelType = Literal["half", "float"]
 
