@@ -22,8 +22,8 @@ Rules for the author of a stage:
 - Raise ShardFailed for a shard that may succeed later: it is retried, twice by default. ConfigError and Rejected
   quarantine it at once. Any other exception counts as ShardFailed. An OSError of a full disk or missing permission is
   Fatal, and everything stops. Do not catch those.
-- Import native libraries inside functions. A worker has one thread: the environment is set for BLAS, OpenMP and numba
-  before Python starts.
+- Import native libraries and modules with kernels inside functions: the driver of a run only plans. A worker has one
+  thread: the environment is set for BLAS, OpenMP and numba before Python starts.
 """
 
 from __future__ import annotations
