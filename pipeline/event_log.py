@@ -74,6 +74,8 @@ class EventLog:
         """Show how far the compilation of kernels is, as `show` does."""
         left = self._compilation_left.after(progress.worked, progress.work, time.monotonic())
         text = f"compiling kernels, once on this machine: {progress.done:,} of {progress.total:,}"
+        if not progress.total:
+            text = "looking for compiled kernels"
         text += "" if left is None else f", about {duration_text(left)} left"
         self._display.show(text, progress.worked, progress.work)
 

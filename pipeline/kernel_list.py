@@ -100,7 +100,9 @@ def compile_ahead(
 
     Kernels that cannot be compiled are left to their first use.
     """
-    schedule = Schedule(listed, _missing_of(listed, indices, workers))
+    schedule = Schedule(
+        listed, _missing_of(listed, indices, workers, lambda: show(CompilationProgress(0, 0, 0.0, 0.0)))
+    )
     running: dict[Future[Any], int] = {}
     while schedule.ready or running:
         while schedule.ready and workers.idle:
@@ -112,20 +114,23 @@ def compile_ahead(
     return schedule.progress.total
 
 
-def _missing_of(listed: KernelList, indices: list[int], workers: Workers) -> set[int]:
+def _missing_of(listed: KernelList, indices: list[int], workers: Workers, show: Callable[[], None]) -> set[int]:
     """Return those of some kernels that are not compiled; all, where the worker that looks dies."""
     if not indices:
         return set()
     future = workers.call(are_compiled, [listed.kernels[index] for index in indices])
     while not list(workers.ended_calls(_POLL_SECONDS)):
-        pass
+        show()
     compiled = future.result() if future.exception() is None else [False] * len(indices)
     return {index for index, is_compiled in zip(indices, compiled, strict=True) if not is_compiled}
 
 
 @dataclass(frozen=True)
 class CompilationProgress:
-    """Numbers of compiled kernels and of all that are to be compiled, and the same in recorded seconds."""
+    """Numbers of compiled kernels and of all that are to be compiled, and the same in recorded seconds.
+
+    `total` is 0 while a worker looks for those that are not compiled.
+    """
 
     done: int
     total: int
