@@ -13,6 +13,8 @@ from stages.variations.rows.rows import Row, find_rows
 from stages.variations.rows.turns import Circle, find_circles
 
 MAX_LABELS_SHOWN = 3
+MAX_RATIO_DIFFERENCE = 0.02
+"""Difference from a whole number up to which one step is a multiple of another."""
 
 
 @dataclass(frozen=True)
@@ -39,15 +41,29 @@ class KitRow:
 
 
 def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
-    """Return the rows of all exemplars of a kit, the longest of each exemplar and direction first."""
+    """Return the rows of all exemplars of a kit: circles first, then along each direction the longest rows."""
     found: list[KitRow] = []
     for exemplar in kit.exemplars:
         layout = layout_of(kit, exemplar)
-        rows = sorted(find_rows(layout), key=lambda row: (-row.count, len(row.copied), row.copied))
-        described = [_described(kit, exemplar.name, row) for row in rows]
         circles = [_turning(kit, exemplar.name, layout, circle) for circle in find_circles(layout)]
-        found += dict.fromkeys([*circles, *described])
+        found += dict.fromkeys([*circles, *(_described(kit, exemplar.name, row) for row in _main_rows(layout))])
     return tuple(found)
+
+
+def _main_rows(layout: Layout) -> list[Row]:
+    """Return one row for each step, that with most places, longest first; without steps of several periods."""
+    order = sorted(find_rows(layout), key=lambda row: (-row.count, -len(row.insertions), row.copied))
+    main: list[Row] = []
+    for row in order:
+        ratios = [np.linalg.norm(row.shift) / np.linalg.norm(other.shift) for other in main if _same_way(row, other)]
+        if all(ratio > 1.0 and abs(ratio - round(ratio)) > MAX_RATIO_DIFFERENCE for ratio in ratios):
+            main.append(row)
+    return main
+
+
+def _same_way(first: Row, second: Row) -> bool:
+    """Return whether two rows have parallel steps."""
+    return bool(np.linalg.norm(np.cross(first.shift, second.shift)) < MAX_RATIO_DIFFERENCE * first.shift @ second.shift)
 
 
 def _turning(kit: Kit, exemplar: str, layout: Layout, circle: Circle) -> KitRow:

@@ -57,18 +57,17 @@ def find_rows(layout: Layout, steps: Sequence[Step] | None = None) -> list[Row]:
             continue
         for normal in step.normals():
             rows += _rows_along(layout, number, step, count, normal, mates, previous)
-    return [row for row in rows if not any(_is_within(layout, row, whole) for whole in rows)]
+    return [row for row in rows if not any(_splits_units(layout, row, whole) for whole in rows)]
 
 
-def _is_within(layout: Layout, row: Row, whole: Row) -> bool:
-    """Return whether a row of two parts is a pair inside each period of another row, such as the sides of a window."""
-    if row.count != MIN_ROW or row.step == whole.step or set(row.copied) >= set(whole.copied):
+def _splits_units(layout: Layout, row: Row, whole: Row) -> bool:
+    """Return whether a row of two takes only some parts of a unit of another row, such as the sides of a window."""
+    if row.count != MIN_ROW or row.step == whole.step:
         return False
     units = _units(layout, whole.shift)
-    mates = layout.mates(row.shift)
-    first = np.flatnonzero(mates >= 0)
-    first = first[np.isin(layout.types[first], row.copied)]
-    return bool(len(first) and (units[first] >= 0).all() and (units[first] == units[mates[first]]).all())
+    takes = (layout.mates(row.shift) >= 0) | (layout.mates(-row.shift) >= 0)
+    taken, left = units[takes & (units >= 0)], units[~takes & (units >= 0)]
+    return bool(np.intersect1d(taken, left).size)
 
 
 def _units(layout: Layout, shift: FloatArray) -> np.ndarray:

@@ -13,6 +13,11 @@ MAX_STEP_SHARE = 0.75
 """Longest step, as a share of the box along its direction; a longer one joins the two ends of a shape, such as legs."""
 MIN_STEP_TOLERANCES = 4.0
 """Shortest step, in tolerances of mates."""
+MIN_COUNT = 2
+MIN_PAIR_STEP_SHARE = 0.2
+"""Shortest step of a row of two, as a share of the box along its direction; nearer pairs, such as two knobs, are not
+rows.
+"""
 MAX_STEPS = 24
 MAX_NEIGHBOURS_PER_PART = 24
 """Nearest parts of its class that are considered for steps from a part."""
@@ -83,10 +88,36 @@ def steps_of(layout: Layout) -> list[Step]:
             continue
         mates = layout.mates(shift)
         count = longest_row(mates)
-        if count >= 2:
+        if count > MIN_COUNT or (count == MIN_COUNT and _share(layout, shift) >= MIN_PAIR_STEP_SHARE):
             steps.append(Step(shift, count, int((mates >= 0).sum())))
     steps.sort(key=lambda step: (-step.parts, float(np.linalg.norm(step.shift)), *step.shift.tolist()))
-    return steps[:MAX_STEPS]
+    return _without_multiples(layout, steps)[:MAX_STEPS]
+
+
+def _share(layout: Layout, shift: FloatArray) -> float:
+    """Return the length of a step as a share of the box along its largest component."""
+    axis = int(np.abs(shift).argmax())
+    return float(np.abs(shift[axis]) / max(layout.extent[axis], 1e-12))
+
+
+def _without_multiples(layout: Layout, steps: list[Step]) -> list[Step]:
+    """Return the steps without multiples of another one that all their parts take too.
+
+    What a multiple would leave out, since it lacks a part so far away, would be missing in the middle of a row.
+    """
+    taking = [(layout.mates(step.shift) >= 0) | (layout.mates(-step.shift) >= 0) for step in steps]
+    kept = []
+    for step, parts in zip(steps, taking, strict=True):
+        length = float(np.linalg.norm(step.shift))
+        is_multiple = False
+        for other, other_parts in zip(steps, taking, strict=True):
+            times = round(length / float(np.linalg.norm(other.shift)))
+            gap = float(np.linalg.norm(step.shift - times * other.shift))
+            if times > 1 and gap <= times * layout.mate_tolerance and not (parts & ~other_parts).any():
+                is_multiple = True
+        if not is_multiple:
+            kept.append(step)
+    return kept
 
 
 def _shifts(layout: Layout) -> FloatArray:

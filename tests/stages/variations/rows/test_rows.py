@@ -214,4 +214,4 @@ def test_columns_about_an_axis_change_their_number(count: int) -> None:
 def test_rows_are_described() -> None:
     kit, layout = models.shelf()
     assert rows_of_kit(kit)[0].sentence == "5 times board, along y"
-    assert [step.count for step in steps_of(layout)] == [5, 3, 2]
+    assert [step.count for step in steps_of(layout)] == [5]
