@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 import tomllib
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -96,6 +98,13 @@ def test_rooms_do_not_import_in_a_circle() -> None:
     order = list(TopologicalSorter(reads).static_order())
     assert order[0] == "shape"
     assert [room for room, read in reads.items() if "package" in read] == ["verification"]
+
+
+def test_stages_are_found_without_numba_and_scipy() -> None:
+    """A run with nothing to make answers in a second; run functions import kernels and native libraries inside."""
+    program = "import sys; from pipeline.registry import find_stages; find_stages(); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert {"numba", "scipy", "trimesh", "torch", "pyarrow"}.isdisjoint(done.stdout.split())
 
 
 def nondeterministic(path: Path) -> Iterator[str]:

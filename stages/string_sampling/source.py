@@ -18,7 +18,6 @@ from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
 from stages.string_sampling.settings import SourceConfig
-from stages.strings.compiled_grammar import compile_grammar, patterns_json
 from stages.strings.decoder import decode
 from stages.strings.settings import Edges
 from stages.strings.tokens import make_alphabet
@@ -131,6 +130,8 @@ def _expected(kit: Kit) -> dict[str, Any]:
 
 def _check_grammar(kit: Kit, patterns: Mapping[str, Any]) -> None:
     """Raise Rejected for a model trained on another grammar than that of the kit."""
+    from stages.strings.compiled_grammar import compile_grammar, patterns_json
+
     own = patterns_json(compile_grammar(kit.grammar, len(kit.labels), 0, bool(patterns["partial"])))
     if own != {key: patterns[key] for key in own}:
         raise Rejected(

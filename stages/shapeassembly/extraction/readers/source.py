@@ -15,9 +15,6 @@ from stages.shape.input_file import check_input_file, without_sidecars
 from stages.shapeassembly.extraction.hierarchy import UNREADABLE, PartHierarchy
 from stages.shapeassembly.extraction.readers.child_process import read_grass_in_child, read_in_child
 from stages.shapeassembly.extraction.readers.grass import GrassFile
-from stages.shapeassembly.extraction.readers.model import read_model_hierarchy
-from stages.shapeassembly.extraction.readers.partnet import read_partnet
-from stages.shapeassembly.extraction.readers.structurenet import read_structurenet
 from stages.shapeassembly.sources import cached_digest
 
 HierarchyKind = Literal["structurenet", "partnet", "grass", "model", "glb"]
@@ -97,6 +94,11 @@ class HierarchySource:
             check_input_file(file)
         except ConfigError as error:
             raise Rejected(UNREADABLE, str(error).replace(str(file), file.name, 1)) from None
+        # Here, since a plan needs no reader, and before the fork, so that children have the imports.
+        from stages.shapeassembly.extraction.readers.model import read_model_hierarchy
+        from stages.shapeassembly.extraction.readers.partnet import read_partnet
+        from stages.shapeassembly.extraction.readers.structurenet import read_structurenet
+
         readers = {"structurenet": read_structurenet, "partnet": read_partnet}
         return read_in_child(readers.get(self.kind, lambda path: read_model_hierarchy(path, self.up)), file)
 
