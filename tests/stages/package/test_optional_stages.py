@@ -11,6 +11,7 @@ import pytest
 
 from pipeline.config import Config, load_config
 from pipeline.errors import ConfigError
+from pipeline.registry import find_stages
 from pipeline.shards import read_shard
 from stages.package.reader import Dataset
 from stages.points.settings import PointsConfig
@@ -77,3 +78,12 @@ def test_false_turns_a_section_off_and_true_is_refused(tmp_path: Path) -> None:
     path.write_text("name: c\npoints: true\n", encoding="utf-8")
     with pytest.raises(ConfigError, match=r"c\.yaml:2: points: "):
         load_config(path, {"points": PointsConfig})
+
+
+def test_a_model_of_strings_needs_strings(tmp_path: Path) -> None:
+    path = tmp_path / "c.yaml"
+    path.write_text("name: c\nstrings: false\ntraining: {models: [{name: m, kind: string_vae}]}\n", encoding="utf-8")
+    stages = find_stages()
+    config = load_config(path, {name: stage.config for name, stage in stages.items()})
+    with pytest.raises(ConfigError, match="m: it learns from strings, which are turned off"):
+        stages["training"].check(config)
