@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 from pipeline.randomness import decision_rng
 from stages.autoconfig.closed_box import is_closed_box
+from stages.autoconfig.contact_analysis import ALL_KINDS
 from stages.autoconfig.resolve import REQUIREMENT_KEYS, Resolution
 from stages.autoconfig.resolved_kit import ResolvedKit
 from stages.autoconfig.settings import RANDOM_STREAM
@@ -97,10 +99,13 @@ def resize_fallback(resolved: ResolvedKit, layouts: YieldEstimate, max_shapes: i
     """
     if resolved.resolution.is_sufficient or not layouts.is_poor:
         return None
-    unvaried = _unvaried(resolved)
-    built = resolved.observe(unvaried.values)
-    estimate = estimate_resizing(built.kit, max_shapes) if not built.refusals else None
-    if estimate is None or estimate.success_rate < MIN_SUCCESS_RATE:
+    for own_kinds in (False, True):
+        unvaried = _unvaried(resolved, own_kinds)
+        built = resolved.observe(unvaried.values)
+        estimate = estimate_resizing(built.kit, max_shapes) if not built.refusals else None
+        if estimate is not None and estimate.success_rate >= MIN_SUCCESS_RATE:
+            break
+    else:
         return None
     reason = f"{estimate.success_rate:.0%} of what is drawn holds together; of other layouts {layouts.sentence}"
     stable_reason = "the exemplars are stable" if estimate.stable else "not even the exemplars are stable"
@@ -110,11 +115,15 @@ def resize_fallback(resolved: ResolvedKit, layouts: YieldEstimate, max_shapes: i
     return ResizeFallback(replace(unvaried, values=values, reasons=reasons), built, estimate)
 
 
-def _unvaried(resolved: ResolvedKit) -> Resolution:
-    """Return the settings for unchanged layouts: hubs stay, pieces stay if a run accepts them, and nothing is required
-    of layouts."""
+def _unvaried(resolved: ResolvedKit, own_kinds: bool) -> Resolution:
+    """Return the settings for unchanged layouts, which need no graph that can be searched.
+
+    All kinds of contact count, or those of the search (`own_kinds`). Hubs stay, pieces stay if a run accepts them, and
+    nothing is required of layouts.
+    """
     resolution = resolved.resolution
-    unvaried = {
+    unvaried: dict[str, tuple[Any, str]] = {
+        **({} if own_kinds else {"contact.kinds": (ALL_KINDS, "every contact is kept, only sizes change")}),
         "hubs.types": ("none", "all parts stay, only sizes change"),
         "disconnected": ("error", "no part is apart"),
     }

@@ -2,34 +2,56 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from pipeline.errors import ConfigError
 from stages.exemplars.model import Model, pack_model, unpack_model
 from stages.exemplars.rigid_parts import rigid_parts
-from stages.exemplars.segmentation import segment_into_parts
+from stages.exemplars.segmentation import CUTS, segment_into_parts
 from stages.exemplars.settings import Segmentation
 from stages.model_files.limits import ReadLimits
-from stages.model_files.read import read_bounded
+from stages.model_files.read import ReadFailed, read_bounded
 from stages.model_files.scene_file import check_size, first_warnings, read_scene
 
 
 def read_parts(path: Path, segmentation: Segmentation = "auto", limits: ReadLimits | None = None) -> Model:
     """Return the parts of a model file, cut as `segmentation` says; as `parse_parts`.
 
-    Raises ConfigError, with the file, the element and the remedy, for a file without usable parts, whatever it did
-    to the child process, and for one that takes more than `limits`.
+    Where `auto` fails on a file that can be read without cutting one mesh by its symmetries, the model is that one,
+    with a warning. Raises ConfigError, with the file, the element and the remedy, for a file without usable parts,
+    whatever it did to the child process, and for one that takes more than `limits`; and, with the name of the cut, for
+    a stated cut that fails.
     """
     limits = limits or ReadLimits()
-    content = read_bounded(path, lambda: pack_model(parse_parts(path, segmentation, limits)), limits)
+    try:
+        return _read_in_child(path, segmentation, limits)
+    except ReadFailed as error:
+        if segmentation not in ("auto", *CUTS):
+            raise
+        reason = error.reason
+    model = _read_in_child(path, "auto", limits, may_cut=False)
+    if segmentation == "auto":
+        warning = f"cutting it by symmetry failed: {reason}; its parts are taken in other ways"
+        return replace(model, warnings=first_warnings([*model.warnings, warning]))
+    raise ConfigError(
+        f"{path}: the file can be read, but `parts: {segmentation}` failed: {reason}; set `parts: auto` or another "
+        "source of parts, or raise exemplars.limits in the config"
+    )
+
+
+def _read_in_child(path: Path, segmentation: Segmentation, limits: ReadLimits, may_cut: bool = True) -> Model:
+    content = read_bounded(path, lambda: pack_model(parse_parts(path, segmentation, limits, may_cut)), limits)
     try:
         return unpack_model(path, content)
     except ValueError:
         raise ConfigError(f"{path}: cannot be read: its parts are no meshes; export it again") from None
 
 
-def parse_parts(path: Path, segmentation: Segmentation, limits: ReadLimits) -> Model:
+def parse_parts(path: Path, segmentation: Segmentation, limits: ReadLimits, may_cut: bool = True) -> Model:
     """Return the parts of a model file, in the calling process.
+
+    may_cut: whether `auto` may cut one mesh by its symmetries.
 
     Opens nothing outside the folder of `path`. Scale, shear and mirroring of the scene move into the vertices, so that
     poses are rigid. A model far from the origin is moved there, with a warning. Raises ConfigError, with the file, the
@@ -37,7 +59,7 @@ def parse_parts(path: Path, segmentation: Segmentation, limits: ReadLimits) -> M
     """
     scene = read_scene(path)
     check_size(path, scene, limits)
-    segmented, source, why = segment_into_parts(path, scene, segmentation)
+    segmented, source, why = segment_into_parts(path, scene, segmentation, may_cut)
     check_size(path, segmented, limits)
     parts, warnings = rigid_parts(path, segmented)
     return Model(path, parts, source, why, first_warnings([*scene.warnings, *warnings]), scene.up, scene.unit)

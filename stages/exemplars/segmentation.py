@@ -16,6 +16,10 @@ from stages.model_files.scene import ModelScene, Placement, Surface, UniqueNames
 from stages.shape.geometry.connected_faces import connected_faces
 
 SOURCES: tuple[Segmentation, ...] = ("nodes", "objects", "materials", "colors", "components")
+CUTS: tuple[Segmentation, ...] = ("symmetry", "sections")
+"""The sources that search a surface for what repeats, instead of reading parts off the file."""
+NOT_CUT = "which is not cut"
+"""Why a mesh has one part whose cut by symmetry failed."""
 
 MAX_LABEL_COLORS = 64
 """More colours are shading, not labels."""
@@ -34,16 +38,18 @@ _WORDS = {
 
 
 def segment_into_parts(
-    path: Path, scene: ModelScene, segmentation: Segmentation
+    path: Path, scene: ModelScene, segmentation: Segmentation, may_cut: bool = True
 ) -> tuple[ModelScene, Segmentation, str]:
     """Return the scene with one placement for each part, the source of the parts, and a sentence that says why.
+
+    may_cut: whether `auto` may cut one mesh by its symmetries.
 
     Raises ConfigError for a stated source that the scene does not have.
     """
     if segmentation == "auto":
-        source, why, segmented = pick_segmentation(scene)
+        source, why, segmented = pick_segmentation(scene, may_cut)
         return segmented, source, why
-    if segmentation not in (scene.kind, "symmetry", "sections"):
+    if segmentation not in (scene.kind, *CUTS):
         counts = count_parts(scene)
         if segmentation not in counts:
             offered = ", ".join(f"{name} ({count})" for name, count in counts.items())
@@ -65,13 +71,13 @@ def count_parts(scene: ModelScene) -> dict[Segmentation, int]:
     return counts
 
 
-def pick_segmentation(scene: ModelScene) -> tuple[Segmentation, str, ModelScene]:
+def pick_segmentation(scene: ModelScene, may_cut: bool = True) -> tuple[Segmentation, str, ModelScene]:
     """Return the source that `auto` takes, one sentence that says why, and the scene with one placement for each part.
 
     Two or more scene nodes or named objects are their author's parts; components that recur within one of a few objects
     become parts too. Otherwise materials are tried, then colours
     unless they are too many to be labels, then connected components. A mesh in one piece is cut where it repeats
-    itself, unless its surface is so large for its size that the search would take long.
+    itself, if `may_cut`, unless its surface is so large for its size that the search would take long.
     """
     if len(scene.placements) > 1:
         counted = f"{len(scene.placements)} {_WORDS[scene.kind]}"
@@ -93,6 +99,8 @@ def pick_segmentation(scene: ModelScene) -> tuple[Segmentation, str, ModelScene]
         else:
             passed.append("one connected component")
     reasons = ", ".join(passed)
+    if not may_cut:
+        return scene.kind, f"{reasons}, {NOT_CUT}", scene
     size = search_size(scene)
     if size > MAX_SEARCH_SIZE:
         why = f"{reasons}: too much surface to look unasked for what repeats, about {size:,} cells and triangles"

@@ -14,6 +14,20 @@ from stages.model_files.scene import ModelScene
 from stages.model_files.scene_file import check_size, first_warnings, read_scene
 
 
+class ReadFailed(ConfigError):
+    """The child process that read a file gave no answer.
+
+    reason: why, as the end of a sentence about the file
+    """
+
+    def __init__(self, path: Path, reason: str) -> None:
+        self.reason = reason
+        super().__init__(
+            f"{path}: cannot be read: {reason}; export it again, simpler if it is large, or raise exemplars.limits in "
+            "the config"
+        )
+
+
 def read_model(path: Path, limits: ReadLimits | None = None) -> ModelScene:
     """Return the scene of a model file: GLB, glTF, OBJ with MTL, PLY, STL, OFF or DAE.
 
@@ -39,12 +53,9 @@ def read_model(path: Path, limits: ReadLimits | None = None) -> ModelScene:
 def read_bounded(path: Path, read: Callable[[], bytes], limits: ReadLimits) -> bytes:
     """Return what `read` makes of the file `path`, in a child process with limits.
 
-    Raises ConfigError, with the remedy, whatever happens to the child process.
+    Raises ReadFailed, with the remedy, whatever happens to the child process, and ConfigError where `read` does.
     """
     try:
         return in_child(read, cpu_seconds=limits.cpu_seconds, memory_mb=limits.memory_mb, refusal=ConfigError)
     except ChildFailed as error:
-        raise ConfigError(
-            f"{path}: cannot be read: {error}; export it again, simpler if it is large, or raise exemplars.limits in "
-            "the config"
-        ) from None
+        raise ReadFailed(path, str(error)) from None

@@ -17,6 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.errors import ConfigError
+from stages.exemplars import segmentation
 from stages.exemplars.model import Model, RawPart
 from stages.exemplars.read import parse_parts, read_parts
 from stages.model_files.limits import ReadLimits
@@ -834,3 +835,27 @@ def test_real_exemplars_have_the_parts_of_their_lists_in_order() -> None:
         assert len(model.parts) == described["parts"], folder.name
         assert sum(len(part.faces) for part in model.parts) == described["triangles"], folder.name
         assert model.warnings == (), folder.name
+
+
+class TestCutsThatFail:
+    def failing(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        def fail(_: Any) -> Any:
+            raise ValueError("no such face")
+
+        monkeypatch.setattr(segmentation, "cut_by_symmetry", fail)
+
+    def test_auto_reads_the_mesh_without_the_cut_and_warns(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        self.failing(monkeypatch)
+        glb = Glb()
+        glb.node(name="all", mesh=glb.mesh(glb.primitive(BOXES["base"], BOX_FACES), name="all"))
+        model = read_parts(glb.write(tmp_path / "m.glb"))
+        assert [part.name for part in model.parts] == ["all"]
+        assert "one connected component, which is not cut" in model.why
+        assert re.match(r"cutting it by symmetry failed: .*other ways", model.warnings[-1])
+
+    def test_stated_cut_that_fails_names_the_cut(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.failing(monkeypatch)
+        with pytest.raises(ConfigError, match=r"can be read, but `parts: symmetry` failed: something is in it"):
+            read_parts(boxes_glb().write(tmp_path / "m.glb"), "symmetry")
