@@ -13,16 +13,15 @@ from stages.autoconfig.setting_search import (
     CANDIDATE_GRAMMARS,
     CANDIDATE_KINDS,
     MIN_KEPT_SHARE,
-    MIN_NON_COPY_RATE,
     SUFFICIENT_GRAPHS,
     CandidateSetting,
     SearchSpace,
-    has_low_diversity,
     parts_without_hubs,
     search_settings,
 )
-from stages.autoconfig.trial_search import TrialResult
+from stages.autoconfig.trial_search import MIN_NON_COPY_RATE, TrialResult, has_low_diversity
 from stages.autoconfig.up_axis import resolve_up_axis
+from stages.exemplars.diagnostics import listed_names
 from stages.exemplars.hubs import hub_types
 from stages.exemplars.identify import IdentifiedParts
 from stages.exemplars.model import Model
@@ -30,9 +29,10 @@ from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.shape.kit import Assembly, Kit
 from stages.shape.physics.judge import unmet_requirement
 from stages.shape.physics.settings import Requirements
-from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY, REQUIRED_LABELS_KEY, STABLE_KEY
+from stages.shape.resolved_settings import KEEP_TYPES_KEY, MAX_COPIED_SHARE_KEY, REQUIRED_LABELS_KEY, STABLE_KEY
 from stages.shape.shape import kit_shape
 from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
+from stages.variations.requirements.identity import common_labels
 from stages.variations.requirements.required_labels import spanning_labels
 
 
@@ -68,7 +68,7 @@ class Resolution:
         }
 
 
-REQUIREMENT_KEYS = (MAX_COPIED_SHARE_KEY, STABLE_KEY, REQUIRED_LABELS_KEY)
+REQUIREMENT_KEYS = (MAX_COPIED_SHARE_KEY, STABLE_KEY, REQUIRED_LABELS_KEY, KEEP_TYPES_KEY)
 
 
 def resolve_settings(
@@ -98,7 +98,8 @@ def resolve_settings(
     settings = stated.resolved()
     analysis = ContactAnalysis(identified, settings.tolerance, config.pose_tolerance, settings.up, fit_tolerance)
     one_surface = any(model.is_cut for model in models)
-    candidates = search_settings(analysis, _search_space(stated, analysis, auto_keys, one_surface), tries)
+    space = replace(_search_space(stated, analysis, auto_keys, one_surface), keeps_types=KEEP_TYPES_KEY in require)
+    candidates = search_settings(analysis, space, tries)
     for key, (value, reason) in _requirements(analysis, candidates).items():
         if key in require:
             values[key], reasons[key] = value, reason
@@ -149,6 +150,7 @@ def _requirements(analysis: ContactAnalysis, candidates: Sequence[CandidateSetti
             MAX_COPIED_SHARE_KEY: resolve_max_copied(None),
             STABLE_KEY: (False, nothing),
             REQUIRED_LABELS_KEY: ((), nothing),
+            KEEP_TYPES_KEY: ((), nothing),
         }
     kit, chosen = analysis.kit(candidates[-1].setting), candidates[-1]
     labels = spanning_labels(kit)
@@ -157,7 +159,20 @@ def _requirements(analysis: ContactAnalysis, candidates: Sequence[CandidateSetti
         MAX_COPIED_SHARE_KEY: resolve_max_copied(chosen.trial),
         STABLE_KEY: resolve_stable(kit, chosen.most_different),
         REQUIRED_LABELS_KEY: (labels, large if labels else none),
+        KEEP_TYPES_KEY: resolve_keep_types(kit, chosen.trial),
     }
+
+
+def resolve_keep_types(kit: Kit, trial: TrialResult) -> tuple[tuple[str, ...], str]:
+    """Return the labels that every variant keeps, and why: those of every exemplar that a trial search can keep."""
+    common = common_labels(kit)
+    if not common:
+        return (), "no part type occurs in every exemplar"
+    kept = tuple(label for label in common if label not in trial.lost_labels)
+    if not trial.lost_labels:
+        where = "the exemplar" if len(kit.exemplars) == 1 else "every exemplar"
+        return kept, f"all {len(kept)} part types of {where} occur in every variant, in about their shares"
+    return kept, f"next to nothing is found that keeps {listed_names(trial.lost_labels)} too"
 
 
 def resolve_stable(kit: Kit, most_different: Sequence[Assembly]) -> tuple[bool, str]:

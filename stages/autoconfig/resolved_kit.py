@@ -13,10 +13,11 @@ from stages.exemplars.build import Observation, observe_parts
 from stages.exemplars.identify import IdentifiedParts, identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.read import read_parts
+from stages.exemplars.segmentation import NOT_CUT
 from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.model_files.limits import ReadLimits
 from stages.shape.geometry.contact_oracle import ContactOracle
-from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY
+from stages.shape.resolved_settings import KEEP_TYPES_KEY, MAX_COPIED_SHARE_KEY
 from stages.variations.requirements.hub_restoration import auto_min_hubs
 
 PARTS_KEY = "parts"
@@ -50,9 +51,10 @@ class ResolvedKit:
         """Estimate the layouts of the kit of `oracle`, which is built as `stated` with the resolved settings."""
         kit = oracle.kit
         known_graphs = self.resolution.trial.graphs if self.resolution.trial is not None else 0
-        max_copied_share = self.resolution.values.get(MAX_COPIED_SHARE_KEY, 1.0)
+        values = self.resolution.values
+        max_copied_share, keep_types = values.get(MAX_COPIED_SHARE_KEY, 1.0), values.get(KEEP_TYPES_KEY, ())
         min_hubs = auto_min_hubs(stated, kit)
-        return estimate_yield(kit, oracle, tries, known_graphs, min_hubs, max_copied_share)
+        return estimate_yield(kit, oracle, tries, known_graphs, min_hubs, max_copied_share, keep_types)
 
 
 def read_and_resolve(config: KitConfig, limits: ReadLimits, tries: int, require: Sequence[str]) -> ResolvedKit:
@@ -71,15 +73,18 @@ def resolve_models(
 
 
 def use_sections_if_empty(first: ResolvedKit, limits: ReadLimits, tries: int, require: Sequence[str]) -> ResolvedKit:
-    """Cut the models into sections if `auto` took pieces of meshes for parts and a trial search found nothing in them.
+    """Cut the models into sections if `auto` took pieces of meshes for parts, or failed to cut one by its symmetries,
+    and a trial search found nothing in them.
 
     Sections are taken if they yield enough under the strictest rules, or under other rules what a longer search makes
     a dataset of: the first hit of slabs is rare, since all that crosses a section must fit at the same time. Otherwise
     the models stay as they were read first.
     """
     trial = first.resolution.trial
-    by_author = any(model.segmentation in ("nodes", "objects") for model in first.models)
-    if first.config.parts != "auto" or by_author or trial is None or trial.graphs:
+    by_author = any(
+        model.segmentation in ("nodes", "objects") and not model.why.endswith(NOT_CUT) for model in first.models
+    )
+    if first.config.parts != "auto" or by_author or (trial is not None and trial.graphs):
         return first
     config = first.config.model_copy(update={"parts": "sections"})
     try:
@@ -112,7 +117,8 @@ def _is_dataset(resolved: ResolvedKit, tries: int) -> bool:
     built = resolved.observe(resolution.values)
     if built.refusals:
         return False
-    max_copied_share = resolution.values.get(MAX_COPIED_SHARE_KEY, 1.0)
-    known_graphs = resolution.trial.graphs
-    oracle = ContactOracle(built.kit)
-    return not estimate_yield(built.kit, oracle, tries, known_graphs, max_copied_share=max_copied_share).is_poor
+    required = {
+        "max_copied_share": resolution.values.get(MAX_COPIED_SHARE_KEY, 1.0),
+        "keep_types": resolution.values.get(KEEP_TYPES_KEY, ()),
+    }
+    return not estimate_yield(built.kit, ContactOracle(built.kit), tries, resolution.trial.graphs, **required).is_poor

@@ -11,21 +11,17 @@ from pipeline.randomness import decision_rng
 from stages.autoconfig.contact_analysis import ContactAnalysis, Setting
 from stages.autoconfig.lost_support import lost_support
 from stages.autoconfig.settings import RANDOM_STREAM
-from stages.autoconfig.trial_search import MAX_GROWTH_DEGREE, TrialResult, TrialSearch
+from stages.autoconfig.trial_search import MAX_GROWTH_DEGREE, TrialResult, TrialSearch, has_low_diversity
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import Assembly, ContactKind, Strictness
 from stages.shape.resolved_settings import RESOLVED_HUB_SHARE
 from stages.variations.novelty.copied_pieces import CopyDetector
-from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
+from stages.variations.requirements.identity import common_labels
 
 SUFFICIENT_GRAPHS = 80
 """Distinct graphs of a trial search that promise hundreds in a long one."""
 SUFFICIENT_HISTOGRAMS = 16
-MIN_EXEMPLAR_DISTANCE, MIN_PAIR_DISTANCE = 0.05, 0.03
-"""Distances E to the nearest exemplar and between two hits, below which a pool has low diversity."""
-MIN_NON_COPY_RATE = 0.25
-"""Share of hits that are no near copies, from which a search that rejects near copies still finishes."""
 MIN_SEEN_FILLINGS_SHARE = 0.85
 """Share of parts with slot fillings of the exemplars, below which a grammar of slots is too loose for a kit."""
 MIN_USEFUL_GRAPHS = 20
@@ -50,12 +46,14 @@ class SearchSpace:
     grammars: levels of strictness, the strictest first.
     hubs: the hub types that are left out; None if the search decides.
     may_drop_pieces: whether exemplars may lose what is apart from their largest piece.
+    keeps_types: whether hits keep the labels that occur in every exemplar.
     """
 
     kinds: tuple[tuple[ContactKind, ...], ...] = CANDIDATE_KINDS
     grammars: tuple[Strictness, ...] = CANDIDATE_GRAMMARS
     hubs: tuple[int, ...] | None = None
     may_drop_pieces: bool = True
+    keeps_types: bool = False
 
 
 @dataclass(frozen=True)
@@ -77,9 +75,9 @@ class CandidateSetting:
     def score(self) -> tuple[float, ...]:
         """The order of candidates that do not suffice: diversity times kept parts, then graphs times kept parts.
 
-        Hubs are not left out for next to nothing, and shapes that look broken hardly count.
+        Hubs are not left out for next to nothing, and shapes that look broken or lack part types count less.
         """
-        trial, kept = self.trial, self.kept_share
+        trial, kept = self.trial, self.kept_share / (1 + len(self.trial.lost_labels))
         few = self.setting.hubs and trial.graphs < MIN_USEFUL_GRAPHS
         if few or trial.seen_fillings_share < MIN_SEEN_FILLINGS_SHARE:
             return (0.0, 0.0)
@@ -98,15 +96,6 @@ class CandidateSetting:
             and not has_low_diversity(self.trial)
             and not self.lost_support
         )
-
-
-def has_low_diversity(trial: TrialResult) -> bool:
-    """Return whether hits look like an exemplar or like each other.
-
-    Near copies do no harm by meaning, nor if there are enough other hits, because they are rejected then.
-    """
-    copies = trial.copied_share >= NEAR_COPY_SHARE and trial.non_copy_rate < MIN_NON_COPY_RATE and not trial.by_meaning
-    return trial.distance < MIN_EXEMPLAR_DISTANCE or trial.pair_distance < MIN_PAIR_DISTANCE or copies
 
 
 def parts_without_hubs(analysis: ContactAnalysis, hubs: tuple[int, ...]) -> int:
@@ -177,19 +166,26 @@ class _SettingSearch:
         if any_grammar not in self._copies:
             self._copies[any_grammar] = CopyDetector(kit, oracle.dockings)
         min_hubs = 1 if self._space.hubs else RESOLVED_HUB_SHARE
-        return _try_setting(oracle, setting, self._tries, share, min_hubs, self._copies[any_grammar])
+        kept_labels = common_labels(kit) if self._space.keeps_types else ()
+        return _try_setting(oracle, setting, self._tries, share, min_hubs, self._copies[any_grammar], kept_labels)
 
 
 def _try_setting(
-    oracle: ContactOracle, setting: Setting, tries: int, kept_share: float, min_hubs: float, copies: CopyDetector
+    oracle: ContactOracle,
+    setting: Setting,
+    tries: int,
+    kept_share: float,
+    min_hubs: float,
+    copies: CopyDetector,
+    keep_types: Sequence[str],
 ) -> CandidateSetting:
     """Search with the first tries, and with more if they found something different.
 
-    min_hubs: hubs that a hit must get back, if the setting leaves hubs out. copies: as for Search.
+    min_hubs: hubs that a hit must get back, if the setting leaves hubs out. copies, keep_types: as for TrialSearch.
     """
     names = [oracle.kit.types[index].name for index in setting.hubs]
     rng = decision_rng(0, RANDOM_STREAM, setting.grammar, *setting.kinds, *names)
-    search = TrialSearch(oracle, rng, min_hubs if setting.hubs else 0, copies=copies)
+    search = TrialSearch(oracle, rng, min_hubs if setting.hubs else 0, copies=copies, keep_types=keep_types)
     candidate = _candidate_of(setting, kept_share, search, search.run(tries, SUFFICIENT_GRAPHS, evenly=True))
     promising = candidate.trial.histograms >= (1 if candidate.trial.by_meaning else PROMISING_HISTOGRAMS)
     if promising and not candidate.is_sufficient and not candidate.lost_support:

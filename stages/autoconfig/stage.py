@@ -11,7 +11,7 @@ from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.autoconfig.settings import AutoconfigConfig
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
-from stages.shape.resolved_settings import REQUIRED_LABELS_KEY
+from stages.shape.resolved_settings import KEEP_TYPES_KEY, REQUIRED_LABELS_KEY
 from stages.variations.fallback import allows_fallback
 from stages.variations.settings import VariationsConfig
 
@@ -27,7 +27,7 @@ def plan(plan: Plan) -> list[Shard]:
     variations = plan.config.section(VariationsConfig)
     require = variations.require.auto_keys if variations.samples_per_kit else ()
     if variations.search.sub_assemblies:  # a requested piece of an exemplar need not have its labels
-        require = tuple(key for key in require if key != REQUIRED_LABELS_KEY)
+        require = tuple(key for key in require if key not in (REQUIRED_LABELS_KEY, KEEP_TYPES_KEY))
     return [
         Shard(
             kit.name,

@@ -18,6 +18,7 @@ from stages.shape.kit import Assembly, Kit
 from stages.variations.novelty.copied_pieces import CopyDetector
 from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
 from stages.variations.requirements.hub_restoration import HUBS_NOT_RESTORED, HubRestorer
+from stages.variations.requirements.identity import share_bounds
 from stages.variations.requirements.required_labels import LABELS_MISSING, labels_test, spanning_labels
 from stages.variations.search.search import Search
 from stages.variations.search.variant import Variant
@@ -27,6 +28,10 @@ from stages.variations.settings import SearchConfig
 MAX_MOST_DIFFERENT = 24
 """Hits, the most different ones, that measure diversity."""
 
+MIN_NON_COPY_RATE = 0.25
+"""Share of hits that are no near copies, from which a search that rejects near copies still finishes."""
+MIN_EXEMPLAR_DISTANCE, MIN_PAIR_DISTANCE = 0.05, 0.03
+"""Distances E to the nearest exemplar and between two hits, below which a pool has low diversity."""
 TRIAL_METHODS: tuple[Literal["exchange", "growth"], ...] = ("exchange", "growth")
 """Each method has its own tries: one grown shape of a large kit costs as much as hundreds of exchanges."""
 MAX_GROWTH_DEGREE = 40
@@ -35,6 +40,11 @@ GROWTH_FIRST_DIVISOR = 5
 """Growth stops if it finds nothing in this fraction of its tries."""
 HOPELESS_GROWTH_DIVISOR = 4
 """The fraction is smaller by this factor if the exchange found nothing and the grammar has no slots."""
+MIN_KEEPING_HITS = 10
+"""With fewer hits that are no near copies a search keeps fewer labels."""
+MAX_RELAXATIONS = 2
+RELAXED_SHARE = 0.9
+"""Labels missing at least this share as often as the one missing most are given up together."""
 TRIAL_CONFIG = SearchConfig(duplicates="graph")
 """Distinct graphs are counted, whatever the config calls a duplicate. By meaning, parts lists are counted, since graphs
 do not tell a turned leg from a square one."""
@@ -53,6 +63,7 @@ class TrialResult:
     non_copy_rate: share of the hits that are no near copies.
     seen_fillings_share: share of the parts of the most different hits whose slot fillings occur in an exemplar; 1
         without slots.
+    lost_labels: labels that the hits need not keep, since a search that kept them found next to nothing.
     by_meaning: whether exchanging one part for another of its meaning counts as a hit.
     most_different: indices into the variants, most different first.
     rejects: rejected tries by reason.
@@ -66,6 +77,7 @@ class TrialResult:
     copied_share: float = 1.0
     non_copy_rate: float = 0.0
     seen_fillings_share: float = 1.0
+    lost_labels: tuple[str, ...] = ()
     by_meaning: bool = False
     most_different: tuple[int, ...] = ()
     rejects: Mapping[str, int] = field(default_factory=dict)
@@ -83,6 +95,15 @@ class TrialResult:
         return f"{self.graphs:,} graphs and {self.histograms:,} histograms in {self.tries:,} tries"
 
 
+def has_low_diversity(trial: TrialResult) -> bool:
+    """Return whether hits look like an exemplar or like each other.
+
+    Near copies do no harm by meaning, nor if there are enough other hits, because they are rejected then.
+    """
+    copies = trial.copied_share >= NEAR_COPY_SHARE and trial.non_copy_rate < MIN_NON_COPY_RATE and not trial.by_meaning
+    return trial.distance < MIN_EXEMPLAR_DISTANCE or trial.pair_distance < MIN_PAIR_DISTANCE or copies
+
+
 class TrialSearch:
     """A search of one kit that can be continued; its result depends on the kit and the random stream only.
 
@@ -96,12 +117,14 @@ class TrialSearch:
         min_hubs: float = 0,
         max_copied_share: float = 1.0,
         copies: CopyDetector | None = None,
+        keep_types: Sequence[str] = (),
     ) -> None:
         """Prepare a search of the kit of `oracle`.
 
         min_hubs: hubs that a hit must get back, as for `HubRestorer.has_hubs`.
         max_copied_share: largest share of a hit that may be one verbatim piece of an exemplar.
         copies: as for Search.
+        keep_types: labels that hits keep, without those of them that cannot be kept.
         """
         self.kit = oracle.kit
         self.variants: list[Variant] = []
@@ -119,8 +142,16 @@ class TrialSearch:
         self._slots = SlotGrammar(self.kit, oracle.dockings, TRIAL_CONFIG.upright) if has_slots else None
         duplicates = {"duplicates": "histogram"} if self.kit.by_meaning else {}
         copies = copies or CopyDetector(self.kit, oracle.dockings)
+        self._kept, self._all_kept = list(keep_types), tuple(keep_types)
+        self._shares = share_bounds(self.kit, self._kept)
         self._searches = [
-            Search(oracle, TRIAL_CONFIG.model_copy(update={"method": method, **duplicates}), self._slots, copies)
+            Search(
+                oracle,
+                TRIAL_CONFIG.model_copy(update={"method": method, **duplicates}),
+                self._slots,
+                copies,
+                self._shares,
+            )
             for method in methods
         ]
 
@@ -128,15 +159,52 @@ class TrialSearch:
         """Search on by each method until there are `wanted` variants, or `tries` more tries were spent.
 
         evenly: no method finds more than its share while another still can. Growth completes every shape, so it stops
-        as soon as its first shapes show nothing new.
+        as soon as its first shapes show nothing new. If next to nothing is found, or hits that look alike, labels that
+        were missing most are no longer kept, unless that does not help either. The first run decides.
         """
+        relaxations = 0 if self._tries else MAX_RELAXATIONS
+        self._search(tries, wanted, evenly)
+        for _ in range(relaxations):
+            if self._is_useful() or not self._relax():
+                break
+            self._search(tries, max(wanted, len(self.variants) + MIN_KEEPING_HITS), evenly)
+        if len(self._kept) < len(self._all_kept) and not self._is_useful():
+            self._keep(self._all_kept)
+            self.variants = [hit for hit in self.variants if self._searches[0].keeps_shares(hit.assembly)]
+        return self.result()
+
+    def _is_useful(self) -> bool:
+        """Return whether there are some hits that are no near copies, and not all are alike."""
+        if len(self.variants) < MIN_KEEPING_HITS:
+            return False
+        if self.kit.by_meaning:
+            return True
+        novel = sum(_copied_share(variant) <= NEAR_COPY_SHARE for variant in self.variants)
+        return novel >= MIN_KEEPING_HITS and not has_low_diversity(self.result())
+
+    def _relax(self) -> bool:
+        """Give up the label that was out of proportion most often, and of those that were nearly as often."""
+        missed = np.sum([search.out_of_proportion for search in self._searches], axis=0)
+        if not missed.any():
+            return False
+        lost = {self.kit.labels[index] for index in np.flatnonzero(missed >= RELAXED_SHARE * missed.max()).tolist()}
+        self._keep([label for label in self._kept if label not in lost])
+        for search in self._searches:
+            search.out_of_proportion[:] = 0
+        return True
+
+    def _keep(self, labels: Sequence[str]) -> None:
+        """Keep these labels from now on; all searches read the same bounds."""
+        self._kept = list(labels)
+        self._shares[:] = share_bounds(self.kit, self._kept)
+
+    def _search(self, tries: int, wanted: int, evenly: bool) -> None:
         left = [tries] * len(self._searches)
         if evenly:
             for number in range(len(self._searches)):
                 self._run_method(number, wanted * (number + 1) // len(self._searches), tries, left)
         for number in range(len(self._searches)):
             self._run_method(number, wanted, tries, left)
-        return self.result()
 
     def _run_method(self, number: int, wanted: int, tries: int, left: list[int]) -> None:
         """Search on by one method, with what is left of its `tries`; nothing is left once a search finds nothing."""
@@ -149,8 +217,9 @@ class TrialSearch:
             missing = wanted - len(self.variants)
             variants, used = search.run(self._rng, budget, missing, f"trial-{self._tries}", lambda _: None)
             self._tries += used
-            left[number] = left[number] - used if variants else 0
-            complete = [variant for variant in variants if self._is_complete(variant.assembly)]
+            left[number] = left[number] - used if used and variants else 0
+            kept = [variant for variant in variants if search.keeps_shares(variant.assembly)]
+            complete = [variant for variant in kept if self._is_complete(variant.assembly)]
             hits = [variant for variant in complete if _copied_share(variant) <= self._max_copied_share]
             keys = [search.maker.key(variant.assembly.types, variant.graph, variant.graph) for variant in hits]
             self.variants.extend(hit for hit, key in zip(hits, keys, strict=True) if key not in self._known_keys)
@@ -191,6 +260,7 @@ class TrialSearch:
             copied_share=round(float(np.median(copied)), 4),
             non_copy_rate=round(float(np.mean(copied <= NEAR_COPY_SHARE)), 4),
             seen_fillings_share=self._seen_fillings_share(most_different.tolist()),
+            lost_labels=tuple(label for label in self._all_kept if label not in self._kept),
             by_meaning=self.kit.by_meaning,
             most_different=tuple(most_different.tolist()),
             rejects=rejects,

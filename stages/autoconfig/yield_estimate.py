@@ -9,9 +9,9 @@ import numpy as np
 
 from pipeline.randomness import decision_rng
 from stages.autoconfig.lost_support import lost_support
-from stages.autoconfig.setting_search import MIN_USEFUL_GRAPHS, has_low_diversity
+from stages.autoconfig.setting_search import MIN_USEFUL_GRAPHS
 from stages.autoconfig.settings import RANDOM_STREAM
-from stages.autoconfig.trial_search import TrialResult, TrialSearch
+from stages.autoconfig.trial_search import TrialResult, TrialSearch, has_low_diversity
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.patterns import observed_patterns, unique_pattern_share
 from stages.shape.kit import Kit
@@ -70,14 +70,16 @@ def estimate_yield(
     known_graphs: int = 0,
     min_hubs: float = 0,
     max_copied_share: float = 1.0,
+    keep_types: Sequence[str] = (),
 ) -> YieldEstimate:
     """Search a kit for a short time; the random stream depends on the kit only.
 
     oracle: that of `kit`.
     known_graphs: graphs that an earlier trial search found; if there are any, a first search in vain is continued.
-    min_hubs, max_copied_share: as for TrialSearch, since rejected variants do not count.
+    min_hubs, max_copied_share, keep_types: as for TrialSearch, since rejected variants do not count.
     """
-    search = TrialSearch(oracle, decision_rng(0, RANDOM_STREAM, "forecast"), min_hubs, max_copied_share)
+    rng = decision_rng(0, RANDOM_STREAM, "forecast")
+    search = TrialSearch(oracle, rng, min_hubs, max_copied_share, keep_types=keep_types)
     trial = search.run(tries, MAX_ESTIMATE_GRAPHS, evenly=True)
     if trial.graphs or known_graphs:
         trial = search.run((ESTIMATE_TRIES_FACTOR - 1) * tries, MAX_ESTIMATE_GRAPHS, evenly=True)

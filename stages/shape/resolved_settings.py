@@ -13,6 +13,7 @@ RESOLVED_HUB_SHARE = 0.5
 MAX_COPIED_SHARE_KEY = "require.max_copied_share"
 STABLE_KEY = "require.stable"
 REQUIRED_LABELS_KEY = "require.labels"
+KEEP_TYPES_KEY = "require.keep_types"
 FALLBACK_KEY = "fallback"
 PROPORTIONS_FALLBACK, ROWS_FALLBACK = "proportions", "rows"
 """Values of FALLBACK_KEY: exemplars in other proportions, and those with longer and shorter rows too."""

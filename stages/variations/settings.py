@@ -9,8 +9,9 @@ from pydantic import Field
 from pipeline.config import StrictModel
 from stages.shape.collection.assignment import SplitConfig
 from stages.shape.physics.settings import PhysicsConfig, Requirements
-from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY, REQUIRED_LABELS_KEY, STABLE_KEY
+from stages.shape.resolved_settings import KEEP_TYPES_KEY, MAX_COPIED_SHARE_KEY, REQUIRED_LABELS_KEY, STABLE_KEY
 from stages.variations.novelty.features import Axis
+from stages.variations.requirements.identity import DEFAULT_SHARE_FACTOR
 
 
 class NoveltyConfig(StrictModel):
@@ -248,6 +249,19 @@ class VariantRequirements(StrictModel):
         "cabinet. `auto`: labels of spanning parts, with two thirds of the diagonal of every exemplar, for a kit with "
         "`auto` keys; otherwise none.",
     )
+    keep_types: Literal["auto"] | bool | tuple[str, ...] = Field(
+        "auto",
+        description="Labels that every variant must have, in about their share in the exemplars: a race "
+        "track keeps its track. true: all that occur in each exemplar, hubs aside; false: none. `auto`: true, without "
+        "those that a short search cannot keep; false if `search.sub_assemblies` are variants.",
+    )
+    share_factor: float = Field(
+        DEFAULT_SHARE_FACTOR,
+        ge=1,
+        le=100,
+        description="Factor by which the range of shares that a label of `keep_types` has in the exemplars is widened "
+        "to either side, in whole parts: at 2, of one door in 40 parts there are 1 to 4 in 80.",
+    )
     min_hubs: Literal["auto"] | Annotated[int, Field(ge=0)] | Annotated[float, Field(gt=0, lt=1)] = Field(
         "auto",
         description="Minimum number of hub parts that must be restored: a pile of bricks on which no road fits is no "
@@ -274,6 +288,7 @@ class VariantRequirements(StrictModel):
             MAX_COPIED_SHARE_KEY: self.max_copied_share,
             STABLE_KEY: self.stable,
             REQUIRED_LABELS_KEY: self.labels,
+            KEEP_TYPES_KEY: self.keep_types,
         }
         return tuple(key for key, value in stated.items() if value == "auto")
 

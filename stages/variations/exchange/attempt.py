@@ -9,7 +9,7 @@ from stages.variations.exchange.cuts import cut
 from stages.variations.exchange.joins import join
 from stages.variations.exchange.pose_matching import match_poses
 from stages.variations.exchange.repeated_units import insert_or_remove_unit
-from stages.variations.kernels.checks import connect
+from stages.variations.kernels.checks import connect, keeps_types
 from stages.variations.kernels.graph_key import graph_key
 from stages.variations.kernels.operators import REPEATED_UNIT
 from stages.variations.kernels.outcomes import Outcome
@@ -54,6 +54,8 @@ def attempt(rng, kit, a, b, same_shape, contacts, ws, operator, large, min_parts
 
 @numba.njit(cache=True)
 def complete(kit, contacts, ws, with_labels):
-    """Connect a joined variant; return outcome and key as in `attempt`."""
+    """Connect a joined variant that keeps its part types; return outcome and key as in `attempt`."""
+    if not keeps_types(kit, ws):
+        return Outcome.IDENTITY, np.uint64(0)
     outcome = connect(kit, contacts, ws)
     return outcome, graph_key(kit.label_of, ws, with_labels) if outcome == Outcome.OK else np.uint64(0)

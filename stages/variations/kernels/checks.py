@@ -129,6 +129,25 @@ def _neighbours_admitted(kit, ws, part):
 
 
 @numba.njit(cache=True)
+def keeps_types(kit, ws):
+    """Return whether the share of every label is within `kit.shares`, rounded outwards to whole parts.
+
+    A label whose smallest share is above 0 has at least one part, and one part is never too many.
+    """
+    v, counts = ws.counts[N_PARTS], ws.stack
+    counts[: len(kit.shares)] = 0
+    for part in range(v):
+        counts[kit.label_of[ws.types[part]]] += 1
+    for label in range(len(kit.shares)):
+        low, high = kit.shares[label, 0], kit.shares[label, 1]
+        if low > 0.0 and (counts[label] == 0 or counts[label] < np.floor(low * v + 1e-9)):
+            return False
+        if counts[label] > 1 and counts[label] > np.ceil(high * v - 1e-9):
+            return False
+    return True
+
+
+@numba.njit(cache=True)
 def connect(kit, contacts, ws):
     """Add the contacts between parts of A alone and of B alone, then test the grammar.
 

@@ -23,6 +23,7 @@ class _Outcomes(NamedTuple):
     SOLVED: int = 14  # every node of a graph is placed
     IMPOSSIBLE: int = 15  # the search space is exhausted
     BUDGET: int = 16  # the work allowed is used up
+    IDENTITY: int = 17  # a part type is missing, or its share is out of bounds
 
 
 Outcome = _Outcomes()

@@ -41,6 +41,7 @@ class KitTables(NamedTuple):
     rules: NeighbourhoodRules
     limits: np.ndarray  # float64 (3,): pose tolerance, contact tolerance, quantum of contact answers
     up: int  # axis that docking transforms keep upright, or -1
+    shares: np.ndarray  # float64 (labels, 2): smallest and largest share of the parts, see `share_bounds`
 
 
 class ShapeTables(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.shape.arrays import IntArray
+from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.contact_lookup import POSE_QUANTUM
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.grammar_patterns import grammar_patterns
@@ -12,10 +12,11 @@ from stages.shape.kit import Assembly, Grammar, Kit
 from stages.variations.kernels.structs import N_UNKNOWNS, KitTables, NeighbourhoodRules, ShapeTables, Workspace
 
 
-def kit_tables(kit: Kit, upright: bool) -> KitTables:
+def kit_tables(kit: Kit, upright: bool, shares: FloatArray | None = None) -> KitTables:
     """Return the tables of a kit.
 
     upright: whether docking transforms rotate pieces about the vertical only
+    shares: smallest and largest share of the parts that each label may have, float64 (labels, 2); None: any
     """
     bounds = np.stack([part_type.bounds for part_type in kit.types])
     weights = multiset_weights(len(kit.labels))
@@ -29,6 +30,7 @@ def kit_tables(kit: Kit, upright: bool) -> KitTables:
         rules=_rules(kit.grammar, weights),
         limits=np.array([kit.pose_tolerance, kit.contact_tolerance, kit.contact_tolerance * POSE_QUANTUM]),
         up={"y": 1, "z": 2}[kit.up] if upright else -1,
+        shares=np.tile([0.0, np.inf], (len(kit.labels), 1)) if shares is None else shares,
     )
 
 

@@ -10,7 +10,8 @@ offsets.npy: int64 (k + 1, 2), first part and first edge of each variant
 features.npy: float32 (k, 10)
 keys.npy: uint64 (k, 2), keys by colour refinement
 digests.npy: uint8 (k, 2, 32), of the canonical graph without and with docking labels
-lineage.jsonl
+numbers.npy: int64 (k,), ascending, the number of each among all that the search found: its name is `<search>-<number>`
+lineage.jsonl: a line for each that the search found, kept or not, since any may be the parent of another
 
 Files of a pool shard: kept.npy int64 (k, 2), search and index there of each variant that it kept, counts.npy int32 (k,
     types) of parts by type, and features.npy, keys.npy and digests.npy as above.
@@ -38,12 +39,15 @@ from stages.variations.search.rounds import search_name
 from stages.variations.search.variant import Variant
 
 _INDEX = ("counts", "features", "keys", "digests")
-_FOUND = ("types", "origins", "poses", "stretched", "stretches", "edges", "labels", "offsets", *_INDEX[1:])
+_FOUND = ("types", "origins", "poses", "stretched", "stretches", "edges", "labels", "offsets", "numbers", *_INDEX[1:])
 
 
-def write_variants(task: Task, kit: Kit, variants: Sequence[Variant]) -> None:
-    """Write the variants of a kit that a search shard has found."""
-    name = task.shard.name
+def write_variants(task: Task, kit: Kit, found: Sequence[Variant], kept: Sequence[Variant]) -> None:
+    """Write the variants of a kit that a search shard keeps of those that it `found`, and the lineages of all."""
+    name, variants = task.shard.name, kept
+    lineages = [variant.lineage for variant in found]
+    for variant in kept:
+        lineages[variant.number] = variant.lineage
     assemblies = [variant.assembly for variant in variants]
     sizes = np.array([(len(shape), len(shape.edges)) for shape in assemblies], dtype=np.int64).reshape(-1, 2)
     digests = [
@@ -58,6 +62,7 @@ def write_variants(task: Task, kit: Kit, variants: Sequence[Variant]) -> None:
         (start, shape.stretches) for start, shape in zip(first, assemblies, strict=False) if shape.stretches is not None
     ]
     arrays = {
+        "numbers": np.array([variant.number for variant in variants], dtype=np.int64),
         "types": np.concatenate([np.empty(0, np.int16), *(shape.types for shape in assemblies)]),
         "origins": np.concatenate([np.empty(0, np.int8), *(variant.origins for variant in variants)]),
         "poses": np.concatenate([np.empty((0, 4, 4)), *(shape.poses for shape in assemblies)]),
@@ -76,8 +81,8 @@ def write_variants(task: Task, kit: Kit, variants: Sequence[Variant]) -> None:
         with task.output(f"{name}.{member}.npy") as stream:
             stream.write(array_bytes(array))
     with task.output(f"{name}.lineage.jsonl") as stream:
-        for variant in variants:
-            stream.write(json_bytes(variant.lineage))
+        for lineage in lineages:
+            stream.write(json_bytes(lineage))
 
 
 @dataclass(frozen=True)
@@ -93,6 +98,7 @@ class FoundVariants:
     edges: np.ndarray
     labels: np.ndarray
     offsets: np.ndarray
+    numbers: np.ndarray
     keys: np.ndarray
     features: np.ndarray
     digests: np.ndarray
@@ -134,7 +140,15 @@ class FoundVariants:
 
     def described(self, index: int) -> dict[str, Any]:
         """Return the lineage of one variant."""
-        return json.loads(self._lineage[index])
+        return json.loads(self._lineage[self.numbers[index]])
+
+    def lineages(self) -> Iterator[dict[str, Any]]:
+        """Yield the lineage of each variant that the search found, kept or not, in order of their numbers."""
+        yield from map(json.loads, self._lineage)
+
+    def name_of(self, index: int) -> str:
+        """Return the name of one variant in the search."""
+        return f"{self.name}-{self.numbers[index]}"
 
     def digest(self, index: int) -> str:
         """Return the hex digest of one variant's canonical graph."""

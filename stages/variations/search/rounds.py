@@ -14,7 +14,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from pipeline.stage import Plan, Shard
-from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY, REQUIRED_LABELS_KEY, STABLE_KEY, resolved_settings
+from stages.shape.resolved_settings import (
+    KEEP_TYPES_KEY,
+    MAX_COPIED_SHARE_KEY,
+    REQUIRED_LABELS_KEY,
+    STABLE_KEY,
+    resolved_settings,
+)
 from stages.variations.constraint import module_of
 from stages.variations.settings import VariationsConfig
 
@@ -97,13 +103,15 @@ def added_counts(*counts: Mapping[str, int]) -> dict[str, int]:
 
 def _required(plan: Plan, kit: str) -> dict[str, Any]:
     """Return the requirements of a kit's variants that a config can leave at `auto`, as stated or as resolved."""
-    require = plan.config.section(VariationsConfig).require
+    section = plan.config.section(VariationsConfig)
+    require = section.require
     resolved = resolved_settings(plan, kit)
     required: dict[str, Any] = {}
     for key, stated, default in (
         (MAX_COPIED_SHARE_KEY, require.max_copied_share, 1.0),
         (STABLE_KEY, require.stable, False),
         (REQUIRED_LABELS_KEY, require.labels, ()),
+        (KEEP_TYPES_KEY, require.keep_types, not section.search.sub_assemblies),
     ):
         value = resolved.get(key, default) if stated == "auto" else stated
         required[key.removeprefix("require.")] = list(value) if isinstance(value, tuple) else value

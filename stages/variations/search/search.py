@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from stages.shape.arrays import IntArray
+from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly
@@ -16,9 +17,11 @@ from stages.variations.kernels.tables import shape_tables
 from stages.variations.novelty.archive import Archive, Place
 from stages.variations.novelty.copied_pieces import CopyDetector
 from stages.variations.novelty.features import material_shares
+from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
+from stages.variations.requirements.identity import out_of_bounds
 from stages.variations.search.operator_selection import TRIES_PER_PLAN, TRY_WORK, OperatorSelector, PlannedTry
 from stages.variations.search.parents import Parent, Parents
-from stages.variations.search.variant import EARLY_REASONS, NEW_VARIANT, Variant
+from stages.variations.search.variant import EARLY_REASONS, NEW_VARIANT, OUT_OF_PROPORTION, Variant
 from stages.variations.search.variant_maker import VariantMaker
 from stages.variations.settings import SearchConfig
 
@@ -26,6 +29,9 @@ RESERVE_FACTOR = 4
 """A search ends at this many times the variants that it looks for, even if few of them add to the archive."""
 KNOWN_HISTOGRAM_GAIN = 0.2
 """Gain of a new variant with a known histogram; one with a new histogram has gain 1."""
+MIN_BATCHES_IN_VAIN = 16
+STEPPING_STONE_GAIN = 0.1
+"""Gain of a new variant that does not keep the shares."""
 JOINED_TRY_WORK = 3.0
 """Work of an exchange that comes as far as joining pieces; one that finds no match has work 1."""
 
@@ -33,7 +39,8 @@ JOINED_TRY_WORK = 3.0
 class Search:
     """A search worker: its parents, its archive, and what it has learnt about operators.
 
-    slots, copies: as for `VariantMaker`
+    slots, copies, shares: as for `VariantMaker`
+    out_of_proportion: for each label the drafts in which it was missing or too frequent, int64 (labels,)
     """
 
     def __init__(
@@ -42,16 +49,19 @@ class Search:
         config: SearchConfig,
         slots: SlotGrammar | None = None,
         copies: CopyDetector | None = None,
+        shares: FloatArray | None = None,
     ) -> None:
         self.kit, self.oracle, self.config = oracle.kit, oracle, config
-        self.maker = VariantMaker(oracle, config, slots, copies)
+        self.maker = VariantMaker(oracle, config, slots, copies, shares)
         self.archive = Archive(config.novelty.cell_quota)
         self.operators = OperatorSelector(config, self.kit.by_meaning)
         exemplars = [self._exemplar(number) for number in range(len(self.kit.exemplars))]
         self.parents = Parents(exemplars, config.max_parents)
         self.maker.remember_exemplars(self.parents.exemplars)
         self.reserve = 0
+        self._batches_in_vain = 0
         self.rejects: Counter[str] = Counter()
+        self.out_of_proportion = np.zeros(len(self.kit.labels), dtype=np.int64)
         self.crossings: Counter[str] = Counter()
 
     def _exemplar(self, number: int) -> Parent:
@@ -82,12 +92,19 @@ class Search:
 
         The search also ends after `tries`, or after RESERVE_FACTOR times `wanted` variants of any kind. Variants that
         add to the archive become parents at once; lineages call them `<name>-<number>`.
+
+        Variants that do not keep the `shares` are returned too (see `keeps_shares`), but do not count as found. They
+        are stepping stones: parents of others that may keep them. They are refused early, except in every second batch
+        of tries after MIN_BATCHES_IN_VAIN batches that found nothing but near copies.
         progress: is told how many there are
         """
         found: list[Variant] = []
-        novel, number = 0, 0
-        while number < tries and novel < wanted and len(found) < RESERVE_FACTOR * wanted:
+        novel, kept, number = 0, 0, 0
+        while number < tries and novel < wanted and kept < RESERVE_FACTOR * wanted:
             batch = self.operators.plan(rng, self.parents, self.archive, min(TRIES_PER_PLAN, tries - number))
+            may_step = self._batches_in_vain >= MIN_BATCHES_IN_VAIN and self._batches_in_vain % 2 == 0
+            self.maker.enforce_shares(not may_step)
+            self._batches_in_vain += 1
             for planned in batch:
                 if number >= tries:  # a grown shape costs many tries
                     break
@@ -96,15 +113,36 @@ class Search:
                 number += 1 if exchanged else max(round(work / TRY_WORK), 1)
                 if isinstance(result, str):
                     self.rejects[result] += 1
+                    if result == OUT_OF_PROPORTION:
+                        self._count_out_of_proportion(self.maker.draft_label_counts())
                     self.operators.learn(planned, 0.0, work)
                     continue
+                result = replace(result, number=len(found))
                 found.append(result)
-                if self._keep(rng, result, planned, work, f"{name}-{len(found) - 1}"):
+                keeps = self.keeps_shares(result.assembly)
+                if not keeps:
+                    self._count_out_of_proportion(self.maker.draft_label_counts())
+                kept += keeps
+                if keeps and result.lineage["copied"]["share"] <= NEAR_COPY_SHARE:
+                    self._batches_in_vain = 0
+                if self._keep(rng, result, planned, work, f"{name}-{result.number}", keeps) and keeps:
                     novel += 1
                     progress(novel)
-                if novel >= wanted or len(found) >= RESERVE_FACTOR * wanted:
+                if novel >= wanted or kept >= RESERVE_FACTOR * wanted:
                     break
         return found, number
+
+    def keeps_shares(self, assembly: Assembly) -> bool:
+        """Return whether every label has its share of the parts of a variant."""
+        shares = self.maker.shares
+        if shares is None:
+            return True
+        counts = np.bincount(self.kit.label_of[assembly.types], minlength=len(shares))
+        return not out_of_bounds(shares, counts[None]).any()
+
+    def _count_out_of_proportion(self, counts: np.ndarray) -> None:
+        if self.maker.shares is not None:
+            self.out_of_proportion += out_of_bounds(self.maker.shares, counts[None])[0]
 
     def _try(self, rng: np.random.Generator, planned: PlannedTry) -> tuple[Variant | str, float, PlannedTry]:
         """Return a new variant or the reason for a failure, the work, and the try that it counts for."""
@@ -117,15 +155,20 @@ class Search:
             self.crossings[result if isinstance(result, str) else NEW_VARIANT] += 1
         return result, 1.0 if isinstance(result, str) and result in EARLY_REASONS else JOINED_TRY_WORK, planned
 
-    def _keep(self, rng: np.random.Generator, variant: Variant, planned: PlannedTry, work: float, name: str) -> bool:
-        """Count a new variant, and make it a parent where it adds to the archive; return whether it does."""
+    def _keep(
+        self, rng: np.random.Generator, variant: Variant, planned: PlannedTry, work: float, name: str, keeps: bool
+    ) -> bool:
+        """Count a new variant, and make it a parent where it adds to the archive; return whether it does.
+
+        keeps: whether it keeps the shares; otherwise it gains less
+        """
         self.maker.remember(variant.assembly.types, variant.graph, variant.docked)
         full = self.archive.is_full(variant.cell, variant.histogram)
         gain = KNOWN_HISTOGRAM_GAIN if self.archive.has_histogram(variant.histogram) else 1.0
-        self.operators.learn(planned, 0.0 if full else gain, work)
+        self.operators.learn(planned, 0.0 if full else gain if keeps else STEPPING_STONE_GAIN, work)
         place = self.archive.add(variant.cell, variant.histogram)
         if full and self.config.novelty.guided:
-            self.reserve += 1
+            self.reserve += keeps
             return False
         if variant.assembly.stretches is None:  # no exemplar shows how stretched parts dock
             self.adopt(rng, self.parent(name, variant.assembly, variant.origins, place, variant.labels))

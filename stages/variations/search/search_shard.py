@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.config import Config
 from pipeline.stage import Outcome, Task
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.arrays import FloatArray
 from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit, input_oracle
 from stages.shape.physics.judge import unmet_requirement
@@ -18,10 +19,11 @@ from stages.shape.shape import kit_shape
 from stages.variations.constraint import build_repair, build_test
 from stages.variations.novelty.archive import cell_of
 from stages.variations.requirements.hub_restoration import HUBS_NOT_RESTORED, auto_min_hubs, hub_restorer
+from stages.variations.requirements.identity import common_labels, share_bounds
 from stages.variations.requirements.required_labels import LABELS_MISSING, labels_test
 from stages.variations.search.pool import PoolIndex, write_variants
 from stages.variations.search.search import Search
-from stages.variations.search.variant import Variant
+from stages.variations.search.variant import OUT_OF_PROPORTION, Variant
 from stages.variations.settings import VariationsConfig
 
 TOO_MUCH_COPIED = "largest verbatim piece too large"
@@ -33,7 +35,7 @@ def run_search(task: Task) -> Outcome:
     section = task.config.section(VariationsConfig)
     config = section.search
     kit = input_kit(task, task.shard.params["kit"])
-    search = Search(input_oracle(task, kit.name), config)
+    search = Search(input_oracle(task, kit.name), config, shares=_shares(task, kit, section.require.share_factor))
     rng = task.rng("tries")
     pool = PoolIndex.of(task, kit.name, len(kit.types))
     places = _fill_archive(pool, search)
@@ -42,13 +44,16 @@ def run_search(task: Task) -> Outcome:
         (assembly, labels), origins = found.assembly(index), found.origins_of(index)
         if assembly.stretches is not None:  # no exemplar shows how stretched parts dock
             continue
-        search.adopt(rng, search.parent(f"{found.name}-{index}", assembly, origins, (place[0], place[1]), labels))
+        search.adopt(rng, search.parent(found.name_of(index), assembly, origins, (place[0], place[1]), labels))
     wanted = task.shard.params["wanted"]
     variants, tries = search.run(
         rng, config.tries_per_round, wanted, task.shard.name, lambda count: task.progress(count, wanted)
     )
-    kept, resized = _required(task, kit, section, variants, search.rejects)
-    write_variants(task, kit, kept)
+    in_shares = [variant for variant in variants if search.keeps_shares(variant.assembly)]
+    if len(in_shares) < len(variants):
+        search.rejects[OUT_OF_PROPORTION] += len(variants) - len(in_shares)
+    kept, resized = _required(task, kit, section, in_shares, search.rejects)
+    write_variants(task, kit, variants, kept)
     rejects = dict(sorted(search.rejects.items()))
     for reason, count in rejects.items():
         task.reject(task.shard.name, reason, count=count)
@@ -56,6 +61,13 @@ def run_search(task: Task) -> Outcome:
     for key, counts in (("crossings", search.crossings), ("lists", search.maker.lists), ("resized", resized)):
         summary[key] = dict(sorted(counts.items()))
     return Outcome(0, summary)
+
+
+def _shares(task: Task, kit: Kit, factor: float) -> FloatArray | None:
+    """Return the bounds of the labels that are kept; None without any."""
+    kept = task.shard.params["keep_types"]
+    labels = common_labels(kit) if kept is True else kept
+    return share_bounds(kit, labels, factor) if labels else None
 
 
 def _fill_archive(pool: PoolIndex, search: Search) -> np.ndarray:

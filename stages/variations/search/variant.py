@@ -18,6 +18,8 @@ SUBASSEMBLY = "only a piece of an exemplar"
 DISCONNECTED = "not in one piece"
 LIFTED = "lifted off the ground"
 UNATTACHED = "not held at a side where it always was"
+OUT_OF_PROPORTION = "part type missing or out of proportion"
+"""Reject reason of a variant that does not keep the part types of its exemplars."""
 REASONS = {
     Outcome.WHOLE: "cut took the whole shape",
     Outcome.NO_SUCH_PART: "boundary part missing in the other shape",
@@ -27,6 +29,7 @@ REASONS = {
     Outcome.TOO_LARGE: "too many parts",
     Outcome.CLASH: "parts clash",
     Outcome.GRAMMAR: "neighbourhood not in the grammar",
+    Outcome.IDENTITY: OUT_OF_PROPORTION,
 }
 GROWTH_REASONS = {
     Outcome.NO_MATCH: "growth given up",
@@ -57,3 +60,4 @@ class Variant:
     histogram: int  # A hash of its type histogram
     lineage: dict[str, Any]
     """Parents, number of parts from each, boundary, docking transform and verbatim copies, as JSON."""
+    number: int = 0  # among all that its search found, kept or not: its name there

@@ -49,16 +49,26 @@ from stages.variations.substitution.ground import GroundTest
 from stages.variations.substitution.substitute import substitute
 from stages.variations.substructures.replacer import Replacer
 
+ANY_SHARE = (0.0, np.inf)
+"""Bounds of a label that is free."""
+
 
 class VariantMaker:
     """Makes variants of one kit, one a call; it remembers which shapes are known.
 
     slots: what the kit shows of slots, where its grammar is one of slots and they were computed already
     copies: the detector of copies from its exemplars, where it was computed already
+    shares: smallest and largest share of the parts that each label may have, from `share_bounds`; None: any. May be
+        changed in place.
     """
 
     def __init__(
-        self, oracle: ContactOracle, config: SearchConfig, slots: SlotGrammar | None, copies: CopyDetector | None
+        self,
+        oracle: ContactOracle,
+        config: SearchConfig,
+        slots: SlotGrammar | None,
+        copies: CopyDetector | None,
+        shares: FloatArray | None = None,
     ) -> None:
         kit = oracle.kit
         self.kit, self.oracle, self.config = kit, oracle, config
@@ -67,7 +77,8 @@ class VariantMaker:
         self.max_parts = max(3, round(config.max_size * max(sizes)))
         self._sizes = np.array(sizes)
         self._has = np.array([np.isin(np.arange(len(kit.types)), shape.assembly.types) for shape in kit.exemplars])
-        self.tables = kit_tables(kit, config.upright)
+        self.shares = shares
+        self.tables = kit_tables(kit, config.upright, None if shares is None else shares.copy())
         self._histogram_weights = multiset_weights(len(kit.types))
         self.ws = workspace(max(self.max_parts, *sizes))
         self._stretches: FloatArray | None = None
@@ -110,6 +121,16 @@ class VariantMaker:
     def histogram(self, types: np.ndarray) -> int:
         """Return a hash of a type histogram, by meshes even with `types: meaning`: what looks different is new."""
         return int(self._histogram_weights[types].sum(dtype=np.uint64))
+
+    def enforce_shares(self, enforced: bool) -> None:
+        """Refuse drafts that do not keep `shares` from now on, or let them pass."""
+        if self.shares is not None:
+            self.tables.shares[:] = self.shares if enforced else ANY_SHARE
+
+    def draft_label_counts(self) -> np.ndarray:
+        """Return the number of parts of the draft by label, int64 (labels,)."""
+        types = self.ws.types[: self.ws.counts[N_PARTS]]
+        return np.bincount(self.kit.label_of[types], minlength=len(self.kit.labels))
 
     def keys_of(self, shape: Parent) -> tuple[int, int]:
         """Return the two refinement keys of a shape."""

@@ -72,16 +72,16 @@ def read_ancestry(task: Task, pool: PoolIndex) -> Ancestry:
     cuts = [""] * len(pool)
     for search, name in enumerate(pool.searches):
         found = FoundVariants.of(task, name)
-        for index in range(len(found)):
-            lineage = found.described(index)
+        indices = {number: index for index, number in enumerate(found.numbers.tolist())}
+        for own_number, lineage in enumerate(found.lineages()):
             made_of = lineage["parents"]
             joined = [ancestor for parent in made_of for ancestor in ancestors.get(parent, (parent,))]
             nearest = tuple(dict.fromkeys(joined))
-            number = numbers.get((search, index))
+            number = numbers.get((search, indices.get(own_number, -1)))
             if number is None:
-                ancestors[f"{name}-{index}"] = nearest
+                ancestors[f"{name}-{own_number}"] = nearest
                 continue
-            ancestors[f"{name}-{index}"] = (number,)
+            ancestors[f"{name}-{own_number}"] = (number,)
             parents[number] = nearest
             if any(parent in ancestors for parent in made_of):
                 cuts[number] = f"{made_of} {lineage['boundary']}"

@@ -77,7 +77,7 @@ def _sample(
         assembly=orientation.turned_back(assembly, degrees),
         lineage={
             "method": described["method"],
-            "name": f"{found.name}-{index}",
+            "name": found.name_of(index),
             **described,
             "parents": parents,
             "made_of": described["parents"],

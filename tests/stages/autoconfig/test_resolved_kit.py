@@ -17,6 +17,7 @@ from stages.autoconfig.resolved_kit import ResolvedKit, use_sections_if_empty
 from stages.autoconfig.trial_search import TrialResult
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
+from stages.exemplars.segmentation import NOT_CUT
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig
 from stages.model_files.limits import ReadLimits
 from stages.shape.kit import Kit
@@ -71,12 +72,25 @@ def test_mesh_without_results_is_cut_into_sections_under_the_strictest_rules(
 
 
 @pytest.mark.parametrize(
-    "changed", [{"graphs": 1}, {"segmentation": "nodes"}, {"segmentation": "objects"}, {"parts": "components"}]
+    "changed",
+    [
+        {"graphs": 1},
+        {"segmentation": "nodes"},
+        {"segmentation": "objects"},
+        {"parts": "components"},
+    ],
 )
 def test_parts_with_results_or_by_the_author_are_not_cut(searched: list[KitConfig], changed: dict[str, Any]) -> None:
     first = read_first(**changed)
     assert cut(first) is first
     assert not searched
+
+
+def test_mesh_whose_cut_by_symmetry_failed_is_cut_into_sections(searched: list[KitConfig]) -> None:
+    whole = read_first(segmentation="nodes")
+    models = [replace(model, why=f"one node, {NOT_CUT}") for model in whole.models]
+    nothing_to_search = replace(whole.resolution, trial=None)
+    assert cut(replace(whole, models=models, resolution=nothing_to_search)).config.parts == "sections"
 
 
 def test_sections_without_repeats_are_not_searched(searched: list[KitConfig], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -78,6 +78,7 @@ def test_near_copies_are_rejected_if_auto_finds_enough_other_variants(tmp_path: 
     run(tmp_path, ("autoconfig", "exemplars", "variations"))
     requirements = {"require.stable": False, "require.labels": []}
     summary = record(tmp_path, "autoconfig", "open")["summary"]["resolved"]
+    assert "deck" in summary.pop("require.keep_types")
     assert summary == {"disconnected": "error", "require.max_copied_share": 0.9, **requirements}
     samples = [
         sample
