@@ -17,18 +17,14 @@ from stages.shape.sample import Sample
 from stages.shape.shape import Shape, part_count, upright
 from stages.shape.views.buffers import RendererName, renderer_version
 from stages.shape.views.camera import Camera
-from stages.shape.views.part_colors import part_paint
 from stages.shape.views.portrait import portrait
-from stages.shape.views.scene import scene_of
-from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
+from stages.shape.views.scene import Scene, scene_of
+from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png, trimmed
+from stages.shape.views.viewpoint import best_viewpoint
 from stages.sketches.settings import SketchesConfig
 
 PREVIEW_COLUMNS = 8
 CELL_PIXELS = 232
-MIN_CONTRAST_LEVELS = 12
-"""Pixels that differ more from the background are content, of 255."""
-CELL_PAD_SHARE = 0.02
-"""Strip above and below the content of a row, as a share of the pictures' height."""
 MAX_PREVIEW_CANDIDATES = 512
 """Number of shapes, evenly spread over the samples, from which the preview is chosen."""
 ABOVE = Camera(azimuth=-40.0, elevation=25.0)
@@ -46,27 +42,51 @@ def draw_preview(task: Task) -> Outcome:
     sketches = task.config.section(SketchesConfig)
     backend = sketches.renderer
     camera = BELOW if sketches.views and sketches.views[0].elevation < 0 else ABOVE
+    cameras = _Cameras(camera)
     collection, shards = Collection(task), params["shards"]
     keys_by_stage = [_keys(task, stage, shards) for stage in params["rows"]]
     samples = [sample for shard in shards for sample in collection.samples(shard)]
     complete = [sample for sample in samples if all(sample.key in keys for keys in keys_by_stage)]
     complete = complete[:: -(-len(complete) // MAX_PREVIEW_CANDIDATES)]
     chosen = varied([(sample, collection.shape(sample)) for sample in complete], config.previewed)
-    variants = [Cell(_picture(shape, camera, backend), part_count(shape)) for _, shape in chosen]
+    for sample, shape in chosen:
+        cameras.see(sample.kit, shape)
+    variants = [Cell(_picture(shape, cameras.of(sample.kit), backend), part_count(shape)) for sample, shape in chosen]
     sections = [Section("Shapes", _rows(variants), f"{len(chosen)} of {params['of']:,}")]
     exemplars = [
-        Cell(_picture(shape, ABOVE, backend), caption) for caption, shape in collection.decoder.shown(PREVIEW_COLUMNS)
+        Cell(_picture(shape, best_viewpoint([scene_of(upright(shape))], ABOVE), backend), caption)
+        for caption, shape in collection.decoder.shown(PREVIEW_COLUMNS)
     ]
     if exemplars:
         sections.insert(0, Section("Exemplars", _rows(exemplars), "input"))
+    shown = [sample for sample, _ in chosen[:PREVIEW_COLUMNS]]
     for stage in params["rows"]:
-        added = _members(task, stage, shards, {sample.key for sample, _ in chosen[:PREVIEW_COLUMNS]})
+        added = _members(task, stage, shards, {sample.key for sample in shown})
         for row in members()[stage].rows(task.config):
-            cells = [Cell(row.draw(added[sample.key], camera, CELL_PIXELS)) for sample, _ in chosen[:PREVIEW_COLUMNS]]
+            cells = [Cell(row.draw(added[sample.key], cameras.of(sample.kit), CELL_PIXELS)) for sample in shown]
             sections.append(Section(row.title, _rows(cells), row.caption(task.config)))
     with task.output(f"{task.shard.name}.png") as stream:
         stream.write(picture_png(contact_sheet(sections, params["title"], CELL_PIXELS)))
     return Outcome(samples=0, summary={"renderer": backend, "renderer_version": renderer_version(backend)})
+
+
+class _Cameras:
+    """The viewpoint of each kit's pictures, chosen by its first shapes, where pictures are taken from above."""
+
+    def __init__(self, camera: Camera) -> None:
+        self._camera = camera
+        self._scenes: dict[str, list[Scene]] = {}
+        self._chosen: dict[str, Camera] = {}
+
+    def see(self, kit: str, shape: Shape) -> None:
+        self._scenes.setdefault(kit, []).append(scene_of(upright(shape)))
+
+    def of(self, kit: str) -> Camera:
+        if self._camera.elevation < 0:
+            return self._camera
+        if kit not in self._chosen:
+            self._chosen[kit] = best_viewpoint(self._scenes[kit], self._camera)
+        return self._chosen[kit]
 
 
 def varied(samples: Sequence[tuple[Sample, Shape]], count: int) -> list[tuple[Sample, Shape]]:
@@ -103,29 +123,9 @@ def _members(task: Task, stage: str, shards: Sequence[str], keys: set[str]) -> d
 
 
 def _picture(shape: Shape, camera: Camera, backend: RendererName) -> ByteArray:
-    return portrait(scene_of(upright(shape)), camera, (CELL_PIXELS, CELL_PIXELS), part_paint(shape), backend)
+    return portrait(scene_of(upright(shape)), camera, (CELL_PIXELS, CELL_PIXELS), renderer=backend)
 
 
 def _rows(cells: Sequence[Cell]) -> list[list[Cell]]:
     """Arrange cells in rows, without the empty strips above and below their pictures."""
-    return [_trimmed(cells[start : start + PREVIEW_COLUMNS]) for start in range(0, len(cells), PREVIEW_COLUMNS)]
-
-
-def _trimmed(row: Sequence[Cell]) -> list[Cell]:
-    """Crop the pictures of a row to one strip that holds the content of all."""
-    tops, ends = [], []
-    for cell in row:
-        height = len(cell.picture)
-        marked = (
-            (np.abs(cell.picture.astype(np.int16) - cell.picture[0, 0]) > MIN_CONTRAST_LEVELS)
-            .reshape(height, -1)
-            .any(axis=1)
-        )
-        content_rows = np.flatnonzero(marked)
-        tops.append(content_rows[0] / height if len(content_rows) else 0.5)
-        ends.append((content_rows[-1] + 1) / height if len(content_rows) else 0.5)
-    top, end = max(min(tops) - CELL_PAD_SHARE, 0.0), min(max(ends) + CELL_PAD_SHARE, 1.0)
-    return [
-        Cell(cell.picture[round(top * len(cell.picture)) : round(end * len(cell.picture))], cell.caption)
-        for cell in row
-    ]
+    return [trimmed(cells[start : start + PREVIEW_COLUMNS]) for start in range(0, len(cells), PREVIEW_COLUMNS)]

@@ -19,6 +19,11 @@ RULE_COLOR = (226, 221, 213)
 MIN_NOTE_WIDTH = 180
 """Pixels next to a title, of a cell of 320, that a note has at least."""
 
+MIN_CONTRAST_LEVELS = 12
+"""Pixels that differ more from the background are content, of 255."""
+CELL_PAD_SHARE = 0.02
+"""Strip above and below the content of a row, as a share of the pictures' height."""
+
 
 @dataclass(frozen=True)
 class Cell:
@@ -93,6 +98,26 @@ def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int 
                 pen.text((x + middle, y + picture.height + round(7 * unit)), line, CAPTION_INK, fonts["caption"])
             y += row_height + gap
     return np.asarray(sheet)
+
+
+def trimmed(row: Sequence[Cell]) -> list[Cell]:
+    """Crop the pictures of a row to one strip that holds the content of all."""
+    tops, ends = [], []
+    for cell in row:
+        height = len(cell.picture)
+        marked = (
+            (np.abs(cell.picture.astype(np.int16) - cell.picture[0, 0]) > MIN_CONTRAST_LEVELS)
+            .reshape(height, -1)
+            .any(axis=1)
+        )
+        content_rows = np.flatnonzero(marked)
+        tops.append(content_rows[0] / height if len(content_rows) else 0.5)
+        ends.append((content_rows[-1] + 1) / height if len(content_rows) else 0.5)
+    top, end = max(min(tops) - CELL_PAD_SHARE, 0.0), min(max(ends) + CELL_PAD_SHARE, 1.0)
+    return [
+        Cell(cell.picture[round(top * len(cell.picture)) : round(end * len(cell.picture))], cell.caption)
+        for cell in row
+    ]
 
 
 def picture_png(picture: ByteArray) -> bytes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,8 @@ from stages.shape.views.camera import Camera
 from stages.shape.views.part_colors import part_paint
 from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
-from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
+from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png, trimmed
+from stages.shape.views.viewpoint import best_viewpoint
 from stages.variations.substructures.replacement_sheet import replacements_sheet
 
 MAX_VARIANTS_SHOWN = 24
@@ -51,15 +52,21 @@ def kit_variants_sheet(kit: Kit, samples: Sequence[Sample], low_diversity: str, 
         ("At random", [(sample.assembly, sample.key) for sample in drawn], "of the rest"),
     ]
 
-    def cell(assembly: Assembly, name: str) -> Cell:
+    scenes = [scene_of(upright(kit_shape(kit, assembly))) for assembly, _ in exemplars.values()]
+    camera = best_viewpoint(scenes, CAMERA)
+
+    def cells_of(assembly: Assembly, name: str, is_exemplar: bool) -> Iterator[Cell]:
         shape = upright(kit_shape(kit, assembly))
-        picture = portrait(scene_of(shape), CAMERA, (CELL_PIXELS, CELL_PIXELS), part_paint(shape))
-        return Cell(picture, f"{name}, {len(assembly)} parts")
+        yield Cell(portrait(scene_of(shape), camera, (CELL_PIXELS, CELL_PIXELS)), f"{name}, {len(assembly)} parts")
+        paint = part_paint(shape)
+        if is_exemplar and paint is not None:
+            yield Cell(portrait(scene_of(shape), camera, (CELL_PIXELS, CELL_PIXELS), paint), "by part type")
 
     sections = []
     for title, shown, note in parts:
-        cells = [cell(assembly, name) for assembly, name in shown]
-        rows = [cells[start : start + COLUMNS_PER_ROW] for start in range(0, len(cells), COLUMNS_PER_ROW)]
+        is_input = title == "Exemplars"
+        cells = [cell for assembly, name in shown for cell in cells_of(assembly, name, is_input)]
+        rows = [trimmed(cells[start : start + COLUMNS_PER_ROW]) for start in range(0, len(cells), COLUMNS_PER_ROW)]
         sections.append(Section(title, rows, note))
     title = f"{kit.name}: {len(samples):,} variants"
     return picture_png(contact_sheet([section for section in sections if section.rows], title, CELL_PIXELS))
