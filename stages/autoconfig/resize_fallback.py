@@ -48,19 +48,23 @@ class ResizeEstimate:
 
     success_rate: share of the draws that hold together.
     different: number of different shapes that a dataset finds, at most MAX_SAMPLES_REQUESTED.
-    shapes: the most different of the draws, at most the number asked for.
+    shapes: the most different of the draws, at most the number asked for, each with whether it has other rows.
+    typical: the first of the draws, as many.
     stable: whether a dataset should require stable shapes, since all exemplars are.
     is_closed_box: whether all exemplars are closed boxes.
     other_layouts: number of layouts with longer or shorter rows among the draws.
+    rows_share: share of the draws with longer or shorter rows, of those that hold together.
     rows: rows of the exemplars that become longer and shorter.
     """
 
     success_rate: float
     different: int
-    shapes: Sequence[Shape]
+    shapes: Sequence[tuple[Shape, bool]]
+    typical: Sequence[tuple[Shape, bool]]
     stable: bool
     is_closed_box: bool
     other_layouts: int = 0
+    rows_share: float = 0.0
     rows: Sequence[KitRow] = ()
 
     @property
@@ -161,7 +165,9 @@ def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
     config = config.model_copy(update={"require": required if stable else Requirements()})
     count, shapes_of = len(kit.exemplars), ProportionShapes(kit)
     tried = held = different = others = 0
-    shapes: list[Shape] = []
+    shapes: list[tuple[Shape, bool]] = []
+    typical: list[tuple[Shape, bool]] = []
+    resized_rows = 0
     for number, exemplar in enumerate(kit.exemplars):
         streams = partial(decision_rng, 0, RANDOM_STREAM, "rows", number)
         wanted = -(-MAX_LAYOUTS_TRIED // count)
@@ -169,7 +175,7 @@ def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
         others += sum(bool(layout.changes) for layout in layouts)
         sides = shapes_of.unwarped(exemplar.name, ()).lattice.sides
         texts: list[str] = []
-        made: dict[str, Shape] = {}
+        made: dict[str, tuple[Shape, bool]] = {}
         for draw in range(-(-TRIAL_DRAWS // count)):
             rng = decision_rng(0, RANDOM_STREAM, "proportions", number, draw)
             layout = layouts[draw % len(layouts)]
@@ -179,12 +185,24 @@ def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
             fault = warp_fault(kit, layout.unwarped.assembly, shape) or unmet_requirement(config.require, shape)
             if fault is None:
                 texts.append(proportion_text(proportions))
-                made[texts[-1]] = shape
+                made[texts[-1]] = shape, bool(layout.changes)
         held += len(made)
-        chosen = chosen_texts(shapes_of, texts, len(range(number, max_shapes, count)), config.min_difference)
-        shapes += [made[text] for text, _ in chosen]
+        resized_rows += sum(has_other_rows for _, has_other_rows in made.values())
+        shown = len(range(number, max_shapes, count))
+        shapes += [made[text] for text, _ in chosen_texts(shapes_of, texts, shown, config.min_difference)]
+        typical += list(made.values())[:shown]
         lattice = shapes_of.unwarped(exemplar.name, ()).lattice
         different += _different(lattice, config, number, len(range(number, MAX_SAMPLES_REQUESTED, count)))
     closed = all(is_closed_box(kit_shape(kit, exemplar.whole)) for exemplar in kit.exemplars)
     found = rows_of_kit(kit) if others else ()
-    return ResizeEstimate(held / max(tried, 1), different, shapes, stable, closed, others, found)
+    return ResizeEstimate(
+        success_rate=held / max(tried, 1),
+        different=different,
+        shapes=shapes,
+        typical=typical,
+        stable=stable,
+        is_closed_box=closed,
+        other_layouts=others,
+        rows_share=resized_rows / max(held, 1),
+        rows=found,
+    )

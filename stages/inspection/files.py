@@ -11,7 +11,7 @@ from stages.autoconfig.resolve import REQUIREMENT_KEYS
 from stages.exemplars.kit_figure import kit_figure
 from stages.inspection.config_text import config_text, dataset_name, proportions_section, variations_section
 from stages.inspection.report import InspectionReport
-from stages.inspection.sample_figure import sample_figure
+from stages.inspection.sample_figure import ShownShapes, sample_figure
 from stages.model_files.scene_file import READERS
 from stages.shape.resolved_settings import FALLBACK_STABLE_KEY
 
@@ -23,10 +23,14 @@ def write_report_files(folder: Path, paths: Sequence[Path], report: InspectionRe
     kit = replace(kit, name=" + ".join(exemplar.name for exemplar in kit.exemplars))
     yield "picture", write_file(folder / f"{name}.png", kit_figure(kit))
     if report.shapes:
-        title, note = "Most different hits of a short search", report.sentence
+        note = "; ".join(f"{title}: {text}" for title, text in report.forecast.lines())
         if resizing is not None:
-            title, note = "The same resized", f"{resizing.success_rate:.0%} of what is drawn holds together"
-        figure = sample_figure(report.built.kit, report.shapes, title, name, note)
+            note = f"{note}; {resizing.success_rate:.0%} of what is drawn holds together"
+        groups = [
+            ShownShapes("At random, as most of a dataset looks", report.typical, note),
+            ShownShapes("The most different", report.shapes, report.sentence),
+        ]
+        figure = sample_figure(report.built.kit, groups, name)
         yield "samples", write_file(folder / f"{name}-samples.png", figure)
     if resizing is not None:
         reason = resolution.reasons[FALLBACK_STABLE_KEY]

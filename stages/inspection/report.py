@@ -8,22 +8,26 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
+from pipeline.randomness import decision_rng
 from stages.autoconfig.resize_fallback import ResizeEstimate, resize_fallback
 from stages.autoconfig.resolve import REQUIREMENT_KEYS, Resolution, trial_text
 from stages.autoconfig.resolved_kit import resolve_models
+from stages.autoconfig.settings import RANDOM_STREAM
 from stages.autoconfig.yield_estimate import YieldEstimate
 from stages.exemplars.build import Observation
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
-from stages.inspection.sample_figure import MAX_SHAPES_SHOWN
+from stages.inspection.forecast import Forecast, forecast, kind_of
+from stages.inspection.sample_figure import MAX_SHAPES_SHOWN, ShownShape
 from stages.model_files.limits import ReadLimits
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Kit
 from stages.shape.physics.judge import unmet_requirement
 from stages.shape.physics.settings import Requirements
 from stages.shape.resolved_settings import STABLE_KEY
-from stages.shape.shape import Shape, kit_shape
+from stages.shape.shape import kit_shape
 from stages.variations.requirements.hub_restoration import HubRestorer
+from stages.variations.search.variant import Variant
 from stages.variations.selection.orientation import OrientationFix
 
 OTHER_CUTS = (
@@ -43,7 +47,8 @@ class InspectionReport:
     observed: all parts, with hubs and with pieces that are apart.
     built: what a run builds.
     layouts: the yield estimate of new layouts; None if a run refuses the models.
-    shapes: examples of what a run makes.
+    shapes: the most different of what a short search makes and a run accepts.
+    typical: as many at random.
     variants_per_second: variants found a CPU second.
     seconds: CPU seconds of the inspection.
     is_fragmented: whether the parts are pieces of meshes that only `auto` chose.
@@ -56,7 +61,8 @@ class InspectionReport:
     observed: Observation
     built: Observation
     layouts: YieldEstimate | None
-    shapes: Sequence[Shape]
+    shapes: Sequence[ShownShape]
+    typical: Sequence[ShownShape]
     variants_per_second: float
     seconds: float
     is_fragmented: bool
@@ -72,9 +78,15 @@ class InspectionReport:
             sentence = f"{sentence}; or {OTHER_CUTS}"
         return sentence if self.resizing is None else f"{self.resizing.sentence}; of other layouts {sentence}"
 
+    @property
+    def forecast(self) -> Forecast:
+        """What a run makes, by kind."""
+        return forecast(self.built.kit, self.layouts, self.resizing)
+
     def as_json(self) -> Mapping[str, Any]:
         """Return resolved settings and estimates, as JSON."""
-        estimate: dict[str, Any] = {"sentence": self.sentence}
+        kinds = {"shares": self.forecast.shares, "numbers": self.forecast.numbers, "typical": self.forecast.typical}
+        estimate: dict[str, Any] = {"sentence": self.sentence, "kinds": kinds}
         if self.layouts is not None:
             estimate |= {
                 **self.layouts.trial.as_json(),
@@ -98,6 +110,7 @@ class InspectionReport:
             shown = ", ".join(value) if isinstance(value, tuple) else str(value)
             lines.append((key, f"{shown}: {self.resolution.reasons[key]}"))
         lines.append(("yield", self.sentence))
+        lines += self.forecast.lines()
         if self.layouts is not None:
             trial = self.layouts.trial
             lines += [
@@ -143,35 +156,57 @@ def inspect_models(
     built = observed = resolved.observe(resolution.values)
     if stated.resolved().hubs or stated.resolved().disconnected == "largest":
         observed = resolved.observe({**resolution.values, "hubs.types": "none", "disconnected": "error"})
-    layouts, shapes, rate, resizing = None, [], 0.0, None
+    layouts, rate, resizing = None, 0.0, None
+    shapes: list[ShownShape] = []
+    typical: list[ShownShape] = []
     if not built.refusals:
         oracle = ContactOracle(built.kit)
         begun = time.process_time()
         layouts = resolved.estimate(config, oracle, tries)
         rate = layouts.trial.graphs / max(time.process_time() - begun, 1e-6)
-        shapes = _example_shapes(built.kit, oracle, layouts, resolution.values[STABLE_KEY])
+        stable = resolution.values[STABLE_KEY]
+        at_random = decision_rng(0, RANDOM_STREAM, "typical").permutation(len(layouts.variants)).tolist()
+        shapes = _example_shapes(built.kit, oracle, layouts.most_different, stable)
+        typical = _example_shapes(built.kit, oracle, [layouts.variants[index] for index in at_random], stable)
         fallback = resize_fallback(resolved, layouts, MAX_SHAPES_SHOWN)
         if fallback is not None:
             resizing, resolution, built = fallback.estimate, fallback.resolution, fallback.built
-            stated, shapes = resolved.config.resolve(resolution.values), list(resizing.shapes)
+            stated = resolved.config.resolve(resolution.values)
+            shapes, typical = (
+                [ShownShape(shape, "longer or shorter" if other_rows else "other proportions") for shape, other_rows in drawn]
+                for drawn in (resizing.shapes, resizing.typical)
+            )
     by_author = any(model.segmentation in ("nodes", "objects") for model in resolved.models)
     is_fragmented = resolved.config.parts == "auto" and not by_author
     seconds = time.process_time() - start
     return InspectionReport(
-        stated, resolved.models, resolution, observed, built, layouts, shapes, rate, seconds, is_fragmented, resizing
+        config=stated,
+        models=resolved.models,
+        resolution=resolution,
+        observed=observed,
+        built=built,
+        layouts=layouts,
+        shapes=shapes,
+        typical=typical,
+        variants_per_second=rate,
+        seconds=seconds,
+        is_fragmented=is_fragmented,
+        resizing=resizing,
     )
 
 
-def _example_shapes(kit: Kit, oracle: ContactOracle, layouts: YieldEstimate, stable: bool) -> list[Shape]:
-    """Return the most different hits that a run accepts, with their hubs restored and turned upright."""
+def _example_shapes(kit: Kit, oracle: ContactOracle, hits: Sequence[Variant], stable: bool) -> list[ShownShape]:
+    """Return the first hits that a run accepts, with their hubs restored and turned upright."""
     restorer, orientation, required = (
         HubRestorer(oracle, upright=True),
         OrientationFix(kit),
         Requirements(stable=stable),
     )
-    restored = (restorer.fit(hit.assembly) for hit in layouts.most_different)
-    accepted = (assembly for assembly in restored if unmet_requirement(required, kit_shape(kit, assembly)) is None)
-    upright = [
-        orientation.turned_back(assembly, orientation.turn(assembly)) for assembly in islice(accepted, MAX_SHAPES_SHOWN)
+    restored = ((restorer.fit(hit.assembly), kind_of(hit)) for hit in hits)
+    accepted = (
+        (assembly, kind) for assembly, kind in restored if unmet_requirement(required, kit_shape(kit, assembly)) is None
+    )
+    return [
+        ShownShape(kit_shape(kit, orientation.turned_back(assembly, orientation.turn(assembly))), kind)
+        for assembly, kind in islice(accepted, MAX_SHAPES_SHOWN)
     ]
-    return [kit_shape(kit, assembly) for assembly in upright]

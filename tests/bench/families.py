@@ -21,7 +21,7 @@ from stages.autoconfig.trial_search import type_counts
 from stages.exemplars.build import build_kit, read_kit
 from stages.exemplars.read import read_parts
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
-from stages.inspection.sample_figure import MAX_SHAPES_SHOWN, sample_figure
+from stages.inspection.sample_figure import MAX_SHAPES_SHOWN, ShownShape, ShownShapes, sample_figure
 from stages.programs.files import named_values, shape_glb
 from stages.programs.program import find_program
 from stages.shape.geometry.contact_oracle import ContactOracle
@@ -149,9 +149,9 @@ def main() -> None:
                     type_counts(kit, [assembly.types for assembly in shapes]) for shapes in (stable, _exemplars(kit))
                 )
                 chosen = farthest_first(*lists, min(MAX_SHAPES_SHOWN, len(stable))).tolist()
-                shapes = [kit_shape(kit, stable[index]) for index in chosen]
+                shapes = [ShownShape(kit_shape(kit, stable[index])) for index in chosen]
                 path = asked.sheets / f"{name.replace(' ', '-')}-{method}.png"
-                write_file(path, sample_figure(kit, shapes, "Most different finds", name, method))
+                write_file(path, sample_figure(kit, [ShownShapes("Most different finds", shapes, method)], name))
     print("\n".join(["", FOUND, *rows]))
 
 

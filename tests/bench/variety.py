@@ -27,7 +27,7 @@ from stages.autoconfig.trial_search import type_counts
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_parts
 from stages.exemplars.settings import ExemplarsConfig
-from stages.inspection.sample_figure import MAX_SHAPES_SHOWN, sample_figure
+from stages.inspection.sample_figure import MAX_SHAPES_SHOWN, ShownShape, ShownShapes, sample_figure
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
 from stages.shape.kit import Assembly, Kit
@@ -159,9 +159,9 @@ def main() -> None:
             workers: list[Finds] = Parallel(n_jobs=asked.workers)(jobs)
             print(_row(name, how, workers, asked.seconds), flush=True)
             if asked.sheets and workers[0].different:
-                shapes = [kit_shape(kit, entry) for entry in workers[0].different]
+                shapes = [ShownShape(kit_shape(kit, entry)) for entry in workers[0].different]
                 path = asked.sheets / f"{name.replace('/', '-')}-{how}.png"
-                write_file(path, sample_figure(kit, shapes, "Most different finds", name, how))
+                write_file(path, sample_figure(kit, [ShownShapes("Most different finds", shapes, how)], name))
         if len(kit.exemplars) > 1:
             crossings = sum((entry.crossings for entry in workers), Counter[str]()).most_common()
             notes.append(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from stages.shape.arrays import BoolArray
 from stages.shape.kit import Assembly, Kit
 from stages.variations.novelty.archive import cell_of
 from stages.variations.novelty.edit_distance import edit_bounds
@@ -17,6 +18,9 @@ from stages.variations.report.split_report import shortage
 from stages.variations.settings import NoveltyConfig
 
 QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
+MAX_PIECES_OF_A_ROW = 4
+"""A variant of one exemplar that so few verbatim pieces cover is only longer or shorter, in one direction or in two.
+Any other has a new plan."""
 EDIT_SAMPLE_SIZE = 24
 """Variants that are compared with the exemplars part by part."""
 
@@ -59,6 +63,16 @@ def pool_measures(
     }
 
 
+def have_new_plans(features: np.ndarray, pieces: np.ndarray) -> BoolArray:
+    """Return which of k variants have a new plan, bool (k,): more than another length or width.
+
+    features: float32 (k, 10)
+    pieces: number of verbatim pieces that cover each, int (k,)
+    """
+    new: BoolArray = (pieces > MAX_PIECES_OF_A_ROW) | (features[:, AXES.index("mixture")] >= MIN_MIXTURE)
+    return new
+
+
 def edit_measures(kit: Kit, sample: Sequence[Assembly]) -> dict[str, Any]:
     """Return mean lower and upper bounds, `low` and `high`, of the graph edit distance to the nearest exemplar."""
     bounds = [
@@ -84,7 +98,8 @@ def described(measures: Mapping[str, Any]) -> str:
         f"their neighbourhoods; mean distance E to the nearest {measures['distance']:.2f}; "
         f"{edits['low']:.0f} to {edits['high']:.0f} edits from the nearest on a sample; "
         f"in the median {measures['copied_share']:.0%} of the parts in the largest verbatim piece, "
-        f"{measures['pieces']:.0f} pieces; {low:.0f} to {high:.0f} parts, median {median:.0f}"
+        f"{measures['pieces']:.0f} pieces; {measures['new_plans']:.0%} new plans, {measures['whole']:.0%} hold nearly "
+        f"a whole exemplar; {low:.0f} to {high:.0f} parts, median {median:.0f}"
         + (f"; {overlap}" if overlap else "")
         + (f"; fewer than asked for: {short}" if short else "")
     )
@@ -93,16 +108,17 @@ def described(measures: Mapping[str, Any]) -> str:
 def measure_table(measures: Mapping[str, Mapping[str, Any]]) -> str:
     """Return the measures of the variants selected of each kit as Markdown: a table, and how each search went."""
     lines = [
-        "| kit | found | selected | graphs | histograms | cells | mixed | blended | E | edits | copied | pieces "
-        "| parts |",
-        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | --- | ---: | ---: | --- |",
+        "| kit | found | selected | graphs | histograms | cells | mixed | blended | E | edits | copied | whole "
+        "| pieces | new plans | parts |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | --- | ---: | ---: | ---: | ---: | --- |",
     ]
     for kit, row in measures.items():
         edits, sizes = row["edits"], " / ".join(f"{size:.0f}" for size in row["parts"][1:4])
         lines.append(
             f"| {kit} | {row['pool']:,} | {row['variants']:,} | {row['graphs']:,} | {row['histograms']:,} | "
             f"{row['cells']:,} | {row['mixed']:.0%} | {row['blended']:.0%} | {row['distance']:.2f} | "
-            f"{edits['low']:.0f} to {edits['high']:.0f} | {row['copied_share']:.0%} | {row['pieces']:.0f} | {sizes} |"
+            f"{edits['low']:.0f} to {edits['high']:.0f} | {row['copied_share']:.0%} | {row['whole']:.0%} | "
+            f"{row['pieces']:.0f} | {row['new_plans']:.0%} | {sizes} |"
         )
     lines += [
         "",
@@ -118,8 +134,11 @@ def measure_table(measures: Mapping[str, Mapping[str, Any]]) -> str:
         "upper bound, on a few shapes.",
         "- Copied: median share of parts in the largest piece that one rigid transform lays on an exemplar. Two "
         "exemplars glued together: 50 %.",
+        "- Whole: shapes with more than nine tenths of an exemplar in one such piece.",
         "- Pieces: median number of such pieces that cover a shape. A sample's `lineage.copied` has both numbers of "
         "its own.",
+        "- New plans: shapes that take more than four such pieces, or mix exemplars; the others are only longer or "
+        "shorter, in one direction or in two.",
         "- Parts: number of parts at the 10th, 50th and 90th percentile.",
         "",
         "How the search went:",

@@ -12,8 +12,8 @@ from pipeline.stage import Outcome, Task
 from stages.shape.collection.assignment import SPLITS, assign_shards, assign_splits
 from stages.shape.kit_input import input_kit
 from stages.variations.novelty.kit_overlap import kit_overlap
-from stages.variations.novelty.low_diversity import low_diversity
-from stages.variations.report.measures import EDIT_SAMPLE_SIZE, edit_measures, pool_measures
+from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE, low_diversity
+from stages.variations.report.measures import EDIT_SAMPLE_SIZE, edit_measures, have_new_plans, pool_measures
 from stages.variations.search.pool import PoolIndex
 from stages.variations.selection.ancestry import Ancestry, read_ancestry
 from stages.variations.selection.farthest_first import select_diverse
@@ -127,12 +127,15 @@ def _measures(task: Task, name: str, pool: PoolIndex, chosen: SelectedSamples) -
         }
         for number, split in enumerate(SPLITS)
     }
-    pieces = [found.described(at)["copied"]["pieces"] for found, at in pool.variants(task, variants.tolist())]
+    copied = [found.described(at)["copied"] for found, at in pool.variants(task, variants.tolist())]
+    pieces = np.array([described["pieces"] for described in copied])
     worth = {"variants": len(variants), **pool_measures(*taken, config.search.novelty)}
     return {
         "pool": len(pool),
         **worth,
-        "pieces": float(np.median(pieces)) if pieces else 0.0,
+        "pieces": float(np.median(pieces)) if len(pieces) else 0.0,
+        "new_plans": _share(have_new_plans(taken[1], pieces)),
+        "whole": _share(np.array([described["exemplar_share"] for described in copied]) > NEAR_COPY_SHARE),
         "low_diversity": low_diversity(kit, worth),
         "edits": edit_measures(kit, [found.assembly(at)[0] for found, at in pool.variants(task, sample)]),
         **task.shard.params["searched"][name],
@@ -143,6 +146,10 @@ def _measures(task: Task, name: str, pool: PoolIndex, chosen: SelectedSamples) -
         "min_shared_surface": config.splits.min_shared_surface,
         "discarded": chosen.discarded,
     }
+
+
+def _share(holds: np.ndarray) -> float:
+    return round(float(holds.mean()), 4) if len(holds) else 0.0
 
 
 def sample_key(kit: str, number: int) -> str:
