@@ -173,7 +173,10 @@ def inspect_models(
             resizing, resolution, built = fallback.estimate, fallback.resolution, fallback.built
             stated = resolved.config.resolve(resolution.values)
             shapes, typical = (
-                [ShownShape(shape, "longer or shorter" if other_rows else "other proportions") for shape, other_rows in drawn]
+                [
+                    ShownShape(shape, "longer or shorter" if other_rows else "other proportions")
+                    for shape, other_rows in drawn
+                ]
                 for drawn in (resizing.shapes, resizing.typical)
             )
     by_author = any(model.segmentation in ("nodes", "objects") for model in resolved.models)

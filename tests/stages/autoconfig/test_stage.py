@@ -102,12 +102,12 @@ def test_exemplars_are_resized_if_there_are_too_few_layouts_as_inspect_predicts(
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     text = run(tmp_path, ("autoconfig", "exemplars", "variations", "proportions"))
-    assert "rings: fallback: proportions: 100% of what is drawn holds together; of other layouts about 16" in text
+    assert "rings: fallback: rows: 100% of what is drawn holds together; of other layouts about 16" in text
     work = tmp_path / "out" / ".work" / "toy"
     assert not list((work / "variations").glob("toy-*.tar"))
     samples = [sample for shard in (work / "proportions").glob("toy-*.tar") for sample in read_samples(shard)]
     assert sorted(sample.split for sample in samples) == ["test"] + 8 * ["train"] + 3 * ["val"]
-    assert {sample.lineage["method"] for sample in samples} == {"proportions"}
+    assert {sample.lineage["method"] for sample in samples} == {"proportions", "rows"}
     code, text = shapemill("inspect", *paths, "--json", "--tries", 200)
     assert code == 0, text
     result = json.loads(text)
