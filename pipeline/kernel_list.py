@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 KERNEL_LIST = Path(__file__).with_name("kernels.json")
 
 _POLL_SECONDS = 0.25
-_MIN_SECONDS = 0.05
-"""Cost of a kernel at least; the recorded seconds are rounded."""
+_LOADING_SECONDS = 0.5
+"""What a kernel takes besides its own compilation: another process may have compiled what it calls."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class ListedKernel:
     name: module and qualified name, as `module:name`
     arguments: types, as `argument_words` writes them
     calls: indices of the kernels that it calls, in the list
-    seconds: what its own compilation took when it was recorded
+    seconds: CPU time of its own compilation when it was recorded
     """
 
     name: str
@@ -78,8 +78,8 @@ class KernelList:
 
     @cached_property
     def seconds(self) -> list[float]:
-        """Recorded seconds of each kernel, which are rounded."""
-        return [max(kernel.seconds, _MIN_SECONDS) for kernel in self.kernels]
+        """Seconds that each kernel is expected to take."""
+        return [kernel.seconds + _LOADING_SECONDS for kernel in self.kernels]
 
     @cached_property
     def urgency(self) -> list[float]:
@@ -127,7 +127,7 @@ def _missing_of(listed: KernelList, indices: list[int], workers: Workers, show: 
 
 @dataclass(frozen=True)
 class CompilationProgress:
-    """Numbers of compiled kernels and of all that are to be compiled, and the same in recorded seconds.
+    """Numbers of compiled kernels and of all that are to be compiled, and the same in expected seconds.
 
     `total` is 0 while a worker looks for those that are not compiled.
     """

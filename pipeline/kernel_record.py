@@ -39,11 +39,11 @@ def record_kernels(file: Path) -> None:
             _frames[-1].append(key)
         _frames.append([])
         _nested_seconds.append(0.0)
-        start = time.perf_counter()
+        start = time.process_time()
         try:
             compiled = compile_now(kernel, signature)
         finally:
-            seconds = time.perf_counter() - start
+            seconds = time.process_time() - start
             calls, nested = _frames.pop(), _nested_seconds.pop()
             _nested_seconds[-1] += seconds
         if key not in _recorded and stage_of_note():

@@ -35,7 +35,7 @@ def test_callees_come_first_and_of_those_that_can_be_compiled_what_most_waits_fo
     assert not schedule.ready, "3 waits for 1"
     schedule.end(1)
     assert schedule.next() == 3
-    assert schedule.progress == CompilationProgress(2, 4, 3.0, 13.0)
+    assert schedule.progress == CompilationProgress(2, 4, 4.0, 15.0)
 
 
 def test_kernels_that_are_compiled_already_are_waited_for_by_none() -> None:
