@@ -19,8 +19,10 @@ COMPRESSED = "export it again without compression"
 READ_EXTENSIONS = {
     "KHR_mesh_quantization", "KHR_texture_transform", "KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif",
     "MSFT_texture_dds", "KHR_node_visibility", "KHR_lights_punctual", "EXT_lights_image_based", "KHR_animation_pointer",
-    "KHR_xmp", "KHR_xmp_json_ld", "KHR_techniques_webgl", "KHR_draco_mesh_compression", "EXT_meshopt_compression",
-    "KHR_meshopt_compression", "EXT_mesh_gpu_instancing", "EXT_mesh_manifold", "FB_ngon_encoding",
+    "KHR_xmp", "KHR_xmp_json_ld", "KHR_techniques_webgl", "KHR_technique_webgl",
+    "KHR_draco_mesh_compression", "EXT_meshopt_compression",
+    "KHR_meshopt_compression",
+    "EXT_mesh_gpu_instancing", "EXT_mesh_manifold", "FB_ngon_encoding",
     "KHR_node_hoverability", "KHR_node_selectability", "KHR_interactivity",
 }  # fmt: skip
 """Extensions that are read, that change no shape and no colour, or that have a message of their own where they are."""
