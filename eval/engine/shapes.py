@@ -70,7 +70,7 @@ def model_kits(path: Path, up: str) -> Iterator[tuple[str, Kit]]:
     name = path.parent.name if path.stem == "model" else path.stem
     config = KitConfig(name="model", shapes=(ShapeFile(path=path),), up="z" if up == "z" else "y")
     config = config.resolve(STRICTEST)
-    yield name, observe_models(config, [read_parts(path, config.parts)]).kit
+    yield name, observe_models(config, [read_parts(path, config.parts, units=config.units)]).kit
 
 
 def box_shapes(path: Path, up: str) -> Iterator[tuple[str, Shape]]:

@@ -46,7 +46,7 @@ class Observation:
 
 def read_kit(config: KitConfig) -> Kit:
     """Return the kit of the model files of `config`. Raises ConfigError, as `build_kit` and `read_parts` do."""
-    kit, _ = build_kit(config, [read_parts(shape.path, config.parts) for shape in config.shapes])
+    kit, _ = build_kit(config, [read_parts(shape.path, config.parts, units=config.units) for shape in config.shapes])
     return kit
 
 
@@ -123,6 +123,7 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
         contact_kinds=settings.kinds,
         up=settings.up,
         one_surface=all(model.is_cut for model in models),
+        unit="metre" if all(model.unit == 1.0 for model in models) else "unknown",
     )
     return Observation(
         kit=kit,
@@ -148,6 +149,9 @@ def _kept_parts(
     """
     types = identified.types
     warnings = [f"{model.path.name}: {warning}" for model in models for warning in model.warnings]
+    unknown = [model.path.name for model in models if model.unit is None]
+    if 0 < len(unknown) < len(models):
+        warnings.append(f"no unit is known for {listed_names(unknown)}, others are in metres; set `units` of the kit")
     for model in models:
         left_out = [f"{part} ({why})" for owner, part, why in identified.left_out if owner is model]
         if left_out:

@@ -94,7 +94,7 @@ def _rebuild(paths: DatasetPaths) -> RebuildShape:
         types = np.array([index_of[mesh] for mesh in meshes], dtype=np.int16)
         rigid, stretches = split(np.array(poses, dtype=np.float64))
         meshes_in_use, assembly = bake(kit.types, Assembly(types, rigid, contacts, stretches))
-        return Shape(meshes_in_use, assembly, "y", kit.labels, one_surface=kit.one_surface)
+        return Shape(meshes_in_use, assembly, "y", kit.labels, one_surface=kit.one_surface, unit=kit.unit)
 
     return shape
 
@@ -106,6 +106,6 @@ LANGUAGE = Language(
     graphs=True,
     text="",
     rebuild=_rebuild,
-    coordinates="The unit is that of the model files. The origin of a mesh is the middle of the box around the part as "
+    coordinates="The origin of a mesh is the middle of the box around the part as "
     "its model file has it. The origin of a shape is that of the exemplar with most of its parts, and may be anywhere.",
 )

@@ -5,17 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from pipeline.errors import ConfigError
 from stages.exemplars.model import Model, pack_model, unpack_model
 from stages.exemplars.rigid_parts import rigid_parts
 from stages.exemplars.segmentation import CUTS, segment_into_parts
-from stages.exemplars.settings import Segmentation
+from stages.exemplars.settings import METRES, Segmentation, Units
 from stages.model_files.limits import ReadLimits
 from stages.model_files.read import ReadFailed, read_bounded
+from stages.model_files.scene import ModelScene
 from stages.model_files.scene_file import check_size, first_warnings, read_scene
 
 
-def read_parts(path: Path, segmentation: Segmentation = "auto", limits: ReadLimits | None = None) -> Model:
+def read_parts(
+    path: Path, segmentation: Segmentation = "auto", limits: ReadLimits | None = None, units: Units = "auto"
+) -> Model:
     """Return the parts of a model file, cut as `segmentation` says; as `parse_parts`.
 
     Where `auto` fails on a file that can be read without cutting one mesh by its symmetries, the model is that one,
@@ -25,12 +30,12 @@ def read_parts(path: Path, segmentation: Segmentation = "auto", limits: ReadLimi
     """
     limits = limits or ReadLimits()
     try:
-        return _read_in_child(path, segmentation, limits)
+        return _read_in_child(path, segmentation, limits, units)
     except ReadFailed as error:
         if segmentation not in ("auto", *CUTS):
             raise
         reason = error.reason
-    model = _read_in_child(path, "auto", limits, may_cut=False)
+    model = _read_in_child(path, "auto", limits, units, may_cut=False)
     if segmentation == "auto":
         warning = f"cutting it by symmetry failed: {reason}; its parts are taken in other ways"
         return replace(model, warnings=first_warnings([*model.warnings, warning]))
@@ -40,16 +45,20 @@ def read_parts(path: Path, segmentation: Segmentation = "auto", limits: ReadLimi
     )
 
 
-def _read_in_child(path: Path, segmentation: Segmentation, limits: ReadLimits, may_cut: bool = True) -> Model:
-    content = read_bounded(path, lambda: pack_model(parse_parts(path, segmentation, limits, may_cut)), limits)
+def _read_in_child(
+    path: Path, segmentation: Segmentation, limits: ReadLimits, units: Units, may_cut: bool = True
+) -> Model:
+    content = read_bounded(path, lambda: pack_model(parse_parts(path, segmentation, limits, units, may_cut)), limits)
     try:
         return unpack_model(path, content)
     except ValueError:
         raise ConfigError(f"{path}: cannot be read: its parts are no meshes; export it again") from None
 
 
-def parse_parts(path: Path, segmentation: Segmentation, limits: ReadLimits, may_cut: bool = True) -> Model:
-    """Return the parts of a model file, in the calling process.
+def parse_parts(
+    path: Path, segmentation: Segmentation, limits: ReadLimits, units: Units = "auto", may_cut: bool = True
+) -> Model:
+    """Return the parts of a model file, in the calling process; in metres if `units` or the file states the unit.
 
     may_cut: whether `auto` may cut one mesh by its symmetries.
 
@@ -57,9 +66,24 @@ def parse_parts(path: Path, segmentation: Segmentation, limits: ReadLimits, may_
     poses are rigid. A model far from the origin is moved there, with a warning. Raises ConfigError, with the file, the
     element and the remedy, for a file without usable parts, and any error that a reader did not foresee.
     """
-    scene = read_scene(path)
+    scene = _in_metres(read_scene(path), units)
     check_size(path, scene, limits)
     segmented, source, why = segment_into_parts(path, scene, segmentation, may_cut)
     check_size(path, segmented, limits)
     parts, warnings = rigid_parts(path, segmented)
     return Model(path, parts, source, why, first_warnings([*scene.warnings, *warnings]), scene.up, scene.unit)
+
+
+def _in_metres(scene: ModelScene, units: Units) -> ModelScene:
+    """Return the scene scaled to metres; as it is if nobody states its unit."""
+    unit = scene.unit if units == "auto" else METRES[units]
+    if unit is None or unit == 1.0:
+        return replace(scene, unit=unit)
+    scale = np.ones((4, 4))
+    scale[:3, 3] = unit
+    return replace(
+        scene,
+        surfaces=tuple(replace(surface, vertices=unit * surface.vertices) for surface in scene.surfaces),
+        placements=tuple(replace(placement, pose=scale * placement.pose) for placement in scene.placements),
+        unit=1.0,
+    )

@@ -30,6 +30,11 @@ STRICTEST: Mapping[str, Any] = {
 MAX_CONTACT_TOLERANCE = 0.05
 """As a share of the median part's diagonal."""
 
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+"""Metres of each unit that a config may state."""
+
+Units = Literal["auto", "m", "cm", "mm", "in", "ft"]
+
 Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry", "sections"]
 
 
@@ -150,6 +155,11 @@ class KitConfig(StrictModel):
     up: Literal["auto", "y", "z"] = Field(
         "auto",
         description="The axis that points up in the model files; `auto` decides by the files and by the shapes.",
+    )
+    units: Units = Field(
+        "auto",
+        description="Unit of the numbers in the model files; shapes are made in metres. `auto` takes what files say: "
+        "glTF is in metres, DAE is converted. OBJ, PLY, STL and OFF say nothing; their shapes keep their numbers.",
     )
 
     @model_validator(mode="after")

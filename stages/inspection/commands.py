@@ -93,7 +93,7 @@ def inspect(
         print(f"{paths[0]}: a point cloud, which has no parts; its repetitions may give a grammar")
         _print_rows(rows)
         return
-    read = [read_parts(path, config.parts, limits) for path in paths]
+    read = [read_parts(path, config.parts, limits, config.units) for path in paths]
     report = inspect_models(config, read, tries, limits)
     observation = describe_observation(report.observed, report.models, report.config)
     if as_json:
@@ -123,7 +123,7 @@ def _print_table(config: KitConfig, paths: list[Path], limits: ReadLimits, tries
     for number, path in enumerate(paths):
         try:
             alone = config.model_copy(update={"shapes": (ShapeFile(path=path),)})
-            report = inspect_models(alone, [read_parts(path, config.parts, limits)], tries, limits)
+            report = inspect_models(alone, [read_parts(path, config.parts, limits, config.units)], tries, limits)
         except ConfigError as error:
             print(error, file=sys.stderr)
             continue

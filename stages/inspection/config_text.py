@@ -57,6 +57,7 @@ def config_text(
         *([(3, "label_map", None, "")] if config.label_map else []),
         *((4, _value(name), list(patterns), "") for name, patterns in config.label_map.items()),
         (3, "up", settings.up, reasons.get("up", "")),
+        *([(3, "units", config.units, "")] if config.units != "auto" else []),
         (3, "contact", None, ""),
         (4, "tolerance", settings.tolerance, reasons.get("contact.tolerance", "")),
         (4, "kinds", list(settings.kinds), reasons.get("contact.kinds", "")),

@@ -131,7 +131,8 @@ def card(
         "`contacts.npy` and `joints.npy` are indices into the record's `parts`. `lineage.parents` names the sources of "
         "a sample.",
         "## Coordinates",
-        f"Right-handed, y up; mesh, poses, bounds and contacts share one frame. {text.coordinates} The ground of a "
+        f"Right-handed, y up; mesh, poses, bounds and contacts share one frame. {unit_sentence(tallies)} "
+        f"{text.coordinates} The ground of a "
         "shape is the plane through its lowest point, `bounds[0][1]` in the record. A part's `pose` maps its own "
         "coordinates to those of the shape, and is the matrix of its node in the GLB. "
         + (
@@ -159,6 +160,16 @@ def card(
     ]
     front = yaml.safe_dump(header, sort_keys=False, allow_unicode=True, width=1000)
     return f"---\n{front}---\n\n" + "\n\n".join(sections) + "\n"
+
+
+def unit_sentence(tallies: Mapping[str, SourceTally]) -> str:
+    """Say in which unit the coordinates of each kit or program are."""
+    metric = [name for name, tally in tallies.items() if tally.unit == "metre"]
+    if len(metric) == len(tallies):
+        return "The unit is the metre."
+    if metric:
+        return f"The unit is the metre for {', '.join(metric)}, and unknown for the others; each record states it."
+    return "Records state no unit (`unit` is unknown)."
 
 
 def _pictured(names: Sequence[str]) -> list[str]:

@@ -22,6 +22,7 @@ RECORD_COLUMNS = {
     "pieces": IndexColumn("int32", ("counts", "pieces")),
     "cycles": IndexColumn("int32", ("counts", "cycles")),
     "types": IndexColumn("int32", ("counts", "types")),
+    "unit": IndexColumn("string", ("unit",)),
     "text": IndexColumn("string", ("text",)),
 }
 """Columns from a record, besides those that stages declare."""

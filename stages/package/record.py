@@ -56,6 +56,7 @@ def describe_sample(
             "types": len(set(shape.part_labels.tolist())),
         },
         "bounds": rounded(shape_bounds(shape)).tolist(),
+        "unit": shape.unit,
         **({"text": text} if text else {}),
         **added,
     }

@@ -110,6 +110,10 @@ def _own_fields() -> dict[str, dict[str, Any]]:
             ),
         },
         "bounds": {**_numbers(2, 3), "description": "lowest and highest corner of the bounding box"},
+        "unit": {
+            "enum": ["metre", "unknown"],
+            "description": "unit of all coordinates: metre, or unknown where the sources state none",
+        },
         "text": _text("the text that the sample is made from, or the canonical string of its shape graph"),
     }
 

@@ -16,6 +16,7 @@ class SourceTally:
     """Statistics of the index rows of one kit or program.
 
     samples, rooted, stable: numbers of samples
+    unit: of the coordinates, the same in all samples of a source
     spans: number of rows by value, for each column of RANGES
     """
 
@@ -23,6 +24,7 @@ class SourceTally:
         self.samples = 0
         self.rooted = 0
         self.stable = 0
+        self.unit = "unknown"
         self.spans: dict[str, Counter[int]] = {name: Counter() for name in RANGES}
         self._graphs = array("Q")
 
@@ -31,6 +33,7 @@ class SourceTally:
         self.samples += 1
         self.rooted += row["rooted"]
         self.stable += row["stable"]
+        self.unit = row.get("unit", "unknown")
         for name, counts in self.spans.items():
             counts[row[name]] += 1
         # Eight bytes instead of a text: of a million, two collide in one of 40 million datasets.

@@ -62,6 +62,6 @@ LANGUAGE = Language(
     text="Its proportions as JSON: the exemplar, the periods of rows that were inserted or removed, if any, and for "
     "each axis the factors of the intervals between the ends of the parts.",
     rebuild=_rebuild,
-    coordinates="The unit is that of the model files, and the lowest point is as high as in the exemplar. The origin "
+    coordinates="The lowest point is as high as in the exemplar. The origin "
     "of a mesh is the middle of the box around the part, and poses do not rotate.",
 )

@@ -19,6 +19,9 @@ from stages.shape.geometry.triangles import triangle_areas
 
 ContactKind = Literal["point", "line", "face"]
 
+LengthUnit = Literal["metre", "unknown"]
+"""Unit of coordinates: metres, or that of files that state none."""
+
 Strictness = Literal[
     "multiset", "count_and_set", "count_and_pairs", "count_and_types", "slot_pairs", "slot_fillings", "slots"
 ]
@@ -228,6 +231,7 @@ class Kit:
     contact_kinds: kinds of contact that make neighbours
     up: axis that points up in the exemplars' coordinates
     one_surface: whether the parts were cut from one surface; then no line is drawn where they meet
+    unit: unit of all coordinates
     """
 
     name: str
@@ -239,6 +243,7 @@ class Kit:
     contact_kinds: tuple[ContactKind, ...]
     up: Literal["y", "z"]
     one_surface: bool = False
+    unit: LengthUnit = "unknown"
 
     def type_names(self) -> tuple[str, ...]:
         """Return the names of the types, in order."""

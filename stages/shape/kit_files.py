@@ -25,6 +25,7 @@ def kit_json(kit: Kit) -> dict[str, Any]:
         "pose_tolerance": kit.pose_tolerance,
         "contact_kinds": list(kit.contact_kinds),
         **({"one_surface": True} if kit.one_surface else {}),
+        "unit": kit.unit,
         "types": [
             {
                 "name": kind.name,
@@ -124,6 +125,7 @@ def load_kit(text: Path, arrays: Path) -> Kit:
         contact_kinds=tuple(described["contact_kinds"]),
         up=described["up"],
         one_surface=described.get("one_surface", False),
+        unit=described.get("unit", "unknown"),
     )
 
 

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from stages.shape.arrays import FloatArray, TypeArray
-from stages.shape.kit import Assembly, Kit, PartMesh
+from stages.shape.kit import Assembly, Kit, LengthUnit, PartMesh
 from stages.shape.stretch import StretchedMesh, bake, placements
 
 Z_TO_Y = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
@@ -27,6 +27,7 @@ class Shape:
     own_names: unique name of each part; if empty, its mesh's name and a number
     first_class: id of the class of `labels[0]` in a dataset; the others follow
     one_surface: whether the parts were cut from one surface, so that no line is drawn where they meet
+    unit: unit of all coordinates
     """
 
     meshes: tuple[PartMesh, ...]
@@ -36,6 +37,7 @@ class Shape:
     own_names: tuple[str, ...] = ()
     first_class: int = 0
     one_surface: bool = False
+    unit: LengthUnit = "unknown"
 
     @cached_property
     def label_of(self) -> TypeArray:
@@ -83,7 +85,7 @@ class Shape:
 def kit_shape(kit: Kit, assembly: Assembly) -> Shape:
     """Return the shape of an assembly of the kit's types; stretched parts have meshes of their own."""
     meshes, baked = bake(kit.types, assembly)
-    return Shape(meshes, baked, kit.up, kit.labels, one_surface=kit.one_surface)
+    return Shape(meshes, baked, kit.up, kit.labels, one_surface=kit.one_surface, unit=kit.unit)
 
 
 def mesh_name(part_name: str) -> str:

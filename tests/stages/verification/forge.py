@@ -439,7 +439,7 @@ def _row(key: str, shard: Mapping[str, Any], offset: int, members: Members) -> d
 def _columns() -> list[str]:
     from stages.package.index import columns
 
-    fields = {"key", "split", "kit", "graph", "producer", "counts", "text", "physics"}
+    fields = {"key", "split", "kit", "graph", "producer", "counts", "unit", "text", "physics"}
     return [*columns(fields), "shard", "offset", "bytes"]
 
 
