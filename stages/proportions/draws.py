@@ -74,8 +74,10 @@ def drawn_layouts(
         return [own]
     wanted = min(wanted, MAX_LAYOUTS)
     for number in range(TRIES_PER_LAYOUT * wanted):
+        if len(found) == wanted:
+            break
         drawn = draws.draw(rng_of(number))
-        if drawn is None or drawn[1].key in known or len(found) == wanted:
+        if drawn is None or drawn[1].key in known:
             continue
         changes, layout = drawn
         known.add(layout.key)

@@ -114,7 +114,19 @@ class Slab:
         back = recurs[i] & before[j] & (self.mates[i] < 0)
         if not self._leads_into(j[back], recurs):
             return "a contact at the start of the slab does not recur at its end"
-        return None
+        lost = recurs[i] & within[j] & ~recurs[j]
+        return "a copy would lack what each part of its row has" if self._is_missed(i[lost]) else None
+
+    def _is_missed(self, parts: np.ndarray) -> bool:
+        """Return whether a part has fewer contacts than those a step before and after it, once those named are lost.
+
+        parts: the part of each lost contact, int64 (k,)
+        """
+        degrees = np.bincount(self.layout.edges.ravel(), minlength=len(self.layout))
+        beside = np.stack([self.mates, self.previous])
+        minimum = np.where(beside >= 0, degrees[beside], len(self.layout)).min(axis=0)
+        left = degrees - np.bincount(parts, minlength=len(self.layout))
+        return bool((left[parts] < minimum[parts]).any())
 
     def removal_fault(self) -> str | None:
         """Return why the period cannot be removed as far as contacts tell, or None."""
@@ -138,6 +150,13 @@ class Slab:
         back = within[i] & before[j]
         if not self._leads_into(i[back], beyond):
             return "a contact at the start of the slab does not recur at its end"
+        # A part beyond the slab takes the place of the one a step before, and needs as many contacts.
+        degrees = np.bincount(self.layout.edges.ravel(), minlength=len(self.layout))
+        gained = np.bincount(i[back], minlength=len(self.layout))
+        left = degrees - np.bincount(j[across], minlength=len(self.layout))
+        ends = j[across]
+        if (left[ends] + gained[self.previous[ends]] < degrees[self.previous[ends]]).any():
+            return "a part beyond the slab would lack what the part before it has"
         return None
 
     @cached_property

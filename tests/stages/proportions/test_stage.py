@@ -56,19 +56,19 @@ def samples(out: Path) -> list[Sample]:
 def test_rows_of_a_shelf_become_samples_that_verify(tmp_path: Path) -> None:
     config = write_shelf_config(tmp_path)
     said = run(config, tmp_path / "out", *STAGES)
-    assert "shelf: 24 of 24 shapes of" in said
+    assert "shelf: 12 of 12 shapes of" in said
     found = samples(tmp_path / "out")
     assert all(json.loads(sample.text)["rows"] for sample in found)
     assert {sample.lineage["method"] for sample in found} == {"rows"}
-    run(config, tmp_path / "out", "points", "package")
+    run(config, tmp_path / "out", "validity", "points", "sketches", "package")
     code, said = shapemill("verify", "--config", config, "--out", tmp_path / "out")
     assert code == 0, said
 
 
 def write_shelf_config(folder: Path) -> Path:
-    meshes = {"side": box(0.05, 6.0, 0.4), "board": box(0.9, 0.04, 0.4)}
-    boards = [("board", pose(0.0, 0.2 + 0.4 * number, 0.0)) for number in range(14)]
-    sides = [("side", pose(x, 3.0, 0.0)) for x in (-0.475, 0.475)]
+    meshes = {"side": box(0.05, 3.6, 0.4), "board": box(0.9, 0.04, 0.4)}
+    boards = [("board", pose(0.0, 0.2 + 0.4 * number, 0.0)) for number in range(8)]
+    sides = [("side", pose(x, 1.8, 0.0)) for x in (-0.475, 0.475)]
     shape = write_model(folder / "shelf.glb", meshes, [*sides, *boards])
     path = folder / "stools.yaml"
     config = {
@@ -77,7 +77,11 @@ def write_shelf_config(folder: Path) -> Path:
         "license": "MIT",
         "exemplars": {"kits": [stated({"name": "shelf", "shapes": [shape]})]},
         "variations": {"samples_per_kit": 0, "rows": {"use": True}},
-        "proportions": {"samples_per_kit": 24, "splits": {"val": 0.2, "test": 0.2, "shards": 2}},
+        "proportions": {
+            "samples_per_kit": 12,
+            "parallel_searches": 1,
+            "splits": {"val": 0.2, "test": 0.2, "shards": 2},
+        },
         "points": {"uniform": 64},
         "sketches": {"size": 32, "views": [{"name": "front", "azimuth": 0.0, "elevation": 10.0}]},
     }

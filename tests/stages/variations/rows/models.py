@@ -16,6 +16,7 @@ MESHES = {
     "side": box(0.05, 2.0, 0.4),
     "board": box(0.9, 0.04, 0.4),
     "crate": box(0.5, 0.2, 0.3),
+    "can": box(0.1, 0.1, 0.1),
     "post": box(0.1, 1.0, 0.1),
     "pin": box(0.06, 1.0, 0.06),
 }
@@ -27,11 +28,12 @@ def layout(meshes: dict[str, trimesh.Trimesh], parts: Sequence[Placed]) -> tuple
     return kit, layout_of(kit, kit.exemplars[0])
 
 
-def shelf(boards: int = SHELF_BOARDS, crates: Sequence[int] = ()) -> tuple[Kit, Layout]:
-    """Two sides that hold boards; a crate lies on each of the boards in `crates`."""
+def shelf(boards: int = SHELF_BOARDS, crates: Sequence[int] = (), cans: Sequence[int] = ()) -> tuple[Kit, Layout]:
+    """Two sides that hold boards; a crate or a can stands on the boards in `crates` and `cans`."""
     sides = [("side", pose(x, 1.0, 0.0)) for x in (-0.475, 0.475)]
     held = [("board", pose(0.0, 0.2 + BOARD_STEP * number, 0.0)) for number in range(boards)]
     lying = [("crate", pose(0.0, 0.32 + BOARD_STEP * number, 0.0)) for number in crates]
+    lying += [("can", pose(0.0, 0.27 + BOARD_STEP * number, 0.0)) for number in cans]
     return layout(MESHES, [*sides, *held, *lying])
 
 

@@ -107,6 +107,15 @@ def test_what_occurs_once_stays_once() -> None:
         check(kit, changed)
 
 
+def test_copies_do_not_lack_what_all_parts_of_a_row_have() -> None:
+    """Each board carries something, and only two of the things are alike."""
+    kit, layout = models.shelf(4, crates=[0, 1], cans=[2, 3])
+    for change in changes(find_rows(layout), 1):
+        changed = repeat(layout, change)
+        held = counts(kit, changed)
+        assert held["crate"] + held["can"] == held["board"] == 5
+
+
 def test_alternating_parts_stay_alternating() -> None:
     kit, layout = models.rail()
     for times in (1, -1):
