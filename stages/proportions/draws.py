@@ -81,6 +81,9 @@ def drawn_layouts(
             continue
         changes, layout = drawn
         known.add(layout.key)
+        if layout.pieces().max() > draws.exemplar.pieces().max():
+            reject("row: in more pieces than the exemplar")
+            continue
         unwarped = shapes.unwarped_layout(layout)
         fault = warp_fault(shapes.kit, unwarped.assembly, unwarped.shape) or _fault(config.require, unwarped)
         if fault is not None:

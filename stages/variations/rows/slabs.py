@@ -114,7 +114,8 @@ class Slab:
         back = recurs[i] & before[j] & (self.mates[i] < 0)
         if not self._leads_into(j[back], recurs):
             return "a contact at the start of the slab does not recur at its end"
-        lost = recurs[i] & within[j] & ~recurs[j]
+        into = np.where(self.mates >= 0, recurs[self.mates], False)
+        lost = recurs[i] & ((within[j] & ~recurs[j]) | (before[j] & ~into[j]))
         return "a copy would lack what each part of its row has" if self._is_missed(i[lost]) else None
 
     def _is_missed(self, parts: np.ndarray) -> bool:
