@@ -1,4 +1,4 @@
-"""`shapemill` in this process: its workers are real, and Python starts once, not once for each stage."""
+"""`shapemill` in this process: its workers are real and stay, and Python starts once, not once for each stage."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import sys
 from contextlib import redirect_stderr, redirect_stdout
 
 from pipeline.cli import main
+from tests.warm_workers import warm_workers
 
 
 def shapemill(*arguments: object) -> tuple[int, str]:
@@ -14,7 +15,7 @@ def shapemill(*arguments: object) -> tuple[int, str]:
     printed, before, code = io.StringIO(), sys.argv, 0
     sys.argv = ["shapemill", *map(str, arguments)]
     try:
-        with redirect_stdout(printed), redirect_stderr(printed):
+        with warm_workers(), redirect_stdout(printed), redirect_stderr(printed):
             main()
     except SystemExit as end:
         code = int(str(end.code or 0))

@@ -1,0 +1,55 @@
+"""Workers that stay, with imports and kernels, for the next run of this process: tests of stages start a few.
+
+Tests of the engine itself start workers of their own, as runs do.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pipeline.workers
+from pipeline.compilation_note import RECORD_VARIABLE
+from pipeline.workers import Workers, _Worker
+
+_waiting: list[_Worker] = []
+"""Workers without a run."""
+
+
+class WarmWorkers(Workers):
+    """Workers that a run takes over from the run before."""
+
+    def __init__(self, count: int, output: Path) -> None:
+        super().__init__(count, output)
+        self._idle = [_waiting.pop() if _waiting else worker for worker in self._idle]
+        for worker in self._idle:
+            worker._output = output
+            if worker._executor is not None and worker.submit(_print_into, output).exception() is not None:
+                worker.stop(kill=True)  # it died since; another process replaces it
+
+    def stop(self, kill: bool) -> None:
+        """Keep idle workers; end those at work, or all if asked to kill them."""
+        if not kill:
+            _waiting.extend(self._idle)
+            self._idle = []
+        super().stop(kill)
+
+
+def _print_into(output: Path) -> None:
+    descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    os.dup2(descriptor, 1)
+    os.dup2(descriptor, 2)
+    os.close(descriptor)
+
+
+@contextmanager
+def warm_workers() -> Iterator[None]:
+    """Within the context, runs of this process use warm workers, unless they record what workers load."""
+    if RECORD_VARIABLE not in os.environ:
+        pipeline.workers.Workers = WarmWorkers  # type: ignore[misc]
+    try:
+        yield
+    finally:
+        pipeline.workers.Workers = Workers  # type: ignore[misc]
