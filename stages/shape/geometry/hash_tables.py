@@ -5,6 +5,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from stages.shape.kernel_options import CALLED_BY_KERNELS
+
 MISSING_KEY = -9
 """What `look_up` returns for a key that the table does not hold."""
 
@@ -33,7 +35,7 @@ def look_up(keys, values, key):
     return MISSING_KEY
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, **CALLED_BY_KERNELS)
 def contains(table, key):
     """Return whether a set uint64 (2^k,) holds a key."""
     slot = key & np.uint64(len(table) - 1)
@@ -44,7 +46,7 @@ def contains(table, key):
     return False
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, **CALLED_BY_KERNELS)
 def with_key(table, count, key):
     """Return a set of `count` keys with one more, which it does not hold; a larger array where it was half full."""
     if 2 * (count + 1) > len(table):
@@ -57,7 +59,7 @@ def with_key(table, count, key):
     return table
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, **CALLED_BY_KERNELS)
 def _put(table, key):
     slot = key & np.uint64(len(table) - 1)
     while table[slot] != 0:
@@ -65,7 +67,7 @@ def _put(table, key):
     table[slot] = key
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, **CALLED_BY_KERNELS)
 def cell_hash(point, turn, side):
     """Return the hash of a cell of width `side` at or next to a point, by its first three coordinates.
 

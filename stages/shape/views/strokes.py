@@ -23,6 +23,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray
+from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.shape.views.buffers import Visible
 from stages.shape.views.screen import clip_at, eye_depth
 
@@ -315,7 +316,7 @@ def _crossings(shown, triangles, parts, thresholds, projection):
     return across, down, shares[:total], kinds[:total]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", **CALLED_BY_KERNELS)
 def _differing(shown):
     """Return how many pairs of neighbouring pixels show different triangles."""
     height, width = shown.shape
@@ -380,7 +381,7 @@ def _join(across, down, shares, kinds_of):
     return ends[:total], kinds[:total], nodes[:total]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", **CALLED_BY_KERNELS)
 def _meeting(positions, line_kinds, size):
     """Return where three or four lines meet: on the chord of the two weightiest if they outweigh the rest."""
     middle = np.zeros(2)
@@ -397,7 +398,7 @@ def _meeting(positions, line_kinds, size):
     return middle / counted
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", **CALLED_BY_KERNELS)
 def _root(parent, node):
     while parent[node] != node:
         parent[node] = parent[parent[node]]
