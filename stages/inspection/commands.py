@@ -61,7 +61,7 @@ def inspect(
     from stages.inspection.observation import describe_observation, observation_lines
     from stages.inspection.report import inspect_models
     from stages.model_files.limits import ReadLimits
-    from stages.model_files.scene_file import check_exists
+    from stages.shape.input_file import check_exists
 
     stated_limits = {
         "cpu_seconds": max_cpu_seconds,

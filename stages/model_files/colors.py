@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from stages.model_files.other_content import content_fault
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
+from stages.shape.input_file import content_fault
 
 IMAGE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TGA", "TIFF", "DDS", "PPM")
 """The formats that are tried, whatever the file's name: for others Pillow starts programs (EPS) or runs long."""
@@ -75,7 +75,7 @@ def decode_image(content: bytes) -> ByteArray:
     except Image.DecompressionBombError:
         raise OSError(f"it has more than {2 * (Image.MAX_IMAGE_PIXELS or 0):,} pixels") from None
     except UnidentifiedImageError:
-        if (other := content_fault(content)) is not None:
+        if other := content_fault(content):
             raise OSError(f"it {other}") from None
         raise OSError(f"it is not one of {', '.join(IMAGE_FORMATS)}") from None
     except OSError:

@@ -11,8 +11,8 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.model_files.enclosure import Enclosure
-from stages.model_files.other_content import content_fault
 from stages.model_files.scene import Malformed
+from stages.shape.input_file import content_fault
 
 COMPRESSED = "export it again without compression"
 
@@ -114,7 +114,7 @@ class GltfFile:
                     ) from None
                 except OSError:
                     raise ConfigError(f"{self.path}: buffer {index}, the file {uri!r}, cannot be read") from None
-                if (other := content_fault(content)) is not None:
+                if other := content_fault(content):
                     raise ConfigError(f"{self.path}: buffer {index}, the file {uri[:80]!r}, {other}")
                 self.buffers[index] = content
             elif index == 0 and self.chunk is not None:

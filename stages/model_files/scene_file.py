@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import difflib
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,11 +15,11 @@ from stages.model_files.enclosure import Enclosure
 from stages.model_files.gltf import read_gltf
 from stages.model_files.limits import ReadLimits
 from stages.model_files.off import read_off
-from stages.model_files.other_content import HEAD_BYTES, content_fault
 from stages.model_files.ply import read_ply
 from stages.model_files.scene import ModelScene, Placement, SceneNode, Surface, plain_name, plain_text
 from stages.model_files.stl import read_stl
 from stages.model_files.wavefront import read_wavefront
+from stages.shape.input_file import check_input_file
 
 READERS: dict[str, Callable[[Path, Enclosure], ModelScene]] = {
     ".glb": read_gltf,
@@ -51,17 +49,7 @@ def read_scene(path: Path) -> ModelScene:
             f"{path}: {path.suffix or 'a name without an extension'} is no model format; {hint}"
             f"Shapemill reads {', '.join(READERS)}"
         )
-    check_exists(path)
-    if not path.is_file():
-        raise ConfigError(f"{path}: is {'a folder' if path.is_dir() else 'no regular file'}; name one model file")
-    if not os.access(path, os.R_OK):
-        raise ConfigError(f"{path}: may not be read; give this user permission to read it (chmod u+r)")
-    if path.stat().st_size == 0:
-        raise ConfigError(f"{path}: the file is empty; copy or export it again")
-    with open(path, "rb") as stream:
-        other = content_fault(stream.read(HEAD_BYTES))
-    if other is not None:
-        raise ConfigError(f"{path}: {other}")
+    check_input_file(path)
     enclosure = Enclosure(path)
     try:
         scene = reader(path, enclosure)
@@ -74,16 +62,6 @@ def read_scene(path: Path) -> ModelScene:
     except RecursionError:
         raise ConfigError(f"{path}: {enclosure.at} nests too deeply; export it again, flatter") from None
     return _solid_placements(path, scene)
-
-
-def check_exists(path: Path) -> None:
-    """Raise ConfigError, with the nearest name, for a file that does not exist."""
-    if not os.access(path, os.F_OK):  # Path.exists() raises where a folder on the way may not be entered
-        neighbours: list[str] = []
-        with contextlib.suppress(OSError):
-            neighbours = [file.name for file in path.parent.iterdir()]
-        near = difflib.get_close_matches(path.name, neighbours, n=1)
-        raise ConfigError(f"{path}: no such file" + (f"; did you mean {near[0]}?" if near else ""))
 
 
 def check_size(path: Path, scene: ModelScene, limits: ReadLimits) -> None:

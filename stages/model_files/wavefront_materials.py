@@ -10,10 +10,10 @@ import numpy as np
 
 from stages.model_files.colors import Wrap, color_bytes, decode_image, srgb_from_linear
 from stages.model_files.enclosure import Enclosure, Outside
-from stages.model_files.other_content import content_fault
 from stages.model_files.scene import GREY
 from stages.model_files.wavefront_text import TextLine, decode_text, text_lines
 from stages.shape.arrays import ByteArray, FloatArray
+from stages.shape.input_file import content_fault
 
 _OPTION_NUMBERS = {"-mm": 2, "-o": 3, "-s": 3, "-t": 3}
 """Largest number of values of the options of maps; the other options take one word."""
@@ -45,7 +45,7 @@ def read_libraries(
     materials: dict[str, WavefrontMaterial] = {}
     for line in {line.full: line for line in lines}.values():
         for content in _library_contents(line, enclosure, warnings):
-            if (other := content_fault(content)) is not None:
+            if other := content_fault(content):
                 warnings.append(f"material library {line.rest!r} {other}; its faces are grey")
                 continue
             _Library(enclosure, materials, warnings).read(decode_text(content))

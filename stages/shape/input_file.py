@@ -59,7 +59,11 @@ def check_input_file(path: Path, packed: str = "") -> None:
 
 def check_first_bytes(name: str, first: bytes, packed: str = "") -> None:
     """Refuse a content by its first bytes, as `check_input_file` does. Raises ConfigError that begins with `name`."""
-    fault = _fault(first, packed)
+    fault = content_fault(first, packed)
+    if not first:
+        fault = "the file is empty; copy or export it again"
+    elif not first.strip(b"\0"):
+        fault = "holds zero bytes only, as a broken download does; download or copy it again"
     if fault:
         raise ConfigError(f"{name}: {fault}")
 
@@ -98,32 +102,32 @@ def decode_text(content: bytes) -> str:
     return content.decode("utf-8-sig", errors="replace")
 
 
-def _fault(first: bytes, packed: str) -> str:
-    """Return what is wrong with a file of these first bytes, and the remedy; empty if it may be read."""
-    if not first:
-        return "the file is empty; copy or export it again"
-    if not first.strip(b"\0"):
-        return "holds zero bytes only, as a broken download does; download or copy it again"
+def content_fault(content: bytes, packed: str = "") -> str:
+    """Return what a file is instead of data, as the end of a sentence with the remedy; empty for data.
+
+    content: the bytes of the file, or its first FIRST_BYTES; packed: as in `check_input_file`.
+    """
+    first = content[:FIRST_BYTES]
     if _LFS_POINTER.match(first.lstrip()):
         size = _LFS_SIZE.search(first)
         stored = f" to {int(size[1]):,} bytes" if size else ""
-        return f"this is a Git LFS pointer{stored}, not the file itself; run `git lfs pull` in its repository"
+        return f"is a Git LFS pointer{stored}, not the file itself; run `git lfs pull` in its repository"
     if _ANNEX_POINTER.match(first):
-        return "this is a git-annex pointer, not the file itself; run `git annex get` in its repository"
+        return "is a git-annex pointer, not the file itself; run `git annex get` in its repository"
     prefix = _MARKUP_PREFIX.match(first)
     markup = first[prefix.end() :] if prefix else first
     if _WEB_PAGE.match(markup):
         return (
-            "this is a web page (HTML), not the file itself: its address leads to a page about it, or to a login; "
+            "is a web page (HTML), not the file itself: its address leads to a page about it, or to a login; "
             "download the raw file"
         )
     if _SERVER_ERROR.match(markup):
-        return "this is the error message of a server (XML), not the file itself; download it again"
+        return "is the error message of a server (XML), not the file itself; download it again"
     for name, (magic, command) in _PACKED.items():
         if magic.match(first) and name != packed:
             return f"is packed ({name}); unpack it (`{command} FILE`) and name a file in it"
     if first[_TAR_MAGIC] == b"ustar":
         return "is a tar archive; unpack it (`tar xf FILE`) and name a file in it"
     if first.startswith(_APPLE_DOUBLE):
-        return "is a file that macOS puts next to another, without its content; name the file without `._`"
+        return "is what macOS notes about a file (AppleDouble), without its content; name the file without `._`"
     return ""

@@ -105,7 +105,7 @@ def test_fault_is_named_with_its_file_and_its_element(tmp_path: Path, fault: str
 def test_zip_in_place_of_a_model_is_not_unpacked(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "m.dae", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("m.dae", b" " * 10_000_000)
-    with pytest.raises(ConfigError, match=r"is compressed \(zip\)"):
+    with pytest.raises(ConfigError, match=r"is packed \(zip\)"):
         read_parts(tmp_path / "m.dae", "auto", LIMITS)
 
 

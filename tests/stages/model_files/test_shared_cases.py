@@ -59,8 +59,8 @@ COLORS = {
 REFUSED = {
     "stl-quad-facets.stl": "line 8: a facet has 4 vertices",
     "gltf-required-unknown.glb": "'ACME_vertex_offsets', which is not read",
-    "lfs-pointer.glb": "is a Git LFS pointer, not the file itself; run `git lfs pull`",
-    "lfs-pointer.ply": "is a Git LFS pointer, not the file itself; run `git lfs pull`",
+    "lfs-pointer.glb": "is a Git LFS pointer to 123,456 bytes, not the file itself; run `git lfs pull`",
+    "lfs-pointer.ply": "is a Git LFS pointer to 123,456 bytes, not the file itself; run `git lfs pull`",
 }
 
 

@@ -306,10 +306,10 @@ def test_strips_of_ply_begin_again_with_their_first_side(tmp_path: Path) -> None
     ("content", "fault"),
     [
         (b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n", "is a Git LFS pointer"),
-        (b"\n<!DOCTYPE HTML>\n<html><body>404</body></html>", "is an HTML page"),
-        (b"\xef\xbb\xbf<html lang='en'>", "is an HTML page"),
-        (b"\x1f\x8b\x08\0\0", r"is compressed \(gzip\)"),
-        (b"PK\x03\x04\0\0", r"is compressed \(zip\)"),
+        (b"\n<!DOCTYPE HTML>\n<html><body>404</body></html>", "is a web page"),
+        (b"\xef\xbb\xbf<html lang='en'>", "is a web page"),
+        (b"\x1f\x8b\x08\0\0", r"is packed \(gzip\)"),
+        (b"PK\x03\x04\0\0", r"is packed \(zip\)"),
         (b"\0\x05\x16\x07\0\x02\0\0", "AppleDouble"),
     ],
 )

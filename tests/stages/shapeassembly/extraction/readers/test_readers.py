@@ -242,7 +242,7 @@ def test_folder_of_models_is_read_without_sidecars_and_pointers(tmp_path: Path) 
     assert isinstance(cabinet, PartHierarchy)
     assert isinstance(clone, Rejected)
     assert (name, clone.reason) == ("clone.glb", "unreadable hierarchy")
-    assert "clone.glb: this is a Git LFS pointer" in clone.detail
+    assert "clone.glb: is a Git LFS pointer" in clone.detail
     assert source.sidecars == 1
     assert len(HierarchySource(tmp_path, "glb", "auto")) == 2
 
