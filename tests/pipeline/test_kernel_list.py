@@ -80,7 +80,7 @@ class Interval(NamedTuple):
         types.Optional(types.int64),
         types.Dispatcher(half),
     ],
-    ids=str,
+    ids=lambda argument: type(argument).__name__,
 )
 def test_type_of_an_argument_comes_back_from_its_words(argument: types.Type) -> None:
     words = json.loads(json.dumps(argument_words(argument)))
