@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterable, Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 from pydantic import ValidationError
 
+from pipeline.display import ticking
 from pipeline.errors import ConfigError
 from pipeline.options import INSPECTION
 from stages.autoconfig.settings import AutoconfigConfig
@@ -93,8 +95,13 @@ def inspect(
         print(f"{paths[0]}: a point cloud, which has no parts; its repetitions may give a grammar")
         _print_rows(rows)
         return
-    read = [read_parts(path, config.parts, limits, config.units) for path in paths]
-    report = inspect_models(config, read, tries, limits)
+    read = []
+    for path in paths:
+        read.append(read_parts(path, config.parts, limits, config.units))
+        if not as_json:
+            print(f"{path}: {len(read[-1].parts)} parts by {read[-1].segmentation}", file=sys.stderr, flush=True)
+    with nullcontext() if as_json else ticking("inspect", "looking for settings and trying them out"):
+        report = inspect_models(config, read, tries, limits)
     observation = describe_observation(report.observed, report.models, report.config)
     if as_json:
         written = {} if out is None else dict(write_report_files(out, paths, report))
