@@ -71,7 +71,8 @@ def recurring_pieces(surface: Surface) -> list[np.ndarray]:
     faces_of = np.split(order, np.flatnonzero(np.diff(component[order])) + 1)
     classes = _classes(surface, faces_of)
     sizes = np.bincount(classes)
-    recurs = (sizes[classes] > 1) & (sizes[classes] <= MAX_COPIES)
+    solid = np.array([triangle_areas(surface.vertices[surface.faces[faces]]).any() for faces in faces_of])
+    recurs = (sizes[classes] > 1) & (sizes[classes] <= MAX_COPIES) & solid
     groups = _groups(surface, faces_of, classes, np.flatnonzero(recurs))
     rest = np.flatnonzero(~recurs)
     pieces = [np.sort(np.concatenate([faces_of[member] for member in members])) for members in groups]
