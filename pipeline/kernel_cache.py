@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import ast
 import fcntl
-import gc
 import hashlib
 import os
 import time
@@ -156,15 +155,10 @@ _saved: list[str] = []
 
 def _compile(kernel: dispatcher.Dispatcher, signature: Any) -> Any:
     with global_compiler_lock:
-        # Most of what a compilation makes stays: collections find little and take an eighth of its time.
-        collects_garbage = gc.isenabled()
-        gc.disable()
         _compilations.append([])
         try:
             return _numba_compile(kernel, signature)
         finally:
-            if collects_garbage:
-                gc.enable()
             for lock in _compilations.pop():
                 lock.release()
             if not _compilations:

@@ -243,36 +243,6 @@ def test_every_function_but_kernels_is_typed() -> None:
     assert faults(untyped, CODE) == []
 
 
-def names_in_python(path: Path) -> set[str]:
-    """Return the dotted names, imported or own, that a file uses outside kernels."""
-    tree, module = parsed(path), relative(path).removesuffix(".py").replace("/", ".")
-    inside = {node for kernel in kernels(tree) for statement in kernel.body for node in ast.walk(statement)}
-    full = {node.name: f"{module}.{node.name}" for node in tree.body if isinstance(node, ast.FunctionDef)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom):
-            full |= {item.asname or item.name: f"{node.module}.{item.name}" for item in node.names}
-        elif isinstance(node, ast.Import):
-            full |= {item.asname: item.name for item in node.names if item.asname}
-    found = set(full.values()) if path.name == "__init__.py" else set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Name | ast.Attribute) and node not in inside:
-            first, dot, rest = ast.unparse(node).partition(".")
-            found.add(full.get(first, first) + dot + rest)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            found.add(node.value)
-    return found
-
-
-def test_kernels_that_python_does_not_call_have_no_wrapper() -> None:
-    used = set().union(*map(names_in_python, ALL))
-    for path in CODE:
-        for kernel in kernels(parsed(path)):
-            name = f"{relative(path).removesuffix('.py').replace('/', '.')}.{kernel.name}"
-            options = ast.unparse(kernel.decorator_list[-1])
-            if "inline" not in options:
-                assert ("**CALLED_BY_KERNELS" in options) != (name in used), f"{name}: {options}"
-
-
 def misnamed(path: Path) -> Iterator[str]:
     """Yield what is wrong with the name and the first lines of a file."""
     names = {path.stem, *path.relative_to(ROOT).parts} & BANNED_NAMES

@@ -5,13 +5,11 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
-
 GRID_CELLS_PER_AXIS = 24
 """Of the grid that holds lower bounds of distances."""
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _one_way(first, second, squares, limit):
     """Return the mean distance of the points (3, k) of a cloud to the nearest of another, or any value over `limit`.
 
@@ -28,7 +26,7 @@ def _one_way(first, second, squares, limit):
     return total / first.shape[1]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _minimum(numbers, count):
     """Return the least of the first `count` numbers; overwrites them."""
     while count > 1:  # the lesser of two halves, element by element
@@ -76,13 +74,13 @@ def nearest_clouds(clouds, others, itself):
     return distances, indices
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _by_axes(clouds):
     """Return the clouds (n, k, 3) as float32 (n, 3, k)."""
     return clouds.transpose(0, 2, 1).astype(np.float32).copy()
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _grid(ours, theirs):
     """Return the start and the cell width of a grid around all clouds, by axis, (3, 2)."""
     grid = np.empty((3, 2))
@@ -93,7 +91,7 @@ def _grid(ours, theirs):
     return grid
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _cells(clouds, grid):
     """Return the cell of each point, int32 (n, k), and each cloud's mean distance of points to cell centres (n,)."""
     cells = np.empty((clouds.shape[0], clouds.shape[2]), np.int32)
@@ -111,7 +109,7 @@ def _cells(clouds, grid):
     return cells, offsets
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _field(cloud, grid, squares, field):
     """Fill `field` with lower bounds of the distance of each cell centre to a cloud (3, k), in units of `_unit`."""
     unit = _unit(grid)
@@ -124,13 +122,13 @@ def _field(cloud, grid, squares, field):
         field[cell] = np.uint16(max(np.sqrt(_minimum(squares, cloud.shape[1])) / unit - 0.1, 0.0))
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _unit(grid):
     """Return a 65,000th of the diagonal of the grid."""
     return GRID_CELLS_PER_AXIS * np.sqrt((grid[:, 1] ** 2).sum()) / 65000
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _lower_bound(field, cells, offset, grid):
     """Return a lower bound of the mean distance of points in these cells to a cloud, by the triangle inequality."""
     total = 0

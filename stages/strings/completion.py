@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import numba
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
-
 NO_COMPLETION = 1 << 28
 """Tokens to complete a node that cannot be completed."""
 
@@ -52,7 +50,7 @@ def tokens_to_complete(grammar, kind, counts, pending, finished):
     return best
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _cheapest(grammar, p, kind, counts, missing, room, pending):
     """Return the tokens of children that fill `room` slots of pattern p, the `pending` costliest filled by cycles."""
     children = max(room - pending, 0)

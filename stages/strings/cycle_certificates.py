@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numba
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.strings.completion import NO_COMPLETION, tokens_to_complete
 from stages.strings.mask_state import NO_NODE, NODE, not_joined, open_cycles
 
@@ -17,7 +16,7 @@ AT_CURRENT = -2
 """The cycle can close at the current node, but not below it."""
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def can_complete(grammar, state, i, tokens, first, second):
     """Return whether everything open can be completed within some tokens, each node and cycle by itself.
 
@@ -37,12 +36,12 @@ def can_complete(grammar, state, i, tokens, first, second):
     return True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _is_either(first, second, origin, certificate):
     return first in (origin, certificate) or second in (origin, certificate)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def find_certificates(grammar, state, i):
     """Find a certificate of each open cycle without one, so that most tokens need only a look at it."""
     for k in range(state.opened.shape[1]):
@@ -50,7 +49,7 @@ def find_certificates(grammar, state, i):
             state.certificate[i, k] = max(_closing_node(grammar, state, i, k), NO_NODE)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def forget_certificates(state, i, first, second):
     """Forget the certificates of cycles that start, or close, at one of two nodes."""
     for k in range(state.opened.shape[1]):
@@ -58,7 +57,7 @@ def forget_certificates(state, i, first, second):
             state.certificate[i, k] = NO_NODE
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _closing_node(grammar, state, i, k):
     """Return a node below which open cycle k can close; else AT_CURRENT if it can close there; else NO_NODE."""
     origin = state.opened[i, k]
@@ -82,7 +81,7 @@ def _closing_node(grammar, state, i, k):
     return best
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _closing_node_of_type(grammar, state, i, origin, other, goal):
     """Return the same for an end of type `other`; `goal` is the pair of types that the cycle joins."""
     current = state.current[i]

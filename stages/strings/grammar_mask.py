@@ -18,7 +18,6 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.strings.compiled_grammar import CompiledGrammar
 from stages.strings.completion import NO_COMPLETION
 from stages.strings.cycle_certificates import can_complete, find_certificates, forget_certificates
@@ -42,7 +41,7 @@ from stages.strings.mask_state import (
 NO_TOKEN = -1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _allows_node(grammar, state, i, kind, tokens):
     """Return whether a node can follow, with `tokens` left after it."""
     parent, previous, joins = state.current[i], state.previous[i], state.joins[i]
@@ -54,7 +53,7 @@ def _allows_node(grammar, state, i, kind, tokens):
     return allowed
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _allows_number(grammar, state, i, k, tokens):
     """Return whether cycle number k can follow, with `tokens` left after it."""
     current, origin = state.current[i], state.opened[i, k]
@@ -80,7 +79,7 @@ def _allows_number(grammar, state, i, k, tokens):
     return allowed
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _allows_branch(grammar, state, i, tokens):
     """Return whether a branch can begin: some node can follow in it."""
     types = len(grammar.counted)
@@ -98,7 +97,7 @@ def _allows_branch(grammar, state, i, tokens):
     return allowed
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _allows_branch_end(grammar, state, i, tokens):
     """Return whether the current branch can end."""
     node = state.current[i]
@@ -113,7 +112,7 @@ def _allows_branch_end(grammar, state, i, tokens):
     return allowed
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _allows(grammar, state, i, max_tokens, token):
     """Return whether a token can follow in a string of at most `max_tokens` tokens."""
     types = len(grammar.counted)
@@ -136,7 +135,7 @@ def _allows(grammar, state, i, max_tokens, token):
     return previous == NODE and _allows_number(grammar, state, i, token - types - 3, tokens)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _fill_mask(grammar, state, i, max_tokens, allowed):
     """Fill the mask of a string, bool (tokens,)."""
     first = len(grammar.counted) + 3
@@ -152,7 +151,7 @@ def _fill_mask(grammar, state, i, max_tokens, allowed):
             free = token
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _choose(grammar, state, i, max_tokens, scores):
     """Return the allowed token with the highest score, or NO_TOKEN; scores of refused tokens become -inf."""
     find_certificates(grammar, state, i)
@@ -165,7 +164,7 @@ def _choose(grammar, state, i, max_tokens, scores):
         scores[token] = -np.inf
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def take_token(grammar, state, i, token):
     """Append an allowed token."""
     types = len(grammar.counted)

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.strings.completion import NO_COMPLETION, tokens_to_complete
 
 END_TOKEN = 0
@@ -65,7 +64,7 @@ def empty_state(strings: int, max_tokens: int, types: int, cycles: int) -> MaskS
     )
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def update_need(grammar, state, i, node):
     """Update the tokens that complete a node; return whether it can be completed."""
     need = tokens_to_complete(
@@ -75,7 +74,7 @@ def update_need(grammar, state, i, node):
     return need < NO_COMPLETION
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def add_node(grammar, state, i, kind):
     """Append a node; return whether it and its parent can be completed."""
     new, parent = state.nodes[i], state.current[i]
@@ -97,7 +96,7 @@ def add_node(grammar, state, i, kind):
     return update_need(grammar, state, i, new) and fits
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def remove_node(state, i, previous, need, joins):
     """Undo `add_node`."""
     new = state.nodes[i] - 1
@@ -112,7 +111,7 @@ def remove_node(state, i, previous, need, joins):
     state.joins[i] = joins
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def not_joined(state, i, origin):
     """Return whether the current node differs from `origin` and is no neighbour of it."""
     current = state.current[i]
@@ -124,7 +123,7 @@ def not_joined(state, i, origin):
     return not joined
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def close_cycle(grammar, state, i, k):
     """Close cycle number k at the current node; return whether both ends can be completed."""
     origin, current = state.opened[i, k], state.current[i]
@@ -138,7 +137,7 @@ def close_cycle(grammar, state, i, k):
     return update_need(grammar, state, i, current) and fits
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def open_cycles(state, i):
     """Return the number of open cycles."""
     opened = 0
@@ -147,7 +146,7 @@ def open_cycles(state, i):
     return opened
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def can_leave(grammar, state, i):
     """Return whether the current node is complete but for its open cycles."""
     node = state.current[i]

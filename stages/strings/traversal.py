@@ -8,10 +8,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 
-
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _arcs(n, edges, edge_order):
     """Return the arcs out of each node, in `edge_order`: `(first, target, edge)`."""
     first = np.zeros(n + 1, dtype=np.int64)
@@ -91,7 +89,7 @@ def walk(types, edges, tree, edge_order, root, letters):
     return _written(types, events, nodes, first, target, edge, tree, letters), nodes
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _tree_walk(first, target, edge, tree, root):
     """Return a walk along `tree`, with -1 and -2 for parentheses around all but the last subtrees, and its nodes."""
     n = len(first) - 1
@@ -123,7 +121,7 @@ def _tree_walk(first, target, edge, tree, root):
     return events[:written], nodes[:reached]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _written(types, events, nodes, first, target, edge, tree, letters):
     """Return the codes of a walk: types, parentheses, and the numbers of the edges that are not in `tree`."""
     m = len(tree)

@@ -20,7 +20,6 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import ByteArray, Float32Array, FloatArray
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.shape.views.buffers import Visible
 from stages.shape.views.camera import View
 from stages.shape.views.palette import linear_to_srgb, srgb_to_linear
@@ -261,7 +260,7 @@ def _lit(
     return light
 
 
-@numba.njit(cache=True, error_model="numpy", **CALLED_BY_KERNELS)
+@numba.njit(cache=True, error_model="numpy")
 def _reached(shadow, m, projection, x, y, z, nx, ny, nz, offset, taps):
     """Return the share of the taps around a point of eye space (x, y, z) that the lamp sees.
 

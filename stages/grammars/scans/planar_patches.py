@@ -10,7 +10,6 @@ import numpy as np
 from stages.grammars.scans.outward_normals import outward_signs
 from stages.grammars.scans.point_neighbourhoods import PointNeighbourhoods, patch_contacts
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 
 MAX_TILT_RADIANS = 0.4
 """Largest angle between a patch and the plane of a neighbourhood, which rests on few, noisy points."""
@@ -111,7 +110,7 @@ def _grown(points, normals, near, seeds, min_cosine, distance):
     return patch
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _plane(points, chosen):
     """Return the middle of chosen points and the normal of the plane through them."""
     middle, spread = np.zeros(3), np.zeros((3, 3))

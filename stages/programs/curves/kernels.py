@@ -5,8 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
-
 
 @numba.njit(cache=True)
 def measure(points, closed):
@@ -168,7 +166,7 @@ def all_seen(points):
     return seen, convex
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _facing(a, b, c, x, y, z):
     """Area of a triangle (times 2) as seen along (x, y, z) (times its length); negative from behind."""
     d0, d1, d2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]

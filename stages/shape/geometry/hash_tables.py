@@ -5,8 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
-
 MISSING_KEY = -9
 """What `look_up` returns for a key that the table does not hold."""
 
@@ -35,7 +33,7 @@ def look_up(keys, values, key):
     return MISSING_KEY
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def contains(table, key):
     """Return whether a set uint64 (2^k,) holds a key."""
     slot = key & np.uint64(len(table) - 1)
@@ -46,7 +44,7 @@ def contains(table, key):
     return False
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def with_key(table, count, key):
     """Return a set of `count` keys with one more, which it does not hold; a larger array where it was half full."""
     if 2 * (count + 1) > len(table):
@@ -59,7 +57,7 @@ def with_key(table, count, key):
     return table
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _put(table, key):
     slot = key & np.uint64(len(table) - 1)
     while table[slot] != 0:
@@ -67,7 +65,7 @@ def _put(table, key):
     table[slot] = key
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def cell_hash(point, turn, side):
     """Return the hash of a cell of width `side` at or next to a point, by its first three coordinates.
 

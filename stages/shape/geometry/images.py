@@ -6,10 +6,9 @@ import numba
 import numpy as np
 
 from stages.shape.geometry.hash_tables import OWN_CELL, cell_hash
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _gap(first, second):
     total = 0.0
     for k in range(len(first)):

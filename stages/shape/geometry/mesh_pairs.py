@@ -13,7 +13,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.polygons import cut, polygon_area
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 
 MAX_LEAF_TRIANGLES = 4
 
@@ -73,7 +72,7 @@ def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _segment_distance2(p0, p1, q0, q1):
     """Return the squared distance of two segments."""
     d1x, d1y, d1z = p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]
@@ -108,7 +107,7 @@ def _segment_distance2(p0, p1, q0, q1):
     return x * x + y * y + z * z
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _inside_prism(p, tri, n):
     """Return whether `p` projects into the triangle `tri` with (unnormalised) normal `n`."""
     for k in range(3):
@@ -121,7 +120,7 @@ def _inside_prism(p, tri, n):
     return True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _normal(tri, out):
     ax, ay, az = tri[1, 0] - tri[0, 0], tri[1, 1] - tri[0, 1], tri[1, 2] - tri[0, 2]
     bx, by, bz = tri[2, 0] - tri[0, 0], tri[2, 1] - tri[0, 1], tri[2, 2] - tri[0, 2]
@@ -131,7 +130,7 @@ def _normal(tri, out):
     return (out[0] * out[0] + out[1] * out[1] + out[2] * out[2]) ** 0.5
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _plane_sides(n, length, origin, tri, out):
     """Write the signed distances of the corners of `tri` to a plane into `out`."""
     for k in range(3):
@@ -140,7 +139,7 @@ def _plane_sides(n, length, origin, tri, out):
         ) / length
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _pierces(tri, sides, other, n):
     """Return whether an edge of `tri` passes through the interior of `other` (normal n); `sides` are its plane
     distances.
@@ -160,7 +159,7 @@ def _pierces(tri, sides, other, n):
     return False
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _triangles_within(p, q, tolerance, np_, nq, sp, sq):
     """Return whether two triangles are at most `tolerance` apart or intersect; np_, nq, sp, sq are scratch (3,)."""
     lp = _normal(p, np_)
@@ -193,7 +192,7 @@ def _triangles_within(p, q, tolerance, np_, nq, sp, sq):
     return False
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _boxes_apart(a, b, r, ar, t, tolerance):
     """Return whether box `a` and box `b`, moved by rotation `r` (`ar` = |r|) and translation `t`, are surely apart."""
     dx = r[0, 0] * b[0] + r[0, 1] * b[1] + r[0, 2] * b[2] + t[0] - a[0]
@@ -346,7 +345,7 @@ def contact_patches(ca, cb, pairs, pose, tolerance):
     return points[:total], area, crossing
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _point_triangle_distance2(p, tri, n):
     """Return the squared distance of a point and a triangle; n is scratch (3,)."""
     length = _normal(tri, n)

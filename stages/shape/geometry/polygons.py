@@ -6,13 +6,12 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 
 THIN_CORNER_SHARE = 1e-7
 """Corners that stand out by less than this share of the hull's length are left out."""
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def cut(polygon, count, n, sign, offset, out):
     """Write the part of a polygon, its first `count` rows, where sign n . x <= offset, into `out`. Returns its corner
     count.
@@ -33,7 +32,7 @@ def cut(polygon, count, n, sign, offset, out):
     return kept
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def polygon_area(polygon, count):
     """Return the area of a flat polygon in space, its first `count` rows."""
     x, y, z = 0.0, 0.0, 0.0

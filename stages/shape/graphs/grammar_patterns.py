@@ -14,7 +14,6 @@ import numba
 import numpy as np
 
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.shape.kit import Grammar, Multiset
 
 ANY_SIZE = -1
@@ -100,7 +99,7 @@ def _size(multiset: Multiset) -> int:
     return sum(count for _, count in multiset)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def fits(patterns, part_type, counts, complete):
     """Return whether neighbours fit a pattern of a type; unless `complete`, together with any others.
 

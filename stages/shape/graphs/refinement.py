@@ -10,8 +10,6 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
-
 
 class _Partition(NamedTuple):
     """Nodes in cells, all int64 (n,).
@@ -89,7 +87,7 @@ def refine(colors, edges, forward, backward, classes):
     return order, start
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _arcs(n, edges, forward, backward):
     """Return the arcs into each node: those into `v` come from `source[first[v]:first[v + 1]]` with the classes `kind`
     there.
@@ -113,7 +111,7 @@ def _arcs(n, edges, forward, backward):
     return first, source, kind
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _partition(colors):
     """Return the cells of a colouring, by colour."""
     n = len(colors)
@@ -128,7 +126,7 @@ def _partition(colors):
     return _Partition(order, position, start, size)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _wait(queue, waiting, head, queued, cell):
     """Put a cell at the end of the ring `queue`. Returns the number of waiting cells."""
     waiting[cell] = True
@@ -136,7 +134,7 @@ def _wait(queue, waiting, head, queued, cell):
     return queued + 1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _arcs_by_class(nodes, first, source, kind, members, newest, used):
     """List the arcs into `nodes` by their classes. Returns the number of classes; they are `used`, ascending.
 
@@ -158,7 +156,7 @@ def _arcs_by_class(nodes, first, source, kind, members, newest, used):
     return kinds
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _touch(partition, members, arc, count, touched, moved, parted):
     """Count the arcs of the list that begins at `arc` by their source nodes, and move these to the end of their cells.
 
@@ -189,7 +187,7 @@ def _touch(partition, members, arc, count, touched, moved, parted):
     return reached, broken
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _split(partition, count, cell, low):
     """Cut a cell wherever the count of its nodes changes; the first counted node is at `low`.
 
@@ -212,7 +210,7 @@ def _split(partition, count, cell, low):
     return pieces, largest
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _sort_by_count(partition, count, low, end):
     """Sort the nodes at the positions from `low` to `end` by their counts."""
     order, position, _, _ = partition

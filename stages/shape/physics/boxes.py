@@ -10,7 +10,6 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.polygons import cut, polygon_area
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 
 SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 EDGES = np.array([[a, b] for a in range(8) for b in range(a + 1, 8) if np.abs(SIGNS[a] - SIGNS[b]).sum() == 2])
@@ -56,7 +55,7 @@ def recognise_boxes(corners: FloatArray) -> tuple[BoolArray, FloatArray, FloatAr
     return near & (codes == np.arange(8)).all(axis=1), centres, axes, halves
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _separation(ca, ra, ha, cb, rb, hb, favour, normal):
     """Signed gap of two boxes along the axis that parts them best, over faces and pairs of edges; below zero the
     depth. `normal` becomes that axis, from the second box to the first. Returns the gap and the axis: 0 to 2 of the
@@ -103,13 +102,13 @@ def separations(centres, axes, halves, pairs):
     return gaps
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _corner(c, r, h, signs, out):
     for k in range(3):
         out[k] = c[k] + signs[0] * h[0] * r[0, k] + signs[1] * h[1] * r[1, k] + signs[2] * h[2] * r[2, k]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _corner_distance2(c, r, h, point):
     total = 0.0
     for k in range(3):
@@ -119,7 +118,7 @@ def _corner_distance2(c, r, h, point):
     return total
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _edge_distance2(p0, p1, q0, q1):
     """Squared distance of two segments where both nearest points lie inside them; infinite where they do not (then a
     corner is nearest, or nearer still)."""
@@ -175,7 +174,7 @@ def boxes_within(centres, axes, halves, pairs, distance):
     return within
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _face(c, r, h, axis, sign, polygon):
     """The four corners, in order, of the face of a box at `sign` along `axis`."""
     u, v = (axis + 1) % 3, (axis + 2) % 3
@@ -186,7 +185,7 @@ def _face(c, r, h, axis, sign, polygon):
             polygon[k, i] = c[i] + sign * h[axis] * r[axis, i] + su * h[u] * r[u, i] + sv * h[v] * r[v, i]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _cut_by_box(polygon, count, c, r, h, but, slack, spare):
     """The part of a polygon inside a box, without the sides along axis `but`; in `polygon`; its corner count."""
     for k in range(3):

@@ -7,7 +7,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.polygons import convex_hull, cut
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 
 MIN_OPPOSED_COSINE = 0.98
 """Faces press on each other if their normals are opposed within about 11 degrees."""
@@ -18,7 +17,7 @@ LINES_PER_SIDE = 24
 LINE_OFFSETS = np.array([0.0073, 0.0131, 0.0039])
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _unit_normal(tri, out):
     """Write the unit normal of a triangle into `out`. Returns its double area."""
     for k in range(3):
@@ -31,7 +30,7 @@ def _unit_normal(tri, out):
     return length
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _sides(tri, n, k, out):
     """Write the normal of the plane through side k of a triangle (normal n), perpendicular to it, into `out`. Returns
     its offset.
@@ -105,7 +104,7 @@ def facing_polygons(ca, cb, pairs, pose, tolerance, oriented):
     return points[:total], normals[:total]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _behind(corners, used, r, t, n, base, slack):
     """Return whether any corner of the `used` triangles, moved by r and t, lies deeper than `slack` behind a plane."""
     for u in range(len(corners)):
@@ -202,7 +201,7 @@ def hull_corners(points: FloatArray, normal: FloatArray) -> np.ndarray:
     return convex_hull(flat)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _crossings(corners, axis, low, step, columns, out, counts):
     """Write where lines along `axis` cross the triangles of a mesh into `out` (columns, columns, room), with `counts`.
 

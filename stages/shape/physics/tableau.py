@@ -9,7 +9,6 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 
 FEASIBILITY_TOLERANCE = 1e-7
 """Largest residual of an equation that holds."""
@@ -92,7 +91,7 @@ def _least(edges: FloatArray, load: FloatArray, growing: FloatArray, factor: flo
     return least if (inner @ least >= bounds - 10 * FEASIBILITY_TOLERANCE).all() else found
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _pivot(table, basis, row, column):
     """Let the variable `column` enter the basis at `row`."""
     table[row] /= table[row, column]
@@ -102,7 +101,7 @@ def _pivot(table, basis, row, column):
     basis[row] = column
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _leaving(table, basis, count, column, fixed):
     """Return the row whose variable first becomes zero as that of `column` grows, -1 for none.
 
@@ -119,7 +118,7 @@ def _leaving(table, basis, count, column, fixed):
     return leaving
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _entering(rates, greedy):
     """Return the column of the greatest rate, or of the first above rounding, -1 for none."""
     entering, greatest_rate = -1, ZERO_RATE

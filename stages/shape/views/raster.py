@@ -15,7 +15,6 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.shape.views.camera import View
 from stages.shape.views.layers import layered_moves
 from stages.shape.views.scene import Scene
@@ -112,7 +111,7 @@ def _raster(screen, width, height, bits):
     return shown
 
 
-@numba.njit(cache=True, error_model="numpy", **CALLED_BY_KERNELS)
+@numba.njit(cache=True, error_model="numpy")
 def _centres(corners, bits, size):
     """Return the first and last of `size` pixels whose centres lie between the corners of a triangle along one axis."""
     half = (1 << bits) >> 1
@@ -121,7 +120,7 @@ def _centres(corners, bits, size):
     return max(first, 0), min(last, size - 1)
 
 
-@numba.njit(cache=True, error_model="numpy", **CALLED_BY_KERNELS)
+@numba.njit(cache=True, error_model="numpy")
 def _plane(corners, x, y):
     """Return the depth of a triangle's plane at a point of the screen and its changes per pixel to the right and down.
 

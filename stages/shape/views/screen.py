@@ -13,7 +13,6 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.shape.views.camera import View
 from stages.shape.views.scene import Scene
 
@@ -96,7 +95,7 @@ def _facing_normals(mesh_normals, parts, face_of, rotations, screen):
     return normals
 
 
-@numba.njit(cache=True, error_model="numpy", **CALLED_BY_KERNELS)
+@numba.njit(cache=True, error_model="numpy")
 def clip_at(screen, t, x, y):
     """Return the clip depth of the plane of triangle `t` at a point of the screen, clamped to the triangle's depths."""
     ax, ay = screen[t, 1, 0] - screen[t, 0, 0], screen[t, 1, 1] - screen[t, 0, 1]
@@ -112,7 +111,7 @@ def clip_at(screen, t, x, y):
     return min(max(depth, low), max(first, second, third))
 
 
-@numba.njit(cache=True, error_model="numpy", **CALLED_BY_KERNELS)
+@numba.njit(cache=True, error_model="numpy")
 def eye_depth(clip, projection):
     """Return the distance along the viewing axis of a clip depth."""
     return -(projection[2, 3] - clip * projection[3, 3]) / (clip * projection[3, 2] - projection[2, 2])

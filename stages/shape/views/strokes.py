@@ -23,7 +23,6 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.shape.views.buffers import Visible
 from stages.shape.views.screen import clip_at, eye_depth
 
@@ -316,7 +315,7 @@ def _crossings(shown, triangles, parts, thresholds, projection):
     return across, down, shares[:total], kinds[:total]
 
 
-@numba.njit(cache=True, error_model="numpy", **CALLED_BY_KERNELS)
+@numba.njit(cache=True, error_model="numpy")
 def _differing(shown):
     """Return how many pairs of neighbouring pixels show different triangles."""
     height, width = shown.shape
@@ -381,7 +380,7 @@ def _join(across, down, shares, kinds_of):
     return ends[:total], kinds[:total], nodes[:total]
 
 
-@numba.njit(cache=True, error_model="numpy", **CALLED_BY_KERNELS)
+@numba.njit(cache=True, error_model="numpy")
 def _meeting(positions, line_kinds, size):
     """Return where three or four lines meet: on the chord of the two weightiest if they outweigh the rest."""
     middle = np.zeros(2)
@@ -398,7 +397,7 @@ def _meeting(positions, line_kinds, size):
     return middle / counted
 
 
-@numba.njit(cache=True, error_model="numpy", **CALLED_BY_KERNELS)
+@numba.njit(cache=True, error_model="numpy")
 def _root(parent, node):
     while parent[node] != node:
         parent[node] = parent[parent[node]]

@@ -10,8 +10,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
-
 MOVE, STAY, GROW, HINGE, SWING = range(5)
 """The rule of an attachment: the first of its cuboid; an aligned cuboid that is near enough; one that grew; the second
 attachment; a later one.
@@ -27,22 +25,22 @@ _MAX_PRIOR_SHIFT = 0.01  # maximum shift of prior attachments
 _MIN_LENGTH = 1e-9
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _norm(a):
     return np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _cross(a, b, out):
     out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def point(box, p, out):
     """Write the point of a cuboid with local coordinates `p`."""
     a, b, c = (p[0] - 0.5) * box[3], (p[1] - 0.5) * box[4], (p[2] - 0.5) * box[5]
@@ -50,7 +48,7 @@ def point(box, p, out):
         out[k] = box[k] + a * box[6 + k] + b * box[9 + k] + c * box[12 + k]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def local(box, point, out):
     """Write the local coordinates of a point."""
     x, y, z = point[0] - box[0], point[1] - box[1], point[2] - box[2]
@@ -59,7 +57,7 @@ def local(box, point, out):
         out[k] = along / box[3 + k] + 0.5
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _has_corner(box, other):
     """Return whether a corner of `other` is in `box`."""
     p, q, g = np.empty(3), np.empty(3), np.empty(3)
@@ -72,7 +70,7 @@ def _has_corner(box, other):
     return False
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _nearest_straight(box, target, near, far, gap):
     """Find the nearest grid points of two upright cuboids, axis by axis."""
     for k in range(3):
@@ -86,7 +84,7 @@ def _nearest_straight(box, target, near, far, gap):
                     best, near[k], far[k], gap[k] = abs(way), i / (_GRID_POINTS - 1), j / (_GRID_POINTS - 1), way
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _nearest_tilted(box, target, near, far, gap):
     """Find the nearest grid points of an upright `box` and any target, whose point is found by rounding."""
     p, g, q, h = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
@@ -110,7 +108,7 @@ def _nearest_tilted(box, target, near, far, gap):
             gap[:] = h
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def grow(box, target, decision):
     """Attach an aligned cuboid again, whatever its points: grow towards `target` if it is away."""
     decision[0] = STAY
@@ -133,7 +131,7 @@ def grow(box, target, decision):
             box[k] += more * (near[k] - 0.5)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _rotate_about(box, pivot, u, cosine, sine):
     """Rotate a cuboid about the axis through `pivot` along the unit vector `u`."""
     for start in range(0, 15, 3):
@@ -150,7 +148,7 @@ def _rotate_about(box, pivot, u, cosine, sine):
         box[k] += pivot[k]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _rotate_onto(box, pivot, source, goal):
     """Rotate a cuboid about `pivot` by the smallest angle, so that `source` points towards `goal`.
 
@@ -183,7 +181,7 @@ def across(a, u):
     u[k], u[i], u[j] = 0.0, a[j] / length, -a[i] / length
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def hinge(box, prior, p, goal, decision):
     """Attach a second time: change one size, or all if none suffices, to the right distance; then turn the cuboid."""
     decision[0], decision[1] = HINGE, -1
@@ -211,7 +209,7 @@ def hinge(box, prior, p, goal, decision):
     decision[2] = _rotate_onto(box, pivot, source, goal)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _change_all(box, reach, wanted, has, decision):
     """Change the squared length of the arm from `has` to `wanted` by adding one amount to each size.
 
@@ -228,7 +226,7 @@ def _change_all(box, reach, wanted, has, decision):
         box[3:6] *= np.sqrt(wanted / has)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def hold(box, p, position):
     """Move a cuboid so that its point `p` is at `position`."""
     now = np.empty(3)
@@ -237,7 +235,7 @@ def hold(box, p, position):
         box[k] += position[k] - now[k]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _face_of(p):
     """Return axis and side, 1 or -1, of the face that is nearest to a local point."""
     axis, side, best = 0, 1.0, np.inf
@@ -249,7 +247,7 @@ def _face_of(p):
     return axis, side
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def swing(box, priors, p, goal, decision):
     """Attach after two or more attachments: turn about their line, if they have one, then move the face nearer."""
     decision[0], decision[1], decision[2] = SWING, -1, 0
@@ -283,7 +281,7 @@ def swing(box, priors, p, goal, decision):
     _push(box, priors, p, goal - source, decision)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _push(box, priors, p, way, decision):
     """Move the face of point `p` along `way` if it faces there and no prior attachment shifts too far."""
     axis, side = _face_of(p)

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.shapeassembly.execution.attachment import MOVE, grow, hinge, hold, local, point, swing
 from stages.shapeassembly.execution.tables import ATTACH, DECLARE, REFLECT, SQUEEZE
 from stages.shapeassembly.syntax.limits import MAX_BLOCK_ATTACHMENTS, MAX_DEPTH, MAX_PARTS, MAX_REACH
@@ -51,7 +50,7 @@ class _Events(NamedTuple):
     where: np.ndarray
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _attach(boxes, aligned, events, count, decision):
     """Execute attachment number `count` of an assembly."""
     moved, target = events.who[count]
@@ -82,7 +81,7 @@ def _attach(boxes, aligned, events, count, decision):
         swing(box, priors, p, goal, decision)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _count_events(rows, parts):
     """Return the number of attachments of one assembly, copies included; -1 if too many."""
     moves = np.zeros(parts, np.int64)
@@ -106,7 +105,7 @@ def _count_events(rows, parts):
     return total
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _face_point(face, u, v, out):
     """Write the point (u, v) of a face; faces are numbered as in `FACES`."""
     axis = face // 2
@@ -115,7 +114,7 @@ def _face_point(face, u, v, out):
     out[(2 if axis < 2 else 1)] = v
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _execute(rows, boxes, child, mirrored, decisions):
     """Execute the lines of one assembly in its own coordinates.
 
@@ -172,7 +171,7 @@ def _execute(rows, boxes, child, mirrored, decisions):
                 declared += 1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _copy_event(boxes, events, original, copy, count, axis, mirror, share):
     """Copy attachment `original`: its actual point is mirrored, or shifted by a share of the bounding box."""
     moved, target = events.who[original]
@@ -191,7 +190,7 @@ def _copy_event(boxes, events, original, copy, count, axis, mirror, share):
     events.who[count, 0], events.who[count, 1] = copy, target
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _count_nodes(child, block_parts):
     """Return the status, and the number of assemblies and leaves, of one expanded program."""
     blocks = len(block_parts) - 1
@@ -217,7 +216,7 @@ def _count_nodes(child, block_parts):
     return TOO_DEEP, 0, 0
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _place(boxes, child, mirrored, block_parts, node, leaves, corners, leaf_node, leaf_part):
     """Place the assemblies of one program within each other, breadth first. Returns OK or TOO_FAR."""
     rotations, translations, scales = np.empty((len(node), 3, 3)), np.zeros((len(node), 3)), np.ones((len(node), 3))

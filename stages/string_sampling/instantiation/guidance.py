@@ -13,7 +13,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose_kernels import compose, squared_distance
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.strings.categories import CategorySpace
 from stages.strings.decoder import Decoded
 
@@ -57,7 +56,7 @@ def guide_of(space: CategorySpace, decoded: Decoded, scores: FloatArray) -> Guid
     )
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def score_by_category(kit, guide, graph, s, node):
     """Score the values of a node by their categories, if its parent is placed and has a frame."""
     parent = guide.parents[node]
@@ -69,7 +68,7 @@ def score_by_category(kit, guide, graph, s, node):
             s.scores[value] = guide.scores[node, category] if category >= 0 else NO_CATEGORY_SCORE
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def propagate_frames(kit, guide, graph, s, value):
     """Set the frame of the part placed last, and then those of its placed descendants."""
     node = s.nodes[value]
@@ -92,7 +91,7 @@ def propagate_frames(kit, guide, graph, s, value):
                 s.framed[child] = True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def drop_frames(guide, s):
     """Drop the frames of removed parts and of their descendants."""
     for node in range(len(guide.parents)):
@@ -101,7 +100,7 @@ def drop_frames(guide, s):
             s.framed[node] = False
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _category(kit, guide, graph, s, parent, value):
     """Return the category of a value in the frame of its parent, or -1."""
     kind, label = s.types[value], graph.labels[s.nodes[value]]

@@ -13,7 +13,6 @@ import numpy as np
 
 from stages.shape.geometry.hash_tables import mix
 from stages.shape.geometry.pose_kernels import compose, same_rotation, squared_distance
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 
 MAX_CHAIN_LENGTH = 24
 """Longer chains are assumed to reach any pose."""
@@ -84,7 +83,7 @@ def _reset(reach, orientations):
     reach.counts[N_NODES] = orientations
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def can_reach(kit, placements, reach, orientation, sequence, length, target_orientation, rotation, translation):
     """Return whether a chain of labels `sequence[:length]` from an orientation can reach another at a pose."""
     if length > MAX_CHAIN_LENGTH:
@@ -105,7 +104,7 @@ def can_reach(kit, placements, reach, orientation, sequence, length, target_orie
     return _find(kit, placements, reach, node, end, target_orientation, rotation, translation, slack) >= 0
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _child(kit, placements, reach, node, label):
     """Return the trie node of a sequence extended by a label, or -1 if there is no room."""
     child = reach.children[node]
@@ -171,7 +170,7 @@ def _child(kit, placements, reach, node, label):
     return child
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _bucket(node, x, y, z):
     key = mix(np.uint64(np.int64(x)) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(node))
     key = mix(key + np.uint64(np.int64(y)) * np.uint64(0xBF58476D1CE4E5B9))
@@ -179,7 +178,7 @@ def _bucket(node, x, y, z):
     return np.int64(key & np.uint64(NUM_BUCKETS - 1))
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _find(kit, placements, reach, node, end, orientation, rotation, translation, slack):
     """Return the pose of a trie node, before `end`, that is the same within `slack`, or -1."""
     width, start = BUCKET_TOLERANCES * kit.limits[0], reach.starts[node]

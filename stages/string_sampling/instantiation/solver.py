@@ -30,7 +30,6 @@ from stages.shape.geometry.contact_lookup import NO_CONTACT, UNKNOWN_CONTACT, ca
 from stages.shape.geometry.hash_tables import look_up
 from stages.shape.geometry.pose_kernels import compose, relative_transform
 from stages.shape.graphs.grammar_patterns import fits
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.string_sampling.instantiation.guidance import Guide, drop_frames, propagate_frames, score_by_category
 from stages.string_sampling.instantiation.placements import DockedPlacements
 from stages.string_sampling.instantiation.reach import MAX_CHAIN_LENGTH, ChainReach, can_reach
@@ -79,7 +78,7 @@ def solve(rng, problem, s):
         max_conflicts *= RESTART_GROWTH
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _attempt(rng, problem, s, max_conflicts):
     """Search from one start. CONFLICT for a restart."""
     graph, guide, method = problem.graph, problem.guide, problem.method
@@ -146,7 +145,7 @@ def _attempt(rng, problem, s, max_conflicts):
                 outcome = Outcome.CONFLICT
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _root(rng, problem, s):
     """Return the start: the first node with a guide; else random, or that with most conflicts, on a cycle if any."""
     graph = problem.graph
@@ -164,7 +163,7 @@ def _root(rng, problem, s):
     return best
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _open_root(problem, s, node):
     """Open the domain of the first node: a part of its label in any orientation. False if there is no room."""
     placements = problem.placements
@@ -179,7 +178,7 @@ def _open_root(problem, s, node):
     return True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _add_value(problem, s, node, orientation, rotation, translation):
     """Append a value. False if there is no room."""
     boxes = problem.kit.boxes
@@ -205,7 +204,7 @@ def _add_value(problem, s, node, orientation, rotation, translation):
     return True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _next(rng, problem, s):
     """Return OK and the next node to place, its domain open; or CONFLICT or NO_ROOM."""
     graph, method = problem.graph, problem.method
@@ -233,7 +232,7 @@ def _next(rng, problem, s):
         return Outcome.OK, best
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _random_next(rng, problem, s):
     """Return the same for a random node next to a placed one, which alone determines its domain."""
     graph, method = problem.graph, problem.method
@@ -256,7 +255,7 @@ def _random_next(rng, problem, s):
     return (Outcome.OK if s.domain_size[chosen] > 0 else Outcome.CONFLICT), chosen
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _choose(rng, s, node):
     """Return the value with the highest score, a random one of equals."""
     best, best_score, ties = -1, -np.inf, 0
@@ -271,7 +270,7 @@ def _choose(rng, s, node):
     return best
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _open_domain(problem, s, node, parent):
     """Open the domain of a node: placements docked to its parent that agree with all placed parts.
 
@@ -308,7 +307,7 @@ def _open_domain(problem, s, node, parent):
     return True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _agree(problem, s, placed, value):
     """Return whether a value agrees with a placed part: joined parts touch, and with all contacts no others."""
     is_edge = problem.graph.rows[s.nodes[placed], s.nodes[value]] >= 0
@@ -318,7 +317,7 @@ def _agree(problem, s, placed, value):
     return is_edge or not problem.method.whole
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _relation(kit, contacts, s, a, b):
     """Return the contact of two values: NO_CONTACT, FORBIDDEN_CONTACT or, if they dock, a number from 0."""
     slack = 1.1 * kit.limits[1]
@@ -338,7 +337,7 @@ def _relation(kit, contacts, s, a, b):
     return relation
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _place(problem, s, value):
     """Place a part, prune open domains against it, and open the domains of its neighbours."""
     graph, method = problem.graph, problem.method
@@ -370,7 +369,7 @@ def _place(problem, s, value):
     return Outcome.OK
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _count_neighbours(problem, s, value):
     """Count the contacts of the part placed last."""
     labels = problem.graph.labels
@@ -383,7 +382,7 @@ def _count_neighbours(problem, s, value):
             s.neighbours[other, labels[node]] += 1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _score_by_contacts(problem, s, node):
     """Score the values of a node by their number of contacts; prune those whose contacts the grammar cannot admit."""
     graph_labels = problem.graph.labels
@@ -411,7 +410,7 @@ def _score_by_contacts(problem, s, node):
             _prune(s, value)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _can_be_complete(problem, s, node, fresh, counts):
     """Return whether the grammar admits a neighbourhood with at least the neighbours of a node.
 
@@ -425,7 +424,7 @@ def _can_be_complete(problem, s, node, fresh, counts):
     return fits(problem.kit.rules.patterns, graph.labels[node], counts, False)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _all_complete(problem, s):
     """Return whether the grammar admits the neighbourhood of every part."""
     labels = problem.graph.labels
@@ -435,7 +434,7 @@ def _all_complete(problem, s):
     return wrong == 0
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _prune_unclosable(problem, s, node):
     """Prune the values of a node from which no chain of parts closes its shortest cycle of unplaced nodes."""
     graph = problem.graph
@@ -483,7 +482,7 @@ def _prune_unclosable(problem, s, node):
             _prune(s, value)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _prune(s, value):
     """Take a value out of its domain."""
     s.in_domain[value] = False
@@ -491,7 +490,7 @@ def _prune(s, value):
     _push_pruned(s, value)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _undo(graph, s, length):
     """Undo everything since the trail had some length."""
     while s.counts[TRAIL_LENGTH] > length:
@@ -508,7 +507,7 @@ def _undo(graph, s, length):
             s.domain_start[node] = -1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _remove(graph, s, node):
     """Remove the part placed last."""
     s.assigned[node] = -1
@@ -524,42 +523,42 @@ def _remove(graph, s, node):
 # Encoding of the trail: a pruned value is its row, a placed node -1 - node, an opened one -1 - len(assigned) - node.
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _push(s, entry):
     s.trail[s.counts[TRAIL_LENGTH]] = entry
     s.counts[TRAIL_LENGTH] += 1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _push_pruned(s, value):
     _push(s, value)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _push_placed(s, node):
     _push(s, -1 - node)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _push_opened(s, node):
     _push(s, -1 - len(s.assigned) - node)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _is_pruned(entry):
     return entry >= 0
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _is_placed(s, entry):
     return -len(s.assigned) <= entry < 0
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _placed_node(entry):
     return -1 - entry
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _opened_node(s, entry):
     return -1 - len(s.assigned) - entry

@@ -8,7 +8,6 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.symmetry.surface.lattice import cell_index, cell_of, doubled
 from stages.symmetry.surface.welding import sides_by_edge, weld
 
@@ -135,7 +134,7 @@ def _heights(corners: FloatArray, sides: np.ndarray) -> FloatArray:
     return cross / np.linalg.norm(end - start, axis=1)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _covered_spans(start, way, near, far, normal, n, surface, inward, spans):
     """Write the spans of a line that triangles with this normal cover into `spans` (m, 2); return their number.
 
@@ -171,7 +170,7 @@ def _covered_spans(start, way, near, far, normal, n, surface, inward, spans):
     return count
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _inward(corners, normals):
     """Return, for each side of each triangle, the inward vector of the side's length, and that length."""
     vectors = np.empty((len(corners), 3, 4))
@@ -183,7 +182,7 @@ def _inward(corners, normals):
     return vectors
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _crossings(start, way, origin, size, times):
     """Write the shares of `way` at which a line leaves a cell, from 0.0 to 1.0 ascending, into `times`.
 
@@ -207,7 +206,7 @@ def _crossings(start, way, origin, size, times):
     return times, filled
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _append_uncovered(near, far, spans, count, bare, filled):
     """Append what no span covers between `near` and `far` to `bare`; join it to a piece that ends where it begins."""
     order = np.argsort(spans[:count, 0])
@@ -227,7 +226,7 @@ def _append_uncovered(near, far, spans, count, bare, filled):
     return bare, filled
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _merge_lines(cell, points, directions, lengths, tolerance):
     """Merge equal lines of one cell; a merged line has the point of its longest piece."""
     total, begin = 0, 0

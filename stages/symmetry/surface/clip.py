@@ -8,7 +8,6 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.symmetry.surface.lattice import doubled
 
 MAX_CORNERS = 12
@@ -49,7 +48,7 @@ class _Triangles(NamedTuple):
     faces: np.ndarray
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _clip_half(polygon, count, axis, bound, sign, out):
     """Write the part of a polygon above a plane across an axis (below it if `sign` is -1.0) into `out`.
 
@@ -71,13 +70,13 @@ def _clip_half(polygon, count, axis, bound, sign, out):
     return kept
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _clip_slab(polygon, count, axis, low, high, spare, out):
     """Write the part of a polygon between two planes across an axis into `out`; return its number of corners."""
     return _clip_half(spare, _clip_half(polygon, count, axis, low, 1.0, spare), axis, high, -1.0, out)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _area(polygon, count):
     x, y, z = 0.0, 0.0, 0.0
     for k in range(1, count - 1):
@@ -91,7 +90,7 @@ def _area(polygon, count):
     return 0.5 * np.sqrt(x * x + y * y + z * z)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _cell_range(polygon, count, axis, origin, size):
     """Return the first and the last cell of a polygon along an axis."""
     low, high = polygon[0, axis], polygon[0, axis]
@@ -157,7 +156,7 @@ def fragments(
     return _all_fragments(np.ascontiguousarray(corners), origin, size, box[0], box[1])
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _emit(polygon, count, size, side, face, output, total):
     """Append a polygon to the output as a fan of triangles; return the output and its length."""
     if count < 3 or _area(polygon, count) <= MIN_FRAGMENT_SHARE * size * size:
@@ -172,7 +171,7 @@ def _emit(polygon, count, size, side, face, output, total):
     return output, total
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _layer_sides(known, face, axis, i, j, first, last, polygon, count, spare, out):
     """Return the side of each layer of cells from `first` to `last` along an axis, int64 (last - first + 1,).
 
@@ -206,7 +205,7 @@ def _layer_sides(known, face, axis, i, j, first, last, polygon, count, spare, ou
     return sides
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _run(sides, start):
     """Return where the run of layers of one side that begins at `start` ends, and its side.
 

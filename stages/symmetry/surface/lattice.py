@@ -6,7 +6,6 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 
 BITS_PER_AXIS = 21
 """Bits of a packed key for the position along one axis."""
@@ -31,14 +30,14 @@ def cell_keys(cells: np.ndarray) -> np.ndarray:
     return keys
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def cell_of(point, origin, size, cell):
     """Write the lattice cell of a point into `cell` int64 (3,)."""
     for axis in range(3):
         cell[axis] = int(np.floor((point[axis] - origin[axis]) / size))
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def cell_index(keys, i, j, k):
     """Return the index of cell (i, j, k) among ascending `keys`, or -1 if the cell is empty."""
     if min(i, j, k) < 0:
@@ -69,7 +68,7 @@ def neighbours_of(cells, keys):
     return neighbours
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def doubled(array):
     """Return an array of twice the length that begins with the given one."""
     larger = np.empty((2 * len(array), *array.shape[1:]), dtype=array.dtype)

@@ -12,7 +12,6 @@ from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.components import connected_components
 from stages.shape.geometry.pose import invert, transform_points
 from stages.shape.geometry.triangles import triangle_areas
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.symmetry.matching.cell_lookup import is_among
 from stages.symmetry.surface.clip import cut_triangles, fragments
 from stages.symmetry.surface.grid import SurfaceGrid
@@ -131,7 +130,7 @@ def _near_blocks(corners, pose, low, size, blocks):
     return near[:total].copy()
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _any_block(blocks, first, last):
     """Return whether any of `blocks` bool (i, j, k) from `first` to `last` is chosen."""
     for i in range(first[0], last[0] + 1):

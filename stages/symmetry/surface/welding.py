@@ -8,7 +8,6 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 
 HASH_MULTIPLIER = -7046029254386353131
 """An odd number of about half one bits, from the golden ratio: products differ in their high bits."""
@@ -188,7 +187,7 @@ def _stretch(points, chosen, box):
                 box[0, d], box[1, d] = min(box[0, d], points[corner, d]), max(box[1, d], points[corner, d])
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _before(one, other):
     """Return whether a point comes before another in lexicographic order."""
     for d in range(3):

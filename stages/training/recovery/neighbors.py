@@ -15,8 +15,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
-
 POINTS_PER_CELL = 2
 """Of the grid in which neighbours are searched."""
 
@@ -152,7 +150,7 @@ def _nearest_in_space(points, k):
     return nearest
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _nearest_of_cloud(points, k, nearest):
     """Search rings of cells around a point until the k-th nearest is nearer than any cell that is left."""
     n = len(points)

@@ -10,7 +10,6 @@ import numba
 import numpy as np
 
 from stages.shape.geometry.pose_kernels import apply_transform, squared_distance
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.kernels.membership import admitted
 from stages.variations.kernels.random_choice import random_below
 from stages.variations.kernels.structs import MAX_COMPONENT_CHOICES, N_BOUNDARY
@@ -21,7 +20,7 @@ KEEP_PROBABILITY = 0.7
 """Probability that a component stays in a random choice."""
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def find_components(starts, ends, image_of, component, stack):
     """Number the components of B without the images of the boundary in `component`, -1 for an image; return their
     number.
@@ -50,7 +49,7 @@ def find_components(starts, ends, image_of, component, stack):
     return components
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def choose_components(rng, kit, a, b, ws, components):
     """Choose which components stay, in `ws.keep`; return False where no choice is admitted.
 
@@ -84,7 +83,7 @@ def choose_components(rng, kit, a, b, ws, components):
     return False
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _possible_neighbours(tolerance, a, b, ws, components):
     """Return what each boundary part may have around it: `(firsts, lasts, near, owner, touched)`.
 

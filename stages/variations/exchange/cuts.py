@@ -5,7 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.kernels.operators import GROWN_CUT, JOINT_CUT
 from stages.variations.kernels.outcomes import Outcome
 from stages.variations.kernels.random_choice import random_below
@@ -43,7 +42,7 @@ def cut(rng, a, b, ws, operator, slack):
     return Outcome.OK
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def put_boundary(a, ws):
     """Write the parts of the piece with a neighbour outside into `ws.boundary`; return their number, also in the
     counts.
@@ -60,7 +59,7 @@ def put_boundary(a, ws):
     return count
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _cut(rng, shape, other, ws, operator, slack):
     """Cut a random connected piece out of a shape into `ws.inside`; return its number of parts.
 
@@ -75,7 +74,7 @@ def _cut(rng, shape, other, ws, operator, slack):
     return _cut_by_planes(rng, shape, ws.inside, ws.component, ws.stack, seed, slack)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _grow(rng, starts, ends, inside, stack, seed):
     """Grow a piece of a random number of parts from `seed`, a random adjacent part at a time."""
     n = len(starts) - 1
@@ -98,7 +97,7 @@ def _grow(rng, starts, ends, inside, stack, seed):
     return size
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _cut_at_joints(rng, shape, other_starts, inside, stack, seed):
     """Cut a piece that ends at parts of one or two types which the other shape has too, by its `other_starts` of types.
 
@@ -135,7 +134,7 @@ def _cut_at_joints(rng, shape, other_starts, inside, stack, seed):
     return size
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _cut_by_planes(rng, shape, inside, within, stack, seed, slack):
     """Cut what a half-space, a slab or a box holds, as far as it is connected to `seed`; `within` and `stack` are
     scratch.
@@ -171,13 +170,13 @@ def _cut_by_planes(rng, shape, inside, within, stack, seed, slack):
     return connected(shape.starts, shape.ends, within, inside, stack, seed)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _along(axis, point):
     """Return a point's coordinate along an axis."""
     return axis[0] * point[0] + axis[1] * point[1] + axis[2] * point[2]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _draw_axes(rng, axes):
     """Draw three random perpendicular axes, as rows."""
     for i in range(2):
@@ -197,7 +196,7 @@ def _draw_axes(rng, axes):
     axes[2, 2] = axes[0, 0] * axes[1, 1] - axes[0, 1] * axes[1, 0]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def connected(starts, ends, within, inside, stack, seed):
     """Mark the parts that are connected to `seed` by parts `within`; return their number."""
     size, count = 0, 1

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numba
 
 from stages.shape.geometry.pose_kernels import apply_transform, looks_same, rotate, squared_distance
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.exchange.components import choose_components, find_components
 from stages.variations.kernels.outcomes import Outcome
 from stages.variations.kernels.structs import N_BOUNDARY, N_EDGES, N_PARTS, N_UNKNOWNS, TRY_NUMBER
@@ -49,7 +48,7 @@ def join(rng, kit, a, b, ws, min_parts, max_parts):
     return Outcome.OK
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _check_room(a, b, ws, min_parts, max_parts):
     """Return TOO_SMALL or TOO_LARGE where the variant is that however many parts of the piece and of B are merged."""
     piece, kept = 0, 0
@@ -66,7 +65,7 @@ def _check_room(a, b, ws, min_parts, max_parts):
     return Outcome.OK
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _put_piece(a, b, ws):
     """Begin the variant with the parts of the piece, moved; boundary parts are of B too. Return their number."""
     ws.from_a[: len(a.types)] = -1
@@ -86,7 +85,7 @@ def _put_piece(a, b, ws):
     return v
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _put_rest(kit, a, b, ws, piece):
     """Add the parts of B that stay to the `piece` parts of the variant; return how many parts it has then.
 
@@ -115,7 +114,7 @@ def _put_rest(kit, a, b, ws, piece):
     return v
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _part_of_piece(by_type, first, last, from_a, translations, point, tolerance):
     """Return which of the parts by_type[first:last] of A is in the variant at a point, by its number there, or -1."""
     for k in range(first, last):

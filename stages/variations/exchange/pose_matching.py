@@ -6,13 +6,12 @@ import numba
 import numpy as np
 
 from stages.shape.geometry.pose_kernels import apply_transform, looks_same, part_at, rotate
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.kernels.outcomes import Outcome
 from stages.variations.kernels.random_choice import random_below
 from stages.variations.kernels.structs import MIN_UPRIGHT_COSINE, N_BOUNDARY, N_PARTS
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _transform_between(rotation, translation, symmetry, onto_rotation, onto_translation, out):
     """Write the transform that takes a part's pose, by one of its symmetries, to another pose into `out`."""
     for i in range(3):
@@ -29,7 +28,7 @@ def _transform_between(rotation, translation, symmetry, onto_rotation, onto_tran
             out[3, i] -= out[i, j] * translation[j]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _fit_transform(kit, a, b, ws):
     """Refit the docking transform to the whole boundary by least squares, without changing handedness (strings §4).
 
@@ -75,7 +74,7 @@ def _fit_transform(kit, a, b, ws):
             ws.transform[3, i] -= ws.transform[i, j] * centre_a[j]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def match_poses(rng, kit, a, b, same_shape, ws):
     """Find the boundary of the piece in B by the poses of its parts modulo symmetry, from the rarest type on.
 

@@ -6,7 +6,6 @@ import numba
 import numpy as np
 
 from stages.shape.geometry.pose_kernels import apply_transform, looks_same, part_at
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.exchange.cuts import connected, put_boundary
 from stages.variations.kernels.outcomes import Outcome
 from stages.variations.kernels.random_choice import random_below
@@ -56,7 +55,7 @@ def insert_or_remove_unit(rng, kit, a, ws):
     return Outcome.OK
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _another_of_its_row(rng, kit, a, seed, row):
     """Return a part of the type of `seed` that looks the same way and lies along one of its axes, or -1.
 
@@ -80,6 +79,6 @@ def _another_of_its_row(rng, kit, a, seed, row):
     return row[random_below(rng, count)] if count > 0 else -1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _dot(p, q):
     return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]

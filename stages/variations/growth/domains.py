@@ -8,7 +8,6 @@ import numpy as np
 from stages.shape.geometry.contact_lookup import FORBIDDEN_CONTACT, NO_CONTACT
 from stages.shape.geometry.hash_tables import mix
 from stages.shape.geometry.pose_kernels import looks_same, squared_distance
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.growth.placements import (
     LINK_FORBIDS,
     add_link,
@@ -40,7 +39,7 @@ MAX_SEED_TURNS = 16
 """Symmetric images of the first part that are tried: round parts have hundreds, all alike."""
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def place(problem, state, placement):
     """Place a part, find its candidates, and prune what it forbids; return OK, CONFLICT or NO_ROOM."""
     part, kit, contacts = state.counts[N_GROWN_PARTS], problem.kit, problem.contacts
@@ -98,7 +97,7 @@ def _queue_blocked(blockers, newly_blocked, counts, placement):
         counts[N_NEWLY_BLOCKED] += 1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _find_candidates(problem, state, part):
     """Make the candidates of a part: turned patterns of its type with each part that it touches among their members.
 
@@ -176,7 +175,7 @@ def _turn(rotation, turn, other, out):
             out[i, j] = x
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _add_candidate(problem, state, part, pattern, turn, touching):
     """Add a turned pattern to a part's candidates where all its members may be; return False where there is no room."""
     if state.counts[N_CANDIDATES] + 1 >= len(state.member_starts):
@@ -246,7 +245,7 @@ def _add_candidate(problem, state, part, pattern, turn, touching):
     return True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _within(boxes, low, high, part_type, rotation, translation):
     """Return whether a part at a pose lies between two corners."""
     for i in range(3):
@@ -267,7 +266,7 @@ def _has(member_starts, members, candidate, placement):
     return k < end
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _keep_only_with(state, part, placement):
     """Prune the candidates of a part that lack a placement; return False where its domain becomes empty."""
     candidate, count = state.first_candidates[part], state.domain_sizes[part]
@@ -281,7 +280,7 @@ def _keep_only_with(state, part, placement):
     return True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def prune(state, candidate):
     """Remove a candidate from its part's domain; return False where the domain becomes empty."""
     part = state.candidate_parts[candidate]
@@ -303,7 +302,7 @@ def prune(state, candidate):
     return state.domain_sizes[part] > 0
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def assign(state, candidate):
     """Make a candidate the only one of its part."""
     part = state.candidate_parts[candidate]
@@ -314,7 +313,7 @@ def assign(state, candidate):
             prune(state, other)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def propagate(problem, state):
     """Prune what cannot be and place what must be, until nothing follows; return OK, CONFLICT or NO_ROOM."""
     counts, newly_blocked, dirty = state.counts, state.newly_blocked, state.changed
@@ -337,7 +336,7 @@ def propagate(problem, state):
             return outcome
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _prune_all_with(state, placement):
     """Prune every candidate that has a blocked placement; return False where a domain becomes empty."""
     if state.placed_parts[placement] >= 0:
@@ -360,7 +359,7 @@ def _prune_all_with(state, placement):
     return True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _forced(state, part):
     """Return a placement that all candidates of a part have and where no part is placed, or -1."""
     candidate, in_domain, count = state.first_candidates[part], state.in_domain, state.domain_sizes[part]
@@ -378,7 +377,7 @@ def _forced(state, part):
     return -1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def undo(state, length):
     """Undo everything since the trail had that length."""
     first_links, link_parts, link_next = state.first_links, state.link_parts, state.link_next
@@ -405,7 +404,7 @@ def undo(state, length):
         state.changed[part] = False
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _take_off(state, part):
     """Remove the newest part from its placement, with its links and candidates."""
     first_links, link_parts, link_next = state.first_links, state.link_parts, state.link_next

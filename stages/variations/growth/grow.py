@@ -10,7 +10,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.growth.domains import assign, place, propagate, prune, undo
 from stages.variations.growth.placements import add_placement
 from stages.variations.growth.state import FREE_LINK, N_CONFLICTS, N_DECISIONS, N_GROWN_PARTS, TRAIL_LENGTH
@@ -70,7 +69,7 @@ def grow(rng, problem, state):
         outcome = propagate(problem, state)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _most_constrained(state):
     """Return the part with the fewest candidates, at least two, the oldest of equals; or -1."""
     best, smallest, sizes = -1, 1 << 30, state.domain_sizes
@@ -80,7 +79,7 @@ def _most_constrained(state):
     return best
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _draw(rng, problem, state, part):
     """Draw one of a part's candidates.
 

@@ -15,7 +15,6 @@ from stages.shape.geometry.contact_lookup import (
 )
 from stages.shape.geometry.hash_tables import look_up, mix
 from stages.shape.geometry.pose_kernels import same_rotation, squared_distance
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.growth.state import FREE_LINK, N_GROWN_PARTS, N_LINKS, N_PLACEMENTS, WORK_DONE
 
 LINK_FORBIDS = -1
@@ -26,7 +25,7 @@ BUCKET_TOLERANCES = 8.0
 """Side of the buckets in pose tolerances."""
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _bucket(x, y, z, buckets):
     key = mix(np.uint64(np.int64(x)) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(1))
     key = mix(key + np.uint64(np.int64(y)) * np.uint64(0xBF58476D1CE4E5B9))
@@ -34,7 +33,7 @@ def _bucket(x, y, z, buckets):
     return np.int64(key & np.uint64(buckets - 1))
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def find_placement(
     symmetry_starts, symmetries, tolerance, slack, placement_types, placement_rotations, placement_translations,
     buckets, bucket_next, part_type, rotation, translation,
@@ -60,7 +59,7 @@ def find_placement(
     return -1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def add_placement(kit, contacts, state, part_type, rotation, translation):
     """Add a placement of a type at a pose, linked to the parts that forbid or touch it; return it, or NO_PLACEMENT."""
     placement = state.counts[N_PLACEMENTS]
@@ -105,7 +104,7 @@ def add_placement(kit, contacts, state, part_type, rotation, translation):
     return placement
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def relation(kit, contacts, state, a, b):
     """Return the contact of two placements whose boxes meet: NO_CONTACT, FORBIDDEN_CONTACT or a packed pair of labels.
 
@@ -136,7 +135,7 @@ def boxes_meet(boxes, a, b, slack):
     )
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def add_link(state, placement, part, count):
     """Link a placement to a part; return False where there is no room."""
     link = state.counts[FREE_LINK]

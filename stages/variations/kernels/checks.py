@@ -13,7 +13,6 @@ from stages.shape.geometry.contact_lookup import (
     quantize_pose,
 )
 from stages.shape.geometry.hash_tables import look_up
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.kernels.membership import admitted, neighbourhood_key, recalled
 from stages.variations.kernels.outcomes import Outcome
 from stages.variations.kernels.structs import N_EDGES, N_PARTS, N_UNKNOWNS, TRY_NUMBER
@@ -29,7 +28,7 @@ def _boxes_apart(boxes, i, j, slack):
     )
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _overlaps(boxes, count, origin, between_sides, slack, pairs):
     """Write the pairs i < j of overlapping boxes to `pairs`; return their number, or -1 if `pairs` is too short.
 
@@ -51,7 +50,7 @@ def _overlaps(boxes, count, origin, between_sides, slack, pairs):
     return filled
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _contact(kit, contacts, ws, i, j, quanta):
     """Return the answer for a pair: NO_CONTACT, FORBIDDEN_CONTACT, UNKNOWN_CONTACT or a packed pair of labels."""
     reach, quantum = kit.reach[ws.types[j]], kit.limits[2]
@@ -59,7 +58,7 @@ def _contact(kit, contacts, ws, i, j, quanta):
     return look_up(contacts.keys, contacts.values, contact_key(ws.types[i], ws.types[j], quanta))
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _must_ask(ws, i, j):
     """List a pair whose answer is missing; return False where there is no room."""
     if ws.counts[N_UNKNOWNS] == len(ws.unknown):
@@ -70,7 +69,7 @@ def _must_ask(ws, i, j):
     return True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _add_contacts(kit, contacts, ws, pairs):
     """Add the contacts among the first `pairs` rows of `ws.near` to the edges; return an outcome as `connect`."""
     quanta = np.empty(12, dtype=np.int64)
@@ -91,7 +90,7 @@ def _add_contacts(kit, contacts, ws, pairs):
     return Outcome.UNKNOWN if ws.counts[N_UNKNOWNS] > 0 else Outcome.OK
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _grammar_holds(kit, ws, open_pairs):
     """Return whether every part has an admitted multiset of neighbour types.
 
@@ -117,7 +116,7 @@ def _grammar_holds(kit, ws, open_pairs):
     return True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _neighbours_admitted(kit, ws, part):
     near = np.empty(ws.counts[N_PARTS], dtype=np.int64)
     count = 0

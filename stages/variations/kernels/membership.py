@@ -11,7 +11,6 @@ import numpy as np
 from stages.shape.geometry.contact_lookup import UNKNOWN_CONTACT
 from stages.shape.geometry.hash_tables import look_up, mix
 from stages.shape.graphs.grammar_patterns import fits
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 
 
 @numba.njit(cache=True, inline="always")
@@ -20,7 +19,7 @@ def neighbourhood_key(kit, part_type):
     return mix(kit.weights[part_type])
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def recalled(rules, key):
     """Return 1 or 0 where the verdict of this key is known, else MISSING_KEY."""
     verdict = look_up(rules.keys, rules.verdicts, key)
@@ -43,7 +42,7 @@ def admitted(kit, part_type, near, count):
     return verdict == 1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _remember(rules, key, verdict):
     """Keep a verdict while there is room; verdicts never change, so this changes no answer."""
     if 2 * rules.filled[0] >= len(rules.keys) or key == np.uint64(0):

@@ -14,8 +14,6 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
-
 
 class Groups(NamedTuple):
     """The symmetry groups of part types."""
@@ -133,13 +131,13 @@ def locate(groups, dockings, shape):
     return near, far
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _product(products, row, order, first, second):
     """Return the number of the product of two symmetries of a type."""
     return products[row + first * (order + 1) + second]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _enter(visited, bit):
     """Mark a triple as visited; return whether it was new."""
     mask = np.uint64(1) << np.uint64(bit & 63)
@@ -149,7 +147,7 @@ def _enter(visited, bit):
     return True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _rarest_first(joints, target):
     """Return the contacts of a shape, each once, int64 (k,), those with the docking rarest in the exemplars first."""
     chosen, times = np.empty(len(joints.ends), dtype=np.int64), np.empty(len(joints.ends), dtype=np.int64)
@@ -164,7 +162,7 @@ def _rarest_first(joints, target):
     return chosen[np.argsort(times[:count], kind="mergesort")]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _seeds(groups, dockings, types, handed, tails, joints, target, budget):
     """Return the ways to lay a contact of a shape on one of an exemplar, rarest dockings first, at most `budget`.
 

@@ -16,7 +16,6 @@ import numpy.typing as npt
 
 from stages.shape.arrays import Float32Array, FloatArray, IntArray
 from stages.shape.geometry.triangles import triangle_areas
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.shape.kit import Assembly, Kit
 
 SEEDS_PER_SHAPE = 24
@@ -169,7 +168,7 @@ def _shares(tables, shape, others, least, enough):
     return shares
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _best_of_seed(tables, shape, other, order, first, misses, best, stop, alignment):
     """Return the largest coinciding area above `best` under an alignment of the `first` seed in this order; else
     `best`.
@@ -197,7 +196,7 @@ def _best_of_seed(tables, shape, other, order, first, misses, best, stop, alignm
     return best
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _met(tables, shape, other, best, alignment):
     """Return the area of a shape that coincides with the other's under an alignment; 0 as soon as it cannot exceed
     `best`.
@@ -212,7 +211,7 @@ def _met(tables, shape, other, best, alignment):
     return left
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _lay_upon(tables, part, target, symmetry, alignment):
     """Write the alignment (3, 4) that takes a part to another of its type, turned by a symmetry; return False if it
     tilts.
@@ -239,7 +238,7 @@ def _lay_upon(tables, part, target, symmetry, alignment):
     return True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _meets(tables, alignment, part, other, kind):
     """Return whether a part, moved, has the centroid of a part of its type in the other shape."""
     a, b, c = tables.centres[part, 0], tables.centres[part, 1], tables.centres[part, 2]

@@ -16,7 +16,6 @@ import numpy as np
 
 from stages.shape.geometry.hash_tables import contains, mix, with_key
 from stages.shape.geometry.pose import invert
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.shape.kit import Assembly, Kit
 from stages.variations.kernels.structs import MIN_UPRIGHT_COSINE
 from stages.variations.substructures.growing_arrays import grown
@@ -175,7 +174,7 @@ def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same, ma
     )
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _spread(n, m):
     """Return all pairs (v, w) of v < n and w < m, int64 (n * m, 2), each far from those before it."""
     total = n * m
@@ -189,14 +188,14 @@ def _spread(n, m):
     return pairs
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _divisor(i, j):
     while j > 0:
         i, j = j, i % j
     return i
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _lay(here, there, turn, shift, turns, starts, tolerance, image, back, queue, visited):
     """Lay part on part and mark the triples that give this alignment; return numbers of matched parts and triples."""
     count, triples = 0, 0
@@ -232,7 +231,7 @@ def _lay(here, there, turn, shift, turns, starts, tolerance, image, back, queue,
     return count, triples
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _moved(turn, shift, place):
     """Return the coordinates of a place under an alignment."""
     return (
@@ -242,7 +241,7 @@ def _moved(turn, shift, place):
     )
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _join_across(a, b, here, there, turn, shift, image, back, queue, matched, leader):
     """Make each unmatched node a region, those of the giver counted on, and join regions whose parts take one place.
 
@@ -272,7 +271,7 @@ def _join_across(a, b, here, there, turn, shift, image, back, queue, matched, le
                     _join(leader, near, n + other)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _is_one(a, b, image, queue, matched, leader, line):
     """Return whether everything unmatched is one region; otherwise `leader` says what is.
 
@@ -309,7 +308,7 @@ def _is_one(a, b, image, queue, matched, leader, line):
     return regions <= 1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _root(leader, node):
     while leader[node] != node:
         leader[node] = leader[leader[node]]
@@ -317,7 +316,7 @@ def _root(leader, node):
     return node
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _join(leader, i, j):
     if leader[i] < 0 or leader[j] < 0:
         return
@@ -325,7 +324,7 @@ def _join(leader, i, j):
     leader[max(i, j)] = min(i, j)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _mark(graph, node, offset, image, leader, keys, met, key):
     """Add a matched part to the keys of the regions that it bounds."""
     for d in range(graph.starts[node], graph.starts[node + 1]):

@@ -10,7 +10,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.kernels.membership import admitted
 from stages.variations.kernels.random_choice import random_below
 
@@ -43,7 +42,7 @@ def make_consistent(rng, kit, base, giver, types, giver_types, regions, image, c
     return False
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _misfits(kit, base, giver, types, giver_types, regions, n, x, y, chosen, near, adjacent):
     """Return the number of regions next to a part of the base that coincides, or 0 where the grammar admits its
     neighbours.

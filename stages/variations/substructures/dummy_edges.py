@@ -11,12 +11,11 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.substructures.growing_arrays import grown
 from stages.variations.substructures.partial_symmetry import DEFECTS, ROWS
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def is_alike(graph, d, e):
     """Return whether the darts start from nodes of one type with equal numbers of docking sites."""
     v, w = graph.tails[d], graph.tails[e]
@@ -24,7 +23,7 @@ def is_alike(graph, d, e):
     return graph.types[v] == graph.types[w] and starts[v + 1] - starts[v] == starts[w + 1] - starts[w]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def pass_over(graph, over):
     """Return the dummy edges that can continue the current symmetry, as `go_on` takes them, int64 (k, 4)."""
     passes = np.empty((64, 4), dtype=np.int64)
@@ -56,13 +55,13 @@ def pass_over(graph, over):
     return passes[:count]
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _is_hole(graph, dart, image):
     """Return whether a dart leads to an unmatched node."""
     return image[graph.tails[graph.twins[dart]]] < 0
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _contour(graph, dart, step, image, out):
     """Write the darts that point back from unmatched nodes along the contour of the hole behind `dart`; return their
     number.

@@ -8,7 +8,6 @@ import numba
 import numpy as np
 
 from stages.shape.geometry.hash_tables import contains, mix, with_key
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.substructures.dummy_edges import is_alike, pass_over
 from stages.variations.substructures.growing_arrays import grown
 from stages.variations.substructures.ordered_graph import OrderedGraph
@@ -137,7 +136,7 @@ def _enumerate(graph, darts, same, by_docking, violations):
     return pairs[: filled[FOUND]].copy(), starts[: filled[LISTED] + 1, 0].copy(), plain, meetings, work, is_whole
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _wait(waiting, tail, d, e, passed):
     """Append a symmetry to those that wait to be continued over dummy edges, if there is room; return these and their
     number.
@@ -150,7 +149,7 @@ def _wait(waiting, tail, d, e, passed):
     return waiting, tail + 1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _visit(graph, darts, same, over, visited):
     """Mark all pairs of darts from which the current symmetry would be found again; return their number."""
     count = 0
@@ -162,7 +161,7 @@ def _visit(graph, darts, same, over, visited):
     return count
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _emit(darts, same, over, pairs, starts, listed, filled):
     """Add the new regions of the current symmetry, by a hash of their boundaries; return the number of regions, new or
     not.

@@ -16,7 +16,6 @@ import numba
 import numpy as np
 
 from stages.shape.geometry.hash_tables import mix
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.substructures.ordered_graph import OrderedGraph
 
 CONFLICTS, DEFECTS, MATCHED, ROWS, WORK = range(5)
@@ -52,7 +51,7 @@ def side_by_side(a: OrderedGraph, b: OrderedGraph) -> OrderedGraph:
     )
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def overlay(nodes, darts):
     """Return room for the partial symmetries of two graphs with `nodes` nodes and `darts` darts."""
     return Overlay(
@@ -68,20 +67,20 @@ def overlay(nodes, darts):
     )
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def pair_hash(x, y):
     """Return a hash of a pair of darts, or of one and -1."""
     return mix(np.uint64(x + 1) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(y + 2))
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def agree(graph, d, e, by_docking):
     """Return whether the edges of two darts are of one kind, as far as dockings tell."""
     labels, twins = graph.labels, graph.twins
     return not by_docking or (labels[d] == labels[e] and labels[twins[d]] == labels[twins[e]])
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _match(graph, d, e, side, place, over):
     """Lay the tail of dart e on that of d, dart on dart in order; return whether that was possible.
 
@@ -119,7 +118,7 @@ def _match(graph, d, e, side, place, over):
     return True
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def lay_over(graph, d, e, by_docking, passed, over):
     """Lay dart e of the second graph on dart d of the first, and all that follows; return the hash of the symmetry, or
     0.
@@ -137,7 +136,7 @@ def lay_over(graph, d, e, by_docking, passed, over):
     return total
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def go_on(graph, dummy, by_docking, over):
     """Continue the current symmetry over one dummy edge of the dual (§4.4); return by how much its hash grows, or 0.
 
@@ -148,7 +147,7 @@ def go_on(graph, dummy, by_docking, over):
     return more + pair_hash(dummy[0], dummy[3]) if more != 0 and dummy[2] >= 0 else more
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _extend(graph, d, e, side, place, by_docking, over):
     """Match the tails of two darts and all that they lead to; return a sum of hashes of the pairs, 0 if none match."""
     begin, total = over.counts[MATCHED], np.uint64(0)
@@ -170,7 +169,7 @@ def _extend(graph, d, e, side, place, by_docking, over):
     return total
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def lift(graph, over, left):
     """Remove all matched pairs of parts but the first `left`."""
     for k in range(left, over.counts[MATCHED]):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 from stages.variations.substructures.partial_symmetry import MATCHED, ROWS, WORK, agree
 
 LEADER, FIRST, LAST, LIVE = range(4)
@@ -14,7 +13,7 @@ FROM, AFTER, REACHED = range(3)
 """Columns of `marks`."""
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def region_of(lines, row):
     """Return the first row of a row's region."""
     while lines[row, LEADER] != row:
@@ -23,7 +22,7 @@ def region_of(lines, row):
     return row
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def find_regions(graph, by_docking, over):
     """Find the boundary of the current symmetry, `rows`, and which rows are of one unmatched region.
 
@@ -63,7 +62,7 @@ def find_regions(graph, by_docking, over):
                 row_of[x] = -1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _find_rows(graph, by_docking, over):
     count, partner, rows = 0, over.partner, over.rows
     for k in range(over.counts[MATCHED]):
@@ -89,7 +88,7 @@ def _find_rows(graph, by_docking, over):
     over.counts[ROWS] = count
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _begin(graph, over):
     """Reach what the rows lead to; return how many nodes were reached."""
     reached, rows, row_of, lines = 0, over.rows, over.row_of, over.lines
@@ -109,7 +108,7 @@ def _begin(graph, over):
     return reached
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _reach(node, row, reached, lines, marks):
     """Reach a node from a row's region: it waits there, or joins two regions; return how many were reached."""
     if marks[node, FROM] >= 0:
@@ -127,7 +126,7 @@ def _reach(node, row, reached, lines, marks):
     return reached + 1
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _join(i, j, lines, marks):
     """Make one region of two, and one line of what waits in them."""
     i, j = region_of(lines, i), region_of(lines, j)

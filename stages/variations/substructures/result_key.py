@@ -6,7 +6,6 @@ import numba
 import numpy as np
 
 from stages.shape.geometry.hash_tables import mix
-from stages.shape.kernel_options import CALLED_BY_KERNELS
 
 GOLDEN_MULTIPLIER, ODD_OFFSET = np.uint64(0x9E3779B97F4A7C15), np.uint64(0x7F4A7C15)
 TYPE_OFFSET = np.uint64(0x51ED270B)
@@ -59,7 +58,7 @@ def result_key(base, giver, taken, piece, boundary):
     return refined(colours, edges[:filled], labels)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def _beyond(base, giver, dart, place, source):
     """Return the node of the result that the giver's dart leads to, or -1."""
     ahead = giver.twins[dart]
@@ -104,7 +103,7 @@ def swap_key(base, giver, taken, piece, image):
     return refined(colours, edges[:filled], labels)
 
 
-@numba.njit(cache=True, **CALLED_BY_KERNELS)
+@numba.njit(cache=True)
 def refined(colours, edges, labels):
     """Return the hash of a graph by colour refinement, as `graph_key` does, from its edges in both directions."""
     classes = 0
