@@ -282,7 +282,7 @@ def test_shipped_models_are_better_than_the_base_shape(program: str, kind: str) 
 def test_command_reports_mistakes_and_refused_inputs(tmp_path: Path) -> None:
     np.save(tmp_path / "one.npy", np.zeros((1, 3)))
     for arguments, code, message in (
-        ([tmp_path / "none.ply"], 2, "there is no file"),
+        ([tmp_path / "none.ply"], 2, "no such file"),
         ([tmp_path, "--program", "chari"], 2, "did you mean chair"),
         ([tmp_path, "--program", PROGRAM], 1, "has 1 point"),
     ):
