@@ -48,7 +48,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> list[KitConfig]:
         configs.append(config)
         return resolution_of(90, True)
 
-    def read(_: Path, segmentation: str, __: ReadLimits) -> Model:
+    def read(_: Path, segmentation: str, *_settings: Any) -> Model:
         assert segmentation == "sections"
         return models_of(CHAIN, [chain(5)])[0]
 
