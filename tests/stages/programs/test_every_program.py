@@ -93,7 +93,7 @@ def test_random_toys_are_closed_and_in_one_piece(name: str) -> None:
 @pytest.mark.parametrize("name", program_names())
 def test_many_random_shapes_are_closed_and_in_one_piece(name: str, off_grid: bool) -> None:
     program = find_program(name)
-    check(program, random_values(program, 100, off_grid))
+    check(program, random_values(program, 200, off_grid))
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -76,6 +76,9 @@ class TestRepeatedPieces:
         area = sum(len(piece.poses) * piece.triangles.area for piece in pieces_of_wall())
         assert area == pytest.approx(2 * (6.2 * 2.4 - 2.5) + 0.3 * (2 * 8.6 + 15), rel=1e-6)
 
+    def test_surface_without_repetition_stays_whole(self) -> None:
+        assert copy_counts(box((0, 0, 0), (3, 2, 1))) == [1]
+
 
 class TestCutSurface:
     def test_mesh_in_one_piece_is_cut_by_its_repetitions(self) -> None:
@@ -97,7 +100,7 @@ class TestCutSurface:
         assert np.bincount([placement.surface for placement in parts.placements]).max() == 5
         assert parts.warnings == warnings
 
-    def test_mesh_without_repetition_stays_whole_and_keeps_its_objects(self) -> None:
+    def test_mesh_without_repetition_keeps_its_objects(self) -> None:
         source, why, _ = pick_segmentation(one_object(box((0, 0, 0), (3, 2, 1))))
         assert source == "objects"
         assert "nothing tells parts apart" in why
