@@ -133,7 +133,8 @@ def _report(future: Future[Report | None]) -> Report | None:
     from distributed import KilledWorker
 
     try:
-        return future.result(timeout=_ANSWER_SECONDS)
+        report: Report | None = future.result(timeout=_ANSWER_SECONDS)
+        return report
     except (CancelledError, KilledWorker, OSError):
         return None
     except Exception as error:  # anything before the shard begins, such as a missing module

@@ -120,7 +120,8 @@ def nearest_in_train(pairs: Sequence[tuple[FloatArray, FloatArray]], train: Sequ
 
 def _centred(cloud: FloatArray) -> FloatArray:
     points = np.asarray(cloud, dtype=np.float64)
-    return points - points.mean(axis=0)
+    centred: FloatArray = points - points.mean(axis=0)
+    return centred
 
 
 def aligned_distance(first: FloatArray, second: FloatArray, steps: int) -> float:

@@ -54,7 +54,8 @@ class DatasetRun:
     def manifest(self) -> Mapping[str, Any]:
         """The manifest of the finished dataset; empty without one."""
         path = self.folder / MANIFEST
-        return json.loads(path.read_bytes()) if path.is_file() else {}
+        manifest: dict[str, Any] = json.loads(path.read_bytes()) if path.is_file() else {}
+        return manifest
 
     @property
     def samples(self) -> int:

@@ -100,7 +100,8 @@ def _figures(
 
 
 def _subset(clouds: FloatArray, count: int) -> FloatArray:
-    return clouds[np.sort(np.random.default_rng(0).permutation(len(clouds))[:count])]
+    chosen: FloatArray = clouds[np.sort(np.random.default_rng(0).permutation(len(clouds))[:count])]
+    return chosen
 
 
 def _nearest_by_emd(

@@ -67,7 +67,8 @@ def normalized_clouds(clouds: FloatArray) -> FloatArray:
     low, high = clouds.min(axis=1, keepdims=True), clouds.max(axis=1, keepdims=True)
     centred = clouds - (low + high) / 2
     radius = np.linalg.norm(centred, axis=2).max(axis=1)
-    return centred / np.maximum(radius, np.finfo(np.float64).tiny)[:, None, None]
+    result: FloatArray = centred / np.maximum(radius, np.finfo(np.float64).tiny)[:, None, None]
+    return result
 
 
 def nearest_by_chamfer(
@@ -125,7 +126,8 @@ def _estimated_chamfer(clouds: FloatArray, trees: Sequence[cKDTree], pool: Threa
     squared = np.stack(list(pool.map(lambda tree: tree.query(nodes)[0].astype(np.float32) ** 2, trees)))
     chunks = np.array_split(clouds, -(-len(clouds) // CLOUDS_PER_PRODUCT))
     there = np.concatenate([_node_weights(chunk, low, step) @ squared.T for chunk in chunks])
-    return there + there.T
+    estimates: FloatArray = there + there.T
+    return estimates
 
 
 def _node_weights(clouds: FloatArray, low: FloatArray, step: FloatArray) -> FloatArray:
@@ -139,7 +141,8 @@ def _node_weights(clouds: FloatArray, low: FloatArray, step: FloatArray) -> Floa
         node = cell + corner
         share = np.where(corner, rest, 1 - rest).prod(axis=2)
         np.add.at(weights, (rows, np.ravel_multi_index(tuple(np.moveaxis(node, 2, 0)), (GRID_NODES,) * 3)), share)
-    return (weights / clouds.shape[1]).astype(np.float32)
+    result: FloatArray = (weights / clouds.shape[1]).astype(np.float32)
+    return result
 
 
 def nearest_in_matrix(distances: FloatArray, generated: int) -> tuple[Neighbours, Neighbours]:
@@ -207,4 +210,5 @@ def shape_descriptors(clouds: FloatArray) -> FloatArray:
     pairs = np.linalg.norm(clouds[:, first] - clouds[:, second], axis=2)
     radii = np.linalg.norm(clouds - clouds.mean(axis=1, keepdims=True), axis=2)
     values = [np.quantile(value, shares, axis=1).T for value in (pairs, radii, clouds[..., 1])]
-    return np.concatenate(values, axis=1)
+    descriptors: FloatArray = np.concatenate(values, axis=1)
+    return descriptors

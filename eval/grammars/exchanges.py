@@ -59,7 +59,8 @@ def _areas(kit: Kit, assembly: Assembly) -> FloatArray:
     """Return the share of the surface of each part, float64 (n,)."""
     corners = [kit.types[kind].vertices[kit.types[kind].faces] for kind in assembly.types.tolist()]
     areas = np.array([triangle_areas(part).sum() for part in corners])
-    return areas / areas.sum()
+    shares: FloatArray = areas / areas.sum()
+    return shares
 
 
 def _elementary(kit: Kit, assembly: Assembly, swaps: RegionSwaps, transform: int) -> Iterator[BoolArray]:

@@ -78,7 +78,8 @@ class Similarity:
     @property
     def worst(self) -> FloatArray:
         """The least matched probe, float64 (3,)."""
-        return self.probes[self.shares.argmin()]
+        probe: FloatArray = self.probes[self.shares.argmin()]
+        return probe
 
 
 def r_similarity(
@@ -206,11 +207,12 @@ class _Surface:
         offset = query - nearest["points"].numpy()
         along = (offset * normals).sum(axis=1)
         faces = self.face_normals[nearest["primitive_ids"].numpy()]
-        return np.asarray(
+        is_on: BoolArray = np.asarray(
             (np.abs(along - above) <= self.tolerance)
             & (np.linalg.norm(offset - along[:, None] * normals, axis=1) <= self.tolerance)
             & ((faces * normals).sum(axis=1) > np.cos(MAX_NORMAL_RADIANS))
         )
+        return is_on
 
     @cached_property
     def tree(self) -> Any:
@@ -362,7 +364,8 @@ def _by_corners(exemplar: _Surface, shape: _Surface, point: FloatArray, full: bo
 
 
 def _packed(kinds: np.ndarray) -> np.ndarray:
-    return (kinds[:, 0] * 2 + kinds[:, 1]) * 4 + kinds[:, 2]
+    packed: np.ndarray = (kinds[:, 0] * 2 + kinds[:, 1]) * 4 + kinds[:, 2]
+    return packed
 
 
 def _by_normals(exemplar: _Surface, shape: _Surface, probe: int, rng: np.random.Generator) -> FloatArray:
@@ -375,7 +378,8 @@ def _by_normals(exemplar: _Surface, shape: _Surface, probe: int, rng: np.random.
     turns[:, 0, 0] = turns[:, 1, 1] = np.cos(angle)
     turns[:, 1, 0], turns[:, 0, 1] = np.sin(angle), -np.sin(angle)
     turns[:, 2, 2] = turns[:, 3, 3] = 1.0
-    return (target @ turns @ np.linalg.inv(source)[:, None]).reshape(-1, 4, 4)
+    transforms: FloatArray = (target @ turns @ np.linalg.inv(source)[:, None]).reshape(-1, 4, 4)
+    return transforms
 
 
 def _normal_frames(points: FloatArray, normals: FloatArray) -> FloatArray:
@@ -415,7 +419,8 @@ def _share(target: _Surface, transform: FloatArray, source: _Surface, around: li
     points = source.points[members] @ transform[:3, :3].T + transform[:3, 3]
     is_on = target.lies_on(points, source.normals[members] @ transform[:3, :3].T)
     total = np.bincount(np.repeat(np.arange(len(sizes)), sizes), weights=is_on, minlength=len(sizes))
-    return np.where(sizes > 0, total / np.maximum(sizes, 1), 1.0)
+    shares: FloatArray = np.where(sizes > 0, total / np.maximum(sizes, 1), 1.0)
+    return shares
 
 
 @numba.njit(cache=True)

@@ -99,7 +99,8 @@ class PartSurfaces(nn.Module):
         """Return clouds (n, POINTS_PER_PART, 3) in coordinates of the cuboids."""
         start = self.template.expand(len(styles), -1, -1)
         condition = torch.cat([styles, features], dim=-1)[:, None].expand(-1, POINTS_PER_PART, -1)
-        return (start + self.offset(torch.cat([start, condition], dim=-1))).clamp(-0.5, 0.5)
+        clouds: Tensor = (start + self.offset(torch.cat([start, condition], dim=-1))).clamp(-0.5, 0.5)
+        return clouds
 
 
 def train_surfaces(parts: PartClouds, steps: int, seed: int) -> PartSurfaces:

@@ -64,7 +64,8 @@ def published_chamfer(first: FloatArray, second: FloatArray) -> float:
 
 def _in_sphere(points: FloatArray) -> FloatArray:
     centred = points - (points.min(axis=0) + points.max(axis=0)) / 2.0
-    return centred / np.linalg.norm(centred, axis=1).max()
+    inside: FloatArray = centred / np.linalg.norm(centred, axis=1).max()
+    return inside
 
 
 def held_out(

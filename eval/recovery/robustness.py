@@ -57,7 +57,8 @@ def _few(points: FloatArray, rng: np.random.Generator) -> FloatArray:
 def _thick(ink: BoolArray, _: np.random.Generator) -> BoolArray:
     from scipy.ndimage import binary_dilation
 
-    return binary_dilation(ink, np.ones((5, 5), np.bool_))
+    thick: BoolArray = binary_dilation(ink, np.ones((5, 5), np.bool_))
+    return thick
 
 
 def _broken(ink: BoolArray, rng: np.random.Generator) -> BoolArray:

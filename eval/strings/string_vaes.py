@@ -208,7 +208,8 @@ def model_rng(seed: int, trained: TrainedModel[TrainedStringVae], decision: str)
 
 
 def _codes(model: TrainedStringVae, string: str) -> list[int]:
-    return model.vocabulary.codes(string).tolist()
+    codes: list[int] = model.vocabulary.codes(string).tolist()
+    return codes
 
 
 def _graph(model: TrainedStringVae, string: str) -> str:

@@ -103,4 +103,5 @@ def _grouped(leaves: Sequence[PartNode], corners: FloatArray, max_groups: int, r
 def _common(low: FloatArray, high: FloatArray, others_low: FloatArray, others_high: FloatArray) -> FloatArray:
     """Return the volume (n, m) of the common box of each of n boxes and each of m others; flat boxes count as thin."""
     sizes = np.maximum(high[:, None], others_high) - np.minimum(low[:, None], others_low)
-    return np.prod(sizes + 1e-3 * float(np.abs(sizes).max()), axis=-1)
+    volumes: FloatArray = np.prod(sizes + 1e-3 * float(np.abs(sizes).max()), axis=-1)
+    return volumes

@@ -72,4 +72,5 @@ def _covered(boxes: FloatArray, up: int, tolerance: float) -> BoolArray:
         overlaps &= shared > MIN_OVERLAP_SHARE * np.minimum(width[:, None], width[None])
     max_gap = np.maximum(MAX_GAP_SHARE * (high[:, up] - low[:, up]), tolerance)[:, None]
     gaps = np.abs(low[None, :, up] - high[:, None, up])
-    return np.any([overlaps & (gaps <= max_gap), overlaps & (max_gap >= gaps.T)], axis=2)
+    covered: BoolArray = np.any([overlaps & (gaps <= max_gap), overlaps & (max_gap >= gaps.T)], axis=2)
+    return covered

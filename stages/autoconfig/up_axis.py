@@ -144,10 +144,12 @@ def _turns(identified: IdentifiedParts) -> list[int]:
                 angles = rotation_angle(images)
                 if angles.min() >= MIN_TURN_RADIANS:
                     counts += np.abs(_axis(images[angles.argmin(), :3, :3])) > MIN_AXIS_COSINE
-    return counts.tolist()
+    turns: list[int] = counts.tolist()
+    return turns
 
 
 def _axis(rotation: FloatArray) -> FloatArray:
     """Return the axis of a rotation (3, 3): its eigenvector of eigenvalue 1."""
     values, vectors = np.linalg.eigh((rotation + rotation.T) / 2)
-    return vectors[:, int(np.argmax(values))]
+    axis: FloatArray = vectors[:, int(np.argmax(values))]
+    return axis

@@ -35,7 +35,8 @@ def connected_pieces(assembly: Assembly) -> IntArray:
     order = np.argsort(-np.bincount(piece), kind="stable")
     rank = np.empty(len(order), dtype=np.int32)
     rank[order] = np.arange(len(order))
-    return rank[piece]
+    ranked: IntArray = rank[piece]
+    return ranked
 
 
 def hub_parts(assembly: Assembly) -> list[int]:
@@ -43,7 +44,8 @@ def hub_parts(assembly: Assembly) -> list[int]:
     degrees = np.bincount(assembly.edges.ravel(), minlength=len(assembly))
     is_small = len(assembly) <= MAX_PARTS_WITHOUT_HUBS
     limit = MAX_CONTACTS if is_small else min(MAX_CONTACTS, MAX_CONTACT_SHARE * len(assembly))
-    return np.flatnonzero(degrees > limit).tolist()
+    hubs: list[int] = np.flatnonzero(degrees > limit).tolist()
+    return hubs
 
 
 def refusals(

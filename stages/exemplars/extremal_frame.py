@@ -45,4 +45,5 @@ def _farthest(vertices: FloatArray, distances: FloatArray, slack: float, away_fr
     if np.linalg.norm(mean - away_from) >= 0.1 * distances.max():
         return mean
     ranked = np.lexsort(np.round(vertices[tied] / max(slack, 1e-300)).T[::-1])
-    return vertices[tied[ranked[0]]]
+    chosen: FloatArray = vertices[tied[ranked[0]]]
+    return chosen

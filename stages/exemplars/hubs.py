@@ -36,7 +36,8 @@ def with_touching_types(assembly: Assembly, parts: np.ndarray, types: Sequence[i
     touching = np.zeros(len(assembly), dtype=bool)
     for column in (0, 1):
         touching[assembly.edges[chosen[assembly.edges[:, 1 - column]], column]] = True
-    return np.flatnonzero(chosen | (touching & np.isin(assembly.types, types)))
+    visible: np.ndarray = np.flatnonzero(chosen | (touching & np.isin(assembly.types, types)))
+    return visible
 
 
 def remove_hubs(

@@ -33,7 +33,8 @@ def flipped_faces(faces: IntArray, original: IntArray) -> BoolArray:
     """Return whether each face has the opposite orientation in `original`; both int32 (f, 3)."""
     first = (original == faces[:, :1]).argmax(axis=1)
     following = np.take_along_axis(original, (first[:, None] + 1) % 3, axis=1)[:, 0]
-    return following != faces[:, 1]
+    flipped: BoolArray = following != faces[:, 1]
+    return flipped
 
 
 def _sheets(faces: IntArray) -> tuple[IntArray, BoolArray]:

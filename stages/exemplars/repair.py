@@ -92,7 +92,8 @@ def _coherent(vertices: FloatArray, faces: IntArray) -> IntArray:
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(vertices, faces))
     meshes.meshing_re_orient_faces_coherently()
-    return meshes.current_mesh().face_matrix().astype(np.int32)
+    oriented: IntArray = meshes.current_mesh().face_matrix().astype(np.int32)
+    return oriented
 
 
 def _distinct_corners(vertices: FloatArray, faces: IntArray) -> np.ndarray:
@@ -177,6 +178,7 @@ def _heights(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return the height of each face over its longest side."""
     corners = vertices[faces]
     sides = np.roll(corners, -1, axis=1) - corners
-    return np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / (
+    heights: FloatArray = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / (
         np.linalg.norm(sides, axis=2).max(axis=1, initial=1e-300)
     )
+    return heights

@@ -120,7 +120,8 @@ class Collisions:
         moved = transform_points(pose, self.samples[mesh].points)
         close = np.flatnonzero(((moved > low - reach) & (moved < high + reach)).all(axis=1))
         distance, _ = self.samples[other].tree.query(moved[close], distance_upper_bound=reach)
-        return close[np.isfinite(distance)].astype(np.int32)
+        near: IntArray = close[np.isfinite(distance)].astype(np.int32)
+        return near
 
     def _at_seams(self, points: FloatArray, seams: Sequence[tuple[int, FloatArray]]) -> BoolArray:
         """Return which points (n, 3) lie near a seam, bool (n,)."""

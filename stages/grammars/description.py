@@ -109,7 +109,8 @@ def _grid(grid: Grid) -> dict[str, Any]:
 def _middle(extracted: ExtractedGrammar, number: int) -> np.ndarray:
     grid = extracted.grid
     cells = grid.cells[extracted.docked_pieces[number].border]
-    return grid.origin + (cells.mean(axis=0) + 0.5) * grid.cell_size
+    middle: np.ndarray = grid.origin + (cells.mean(axis=0) + 0.5) * grid.cell_size
+    return middle
 
 
 def _tree(derivation: Derivation) -> list[Any]:

@@ -74,4 +74,5 @@ def sample_mesh(part: PartMesh, size: float) -> SurfaceSamples:
 def facing_direction(normals: FloatArray) -> np.ndarray:
     """Return the axis along which each normal (n, 3) points most, int64 (n,): 0 to 2 along x, y, z, 3 to 5 against."""
     axis = np.abs(normals * AXIS_WEIGHTS).argmax(axis=1)
-    return axis + 3 * (normals[np.arange(len(normals)), axis] < 0)
+    direction: np.ndarray = axis + 3 * (normals[np.arange(len(normals)), axis] < 0)
+    return direction

@@ -65,7 +65,8 @@ def unpack_scene(content: bytes) -> tuple[ModelScene, dict[str, Any]]:
 
     def following(name: str, count: int) -> np.ndarray:
         at[name] += count
-        return arrays[name][at[name] - count : at[name]]
+        rows: np.ndarray = arrays[name][at[name] - count : at[name]]
+        return rows
 
     surfaces = []
     for (name, materials, has_material, has_paint), (vertex_count, face_count) in zip(

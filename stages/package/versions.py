@@ -53,4 +53,5 @@ def library_versions() -> dict[str, str]:
 
 
 def _project() -> dict[str, Any]:
-    return tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]
+    project: dict[str, Any] = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]
+    return project

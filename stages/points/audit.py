@@ -113,7 +113,8 @@ def _segment_distances(points: FloatArray, start: FloatArray, end: FloatArray) -
     length = np.einsum("ij,ij->i", along, along)
     away = points[:, None] - start[None]
     share = np.einsum("ntj,tj->nt", away, along) / np.where(length > 0, length, 1.0)
-    return np.linalg.norm(away - np.clip(share, 0, 1)[:, :, None] * along[None], axis=2)
+    distances: FloatArray = np.linalg.norm(away - np.clip(share, 0, 1)[:, :, None] * along[None], axis=2)
+    return distances
 
 
 AUDIT = Audit(faults=point_faults)

@@ -89,7 +89,8 @@ def farthest_points(points: npt.NDArray[np.floating], n: int, start: int) -> npt
         raise ValueError(f"start {start} is not the index of one of {len(points)} points")
     coordinates = np.ascontiguousarray(points, dtype=np.float64)
     order, first = _boxes(coordinates)
-    return _pick(coordinates[order], order, first, n, start)
+    picks: npt.NDArray[np.int64] = _pick(coordinates[order], order, first, n, start)
+    return picks
 
 
 def _boxes(points: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:

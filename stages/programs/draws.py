@@ -71,7 +71,8 @@ class Draws:
         total = _mixed(shown.view(np.uint64) ^ salts).sum(axis=0, dtype=np.uint64)
         if salt:
             total ^= np.uint64(_salt(salt))
-        return (_mixed(total) >> np.uint64(11)).astype(np.float64) * 2.0**-53
+        hashes: FloatArray = (_mixed(total) >> np.uint64(11)).astype(np.float64) * 2.0**-53
+        return hashes
 
 
 def draw(

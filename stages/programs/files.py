@@ -80,4 +80,5 @@ def shape_glb(program: Program, values: Values, placement: FloatArray | None = N
         visual = trimesh.visual.TextureVisuals(material=material)
         part = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False, visual=visual)
         scene.add_geometry(part, node_name=name, geom_name=name, parent_node_name=parent, transform=pose)
-    return scene.export(file_type="glb")
+    glb: bytes = scene.export(file_type="glb")
+    return glb

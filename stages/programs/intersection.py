@@ -47,7 +47,8 @@ def _faces_in_box(mesh: QuadMesh, low: FloatArray, high: FloatArray) -> np.ndarr
     """The triangles whose bounding boxes overlap the box from `low` to `high`, int32 (k, 3)."""
     corners = mesh.vertices[mesh.triangles]
     overlapping = (corners.min(axis=1) <= high) & (corners.max(axis=1) >= low)
-    return mesh.triangles[overlapping.all(axis=1)]
+    faces: np.ndarray = mesh.triangles[overlapping.all(axis=1)]
+    return faces
 
 
 def _is_inside(point: FloatArray, mesh: QuadMesh) -> bool:

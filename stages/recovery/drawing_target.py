@@ -95,4 +95,5 @@ def _without_jitter(view: SketchView) -> SketchView:
 def _squared_distances(ink: BoolArray) -> FloatArray:
     from scipy.ndimage import distance_transform_edt
 
-    return (distance_transform_edt(~ink) / DRAWING_SIDE_PIXELS) ** 2
+    squared: FloatArray = (distance_transform_edt(~ink) / DRAWING_SIDE_PIXELS) ** 2
+    return squared

@@ -46,4 +46,5 @@ def _isolated(points: FloatArray) -> BoolArray:
     distances, neighbors = cKDTree(points).query(points, OUTLIER_NEIGHBORS + 1)
     reach = distances[:, -1]
     over_neighbors = reach > MAX_REACH_OVER_NEIGHBORS * np.median(reach[neighbors[:, 1:]], axis=1)
-    return over_neighbors | (reach > MAX_REACH_OVER_MEDIAN * np.median(reach))
+    isolated: BoolArray = over_neighbors | (reach > MAX_REACH_OVER_MEDIAN * np.median(reach))
+    return isolated

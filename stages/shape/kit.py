@@ -69,7 +69,8 @@ class PartMesh:
         """Area-weighted centroid of the surface, float64 (3,); every symmetry of the part preserves it."""
         corners = self.vertices[self.faces]
         areas = triangle_areas(corners)
-        return (corners.mean(axis=1) * areas[:, None]).sum(axis=0) / areas.sum()
+        centroid: FloatArray = (corners.mean(axis=1) * areas[:, None]).sum(axis=0) / areas.sum()
+        return centroid
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,7 +48,8 @@ class Shape:
     @cached_property
     def part_labels(self) -> TypeArray:
         """Index of each part's label in `labels`, int16 (n,)."""
-        return self.label_of[self.assembly.types]
+        labels: TypeArray = self.label_of[self.assembly.types]
+        return labels
 
     @cached_property
     def part_classes(self) -> TypeArray:

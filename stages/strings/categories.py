@@ -179,7 +179,8 @@ class CategorySpace:
 
     def _allowed(self, decoded: Decoded, edges: IntArray) -> BoolArray:
         here, there = np.append(decoded.types + 1, 0)[edges].T
-        return self.masks[here, there]
+        allowed: BoolArray = self.masks[here, there]
+        return allowed
 
     def categories_between(self, parent: int | None, label: int) -> range:
         """Return the categories of a part of a label with a parent of some type, or as the first of a string."""

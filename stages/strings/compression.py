@@ -233,7 +233,8 @@ def _docked(book: Codebook, assembly: Assembly) -> IntArray:
     ):
         a, b = (int(assembly.types[part]) for part in pairs[row])
         labels[row] = 0 if book.writer.table.fit(a, b, pose) is not None else -1
-    return pairs[labels >= 0]
+    docked: IntArray = pairs[labels >= 0]
+    return docked
 
 
 def _stored(pose: FloatArray) -> Float32Array:

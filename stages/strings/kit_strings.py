@@ -82,7 +82,8 @@ class KitStrings:
         ends = np.sort(rank[edges], axis=1)
         order = np.lexsort((ends[:, 1], ends[:, 0], strength))
         tree = first_edges_tree(len(assembly), edges.astype(np.int64), order)
-        return edges[(strength == 0) | tree]
+        kept: IntArray = edges[(strength == 0) | tree]
+        return kept
 
     def _kinds(self, assembly: Assembly) -> list[ContactKind | None]:
         """Return the kind of each contact: that of its docking, or of the contact itself if the kit has none.

@@ -34,7 +34,8 @@ def checkpoint_bytes(tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -
     from safetensors.torch import save
 
     text = json.dumps({**header, "version": HEADER_VERSION}, sort_keys=True, ensure_ascii=False, allow_nan=False)
-    return save({name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}, {_KEY: text})
+    content: bytes = save({name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}, {_KEY: text})
+    return content
 
 
 def load_checkpoint(path: Path, expected: Mapping[str, Any]) -> tuple[dict[str, Tensor], dict[str, Any]]:

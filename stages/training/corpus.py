@@ -52,7 +52,8 @@ def write_description(task: Task, description: Mapping[str, Any]) -> None:
 
 def read_description(task: Task) -> dict[str, Any]:
     """Read what `write_description` wrote, in a round's shard."""
-    return json.loads(task.input("training", f"{task.shard.params['data']}.json").read_bytes())
+    description: dict[str, Any] = json.loads(task.input("training", f"{task.shard.params['data']}.json").read_bytes())
+    return description
 
 
 def read_arrays(task: Task, suffix: str) -> dict[str, npt.NDArray[Any]]:

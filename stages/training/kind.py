@@ -36,4 +36,5 @@ def kind_module(name: str) -> str:
 
 def find_kind(name: str) -> Kind:
     """Return the kind of a name, that of its folder."""
-    return importlib.import_module(kind_module(name)).KIND
+    kind: Kind = importlib.import_module(kind_module(name)).KIND
+    return kind

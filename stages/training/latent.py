@@ -60,7 +60,10 @@ class LatentGaussian(nn.Module):
         standard deviation.
         """
         noise = temperature * rng.standard_normal((count, len(self.center)))
-        return (self.center.cpu().numpy() + noise @ self.covariance_root.cpu().numpy().T).astype(np.float32)
+        points: LatentPoints = (self.center.cpu().numpy() + noise @ self.covariance_root.cpu().numpy().T).astype(
+            np.float32
+        )
+        return points
 
 
 def reparameterize(mean: Tensor, log_variance: Tensor, noise: Generator) -> tuple[Tensor, Tensor]:

@@ -61,4 +61,5 @@ def load_program_sampler(path: Path, expected: Mapping[str, Any], top_p: float) 
     kind = read_header(path).get("kind")
     if kind not in ("program_vae", "program_lm"):
         raise CheckpointError(f"{path} is of kind {kind!r}; kinds that sample programs are program_vae, program_lm")
-    return load_model(path, expected, top_p=top_p)  # type: ignore[return-value]
+    model: ProgramSampler = load_model(path, expected, top_p=top_p)  # type: ignore[assignment]
+    return model

@@ -61,7 +61,8 @@ class TrainingTask(ABC):
     @property
     def device(self) -> torch.device:
         """The device of the parameters."""
-        return next(self.module.parameters()).device
+        device: torch.device = next(self.module.parameters()).device
+        return device
 
     def epoch(self, samples: Any, rng: np.random.Generator | None) -> Iterator[Any]:
         """Yield all samples once, in batches: in random order, or in their own order without `rng`.

@@ -55,4 +55,5 @@ class TransformerBlock(nn.Module):
         heads = [tensor.view(*tensor.shape[:2], self.heads, -1).transpose(1, 2) for tensor in (queries, keys, values)]
         mixed = scaled_dot_product_attention(heads[0], heads[1], heads[2], attn_mask=mask, is_causal=causal)
         inputs = inputs + self.dropout(self.joined(mixed.transpose(1, 2).flatten(2)))
-        return inputs + self.dropout(self.feed(self.feed_norm(inputs)))
+        outputs: Tensor = inputs + self.dropout(self.feed(self.feed_norm(inputs)))
+        return outputs

@@ -122,7 +122,8 @@ def _world_triangles(scene: Scene) -> np.ndarray:
     """Return the corners of all triangles in the world, float64 (t, 3, 3)."""
     placed = scene.placed[scene.triangle_part]
     corners = scene.meshes.vertices[scene.meshes.faces[scene.triangle_face]]
-    return np.einsum("tij,tkj->tki", placed[:, :3, :3], corners) + placed[:, None, :3, 3]
+    triangles: np.ndarray = np.einsum("tij,tkj->tki", placed[:, :3, :3], corners) + placed[:, None, :3, 3]
+    return triangles
 
 
 def _rays(renderer: ViewRenderer) -> tuple[np.ndarray, np.ndarray]:

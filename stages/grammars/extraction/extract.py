@@ -87,7 +87,8 @@ class TerminalMeshes(Sequence[PartMesh]):
             self._surface.box(terminal.whole.indices, terminal.cut.corners, self._first + terminal.pieces)
             for _, terminal in self._terminals
         ]
-        return np.array(boxes).reshape(-1, 2, 3).mean(axis=1)
+        middles: FloatArray = np.array(boxes).reshape(-1, 2, 3).mean(axis=1)
+        return middles
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +102,8 @@ class SurfaceMesh:
     @property
     def corners(self) -> FloatArray:
         """Corners of each triangle, float64 (f, 3, 3)."""
-        return self.vertices[self.faces]
+        corners: FloatArray = self.vertices[self.faces]
+        return corners
 
 
 @dataclass(frozen=True, eq=False)

@@ -183,7 +183,8 @@ def _next(ways: Sequence[tuple[int, FloatArray]], transform: FloatArray, middle:
 def _cells(pieces: Sequence[DockedPiece], row: GridRow) -> IntArray:
     """Return the cells between the first piece of a row and its last."""
     held = pieces[row.docked_pieces[0]].cells
-    return held[~is_among(pieces[row.docked_pieces[-1]].cells, held)]
+    between: IntArray = held[~is_among(pieces[row.docked_pieces[-1]].cells, held)]
+    return between
 
 
 def _labels(grid: SurfaceGrid, pieces: Sequence[DockedPiece], row: GridRow) -> IntArray:
@@ -239,4 +240,5 @@ def _nearest_labels(grid: SurfaceGrid, points: FloatArray, labels: IntArray) -> 
     """Return the labels of the occupied cells that are nearest to points (n, 3)."""
     from scipy.spatial import KDTree
 
-    return labels[KDTree(grid.cells).query((points - grid.origin) / grid.cell_size - 0.5)[1]]
+    nearest: IntArray = labels[KDTree(grid.cells).query((points - grid.origin) / grid.cell_size - 0.5)[1]]
+    return nearest

@@ -136,7 +136,8 @@ def _independent_sets(
 def _children(node: int, inside: BoolArray) -> np.ndarray:
     """Return the pieces in a docked piece that lie in no other piece in it."""
     within = np.flatnonzero(inside[node])
-    return within[~inside[np.ix_(within, within)].any(axis=0)]
+    children: np.ndarray = within[~inside[np.ix_(within, within)].any(axis=0)]
+    return children
 
 
 def _rest(grid: SurfaceGrid, every: Sequence[DockedPiece], node: int, chosen: tuple[int, ...]) -> BoolArray:

@@ -34,7 +34,8 @@ def outward_signs(
     component, signs = _consistent_signs(points, near, patch_of, middles, normals)
     offsets = points[held] - points[held].mean(axis=0)
     away = np.bincount(patch_of[held], (offsets * (normals * signs[:, None])[patch_of[held]]).sum(axis=1), len(normals))
-    return signs * np.where(np.bincount(component, away)[component] < 0, -1.0, 1.0)
+    outward: FloatArray = signs * np.where(np.bincount(component, away)[component] < 0, -1.0, 1.0)
+    return outward
 
 
 def _consistent_signs(

@@ -147,7 +147,8 @@ def _meetings(scan: ScannedGrid) -> tuple[np.ndarray, FloatArray]:
 
 def _ranges(counts: np.ndarray) -> np.ndarray:
     """Return 0, 1, ... for each count, one range after another."""
-    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    ranges: np.ndarray = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    return ranges
 
 
 def _cells_with_patches(scan: ScannedGrid) -> np.ndarray:

@@ -184,4 +184,5 @@ def _splats(points: FloatArray, normals: FloatArray, areas: FloatArray) -> Float
     reach = np.sqrt(areas * 4 / (3 * np.sqrt(3)))[:, None]
     turns = np.array([0, 2, 4]) * np.pi / 3
     corners = [points + reach * (np.cos(turn) * one + np.sin(turn) * other) for turn in turns]
-    return np.stack(corners, axis=1)
+    splats: FloatArray = np.stack(corners, axis=1)
+    return splats

@@ -113,7 +113,8 @@ class Curve:
     @cached_property
     def positions(self) -> FloatArray:
         """Relative position of each point, float64 (n,), from 0; an open curve ends at 1."""
-        return self._reached[: len(self.points)] / self._reached[-1]
+        relative: FloatArray = self._reached[: len(self.points)] / self._reached[-1]
+        return relative
 
     @cached_property
     def corners(self) -> BoolArray:

@@ -86,7 +86,8 @@ def follow(rail: Curve, axis: Axis = "z") -> Deformation:
         x, y = rail_axes(stations.points, stations.tangents, positions, False, None)
         at = inverse[len(rail.positions) :]
         across, up = vertices[:, [(index + 1) % 3]], vertices[:, [(index + 2) % 3]]
-        return stations.points[at] + across * x[at] + up * y[at]
+        followed: FloatArray = stations.points[at] + across * x[at] + up * y[at]
+        return followed
 
     return laid
 
@@ -95,4 +96,5 @@ def _share(vertices: FloatArray, index: int) -> FloatArray:
     """Relative position of each vertex between the ends of the mesh along an axis, 0 to 1, (v,)."""
     along = vertices[:, index]
     low, high = along.min(), along.max()
-    return (along - low) / (high - low if high > low else 1.0)
+    share: FloatArray = (along - low) / (high - low if high > low else 1.0)
+    return share

@@ -30,7 +30,8 @@ class QuadMesh:
         """The faces as triangles, int32 (f, 3); each quad is cut along the diagonal with the larger smaller piece."""
         from stages.programs.curves.kernels import cut
 
-        return cut(self.vertices, self.quads)
+        triangles: IntArray = cut(self.vertices, self.quads)
+        return triangles
 
     @cached_property
     def bounds(self) -> FloatArray:
@@ -46,7 +47,8 @@ class QuadMesh:
     def relative(self, points: FloatArray) -> FloatArray:
         """Relative coordinates of points (n, 3) in the bounding box, 0 to 1; 0 along a side without length."""
         low, high = self.bounds
-        return (points - low) / np.where(high > low, high - low, 1.0)
+        share: FloatArray = (points - low) / np.where(high > low, high - low, 1.0)
+        return share
 
     def transformed(self, matrix: FloatArray) -> QuadMesh:
         """The mesh moved by an affine matrix (4, 4); a reflection reverses the faces.

@@ -52,7 +52,8 @@ class Profile:
     @property
     def size(self) -> FloatArray:
         """Width and height of its bounding box, float64 (2,)."""
-        return self.points.max(axis=0) - self.points.min(axis=0)
+        extent: FloatArray = self.points.max(axis=0) - self.points.min(axis=0)
+        return extent
 
     @cached_property
     def cap(self) -> Cap:
@@ -191,7 +192,10 @@ def _crossing(points: FloatArray) -> tuple[int, int] | None:
     after = np.roll(points, -1, axis=0)
 
     def side_of(p: FloatArray, q: FloatArray, r: FloatArray) -> FloatArray:
-        return (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1]) - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])
+        sides: FloatArray = (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1]) - (q[..., 1] - p[..., 1]) * (
+            r[..., 0] - p[..., 0]
+        )
+        return sides
 
     a, b = points[:, None], after[:, None]
     c, d = points[None], after[None]

@@ -131,7 +131,8 @@ def _blended(outlines: FloatArray, given: FloatArray, positions: FloatArray) -> 
     """The outline at each position, float64 (n, k, 2), interpolated linearly between those at `given` (p,)."""
     before = np.clip(np.searchsorted(given, positions, side="right") - 1, 0, len(given) - 2)
     share = ((positions - given[before]) / (given[before + 1] - given[before]))[:, None, None]
-    return outlines[before] + share * (outlines[before + 1] - outlines[before])
+    blended: FloatArray = outlines[before] + share * (outlines[before + 1] - outlines[before])
+    return blended
 
 
 def _styled(style: Style | None, positions: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
@@ -162,4 +163,5 @@ def _dome(
     shrink = np.cos(angles)
     shrink[-1] = 0.0
     reach = depth * np.sin(angles)[:, None] * outwards
-    return shrink[:, None, None] * spokes + (point + reach)[:, None]
+    rings: FloatArray = shrink[:, None, None] * spokes + (point + reach)[:, None]
+    return rings

@@ -93,7 +93,8 @@ def stretch(
     from_frame, to_frame = frame(start, end - start, own_up), frame(goal, goal_end - goal, up)
     sizes = np.diag([share, share, share, 1.0] if uniform else [1.0, 1.0, share, 1.0])
     inverse = attach(from_frame, np.eye(4))
-    return to_frame @ sizes @ inverse
+    stretched: FloatArray = to_frame @ sizes @ inverse
+    return stretched
 
 
 def _about(matrix: FloatArray, center: npt.ArrayLike) -> FloatArray:

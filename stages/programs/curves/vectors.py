@@ -9,7 +9,8 @@ from stages.shape.arrays import FloatArray
 
 def dots(a: FloatArray, b: FloatArray) -> FloatArray:
     """Dot product of each row of `a` (n, 3) with the same row of `b` (n, 3), float64 (n,)."""
-    return np.einsum("ij,ij->i", a, b)
+    product: FloatArray = np.einsum("ij,ij->i", a, b)
+    return product
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -23,4 +24,5 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def unit(rows: FloatArray) -> FloatArray:
     """Each row (n, 3) scaled to length 1; no row may be zero."""
-    return rows / np.sqrt(dots(rows, rows))[:, None]
+    scaled: FloatArray = rows / np.sqrt(dots(rows, rows))[:, None]
+    return scaled

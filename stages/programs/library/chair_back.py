@@ -98,7 +98,8 @@ def _turned(chair: ChairDimensions, share: FloatArray, size: tuple[float, float]
     """
     girth = 0.95 * chair.unit * float(chair.values["bevel_rails"])
     swell = 4.0 * share * (1.0 - share)
-    return 1.0 + swell[:, None] * (np.array([girth, min(girth, room)]) / size)
+    scale: FloatArray = 1.0 + swell[:, None] * (np.array([girth, min(girth, room)]) / size)
+    return scale
 
 
 def _cross_rails(chair: ChairDimensions) -> list[Part]:

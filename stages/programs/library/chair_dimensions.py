@@ -98,7 +98,8 @@ class ChairDimensions:
         """The upward unit direction of the back at a relative height, float64 (3,)."""
         bend, recline = self._leaning
         slope = bend * (1.0 - 2.0 * u) + recline * 2.0 * u
-        return np.array([0.0, 1.0, -slope]) / np.hypot(1.0, slope)
+        along: FloatArray = np.array([0.0, 1.0, -slope]) / np.hypot(1.0, slope)
+        return along
 
     def back(self, x: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
         """Points of the surface of the back, float64 (..., 3), at distances x from the middle and relative heights u.

@@ -17,7 +17,8 @@ def cubic(controls: npt.ArrayLike, count: int) -> FloatArray:
     t = np.linspace(0.0, 1.0, count + 1)
     s = 1.0 - t
     weights = np.stack([s**3, 3.0 * s * s * t, 3.0 * s * t * t, t**3], axis=1)
-    return weights @ np.asarray(controls, dtype=np.float64)
+    points: FloatArray = weights @ np.asarray(controls, dtype=np.float64)
+    return points
 
 
 def eased(points: FloatArray, girth: FloatArray) -> FloatArray:
@@ -29,4 +30,5 @@ def eased(points: FloatArray, girth: FloatArray) -> FloatArray:
     """
     from stages.programs.curves.kernels import ease
 
-    return ease(points, girth, MAX_EASING_ROUNDS, LOCAL_EASING_ROUNDS)
+    moved: FloatArray = ease(points, girth, MAX_EASING_ROUNDS, LOCAL_EASING_ROUNDS)
+    return moved

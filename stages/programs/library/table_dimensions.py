@@ -64,22 +64,26 @@ class TableDimensions:
             swing = [(0.5 + 0.5 * np.cos(np.pi * t), 0.12 + 0.6 * t) for t in np.linspace(0.0, 1.0, 7).tolist()]
             shares, most = [(1.0, 0.0), *swing, (0.0, 1.0)], 1.3
         reach = amount * min(most * (self.thickness + 0.01), 0.22 * float(self.half.min()))
-        return np.array(shares) * [reach, self.thickness]
+        edge: FloatArray = np.array(shares) * [reach, self.thickness]
+        return edge
 
     @cached_property
     def bearing(self) -> FloatArray:
         """Half width and depth of the lower side of the top, float64 (2,)."""
-        return self.half - self.edge[-1, 0]
+        bearing: FloatArray = self.half - self.edge[-1, 0]
+        return bearing
 
     @cached_property
     def corner(self) -> FloatArray:
         """The middle of the corner of the lower side at +x and +z, float64 (2,)."""
-        return self.bearing * (1.0 - CORNER_CUT * self.values["table_top_shape"])
+        corner: FloatArray = self.bearing * (1.0 - CORNER_CUT * self.values["table_top_shape"])
+        return corner
 
     @cached_property
     def spread(self) -> FloatArray:
         """Half axes of the ellipse for a single foot, float64 (2,): rounder than the top."""
-        return np.sqrt(self.bearing * self.bearing.min())
+        spread: FloatArray = np.sqrt(self.bearing * self.bearing.min())
+        return spread
 
 
 def upright(outline: FloatArray, centers: FloatArray, scale: FloatArray) -> QuadMesh:

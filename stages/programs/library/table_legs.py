@@ -65,7 +65,8 @@ class _Frame:
         """The leg's middle at `heights`, any shape (...), as x and z, (..., 2)."""
         down = 1.0 - heights / self.table.under
         out = self.foot * down - 4.0 * self.waist * down * (1.0 - down)
-        return self.top + out[..., None] * self.direction
+        middle: FloatArray = self.top + out[..., None] * self.direction
+        return middle
 
 
 def _rail(table: TableDimensions, frame: _Frame, name: str, axis: int) -> Part:

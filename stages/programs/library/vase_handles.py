@@ -133,7 +133,8 @@ def _cover(wall: Wall, heights: FloatArray) -> FloatArray:
             cover.pop()
         cover.append(point)
     at, radii = np.array(cover).T
-    return np.interp(heights, at, radii)
+    reach: FloatArray = np.interp(heights, at, radii)
+    return reach
 
 
 def _turns_left(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:

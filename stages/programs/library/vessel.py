@@ -62,13 +62,15 @@ def _directions(shape: float) -> FloatArray:
 def _reach(radians: FloatArray, exponent: float) -> FloatArray:
     """The radius of a superellipse of half-width 1 in directions."""
     powers = np.abs(np.cos(radians)) ** exponent + np.abs(np.sin(radians)) ** exponent
-    return powers ** (-1.0 / exponent)
+    radii: FloatArray = powers ** (-1.0 / exponent)
+    return radii
 
 
 def _superellipse(radians: FloatArray, exponent: float) -> FloatArray:
     """Points of a superellipse in directions (n,), float64 (n, 2)."""
     rays = np.stack([np.cos(radians), np.sin(radians)], axis=1)
-    return _reach(radians, exponent)[:, None] * rays
+    points: FloatArray = _reach(radians, exponent)[:, None] * rays
+    return points
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +92,8 @@ class Wall:
         steps = np.diff(self.inner, axis=0)
         steps /= np.hypot(steps[:, 0], steps[:, 1])[:, None]
         turning = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
-        return turning / np.hypot(turning[:, 0], turning[:, 1])[:, None]
+        unit: FloatArray = turning / np.hypot(turning[:, 0], turning[:, 1])[:, None]
+        return unit
 
     @cached_property
     def _offset(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
@@ -149,12 +152,14 @@ class Wall:
         middle, half = (outside + inside) / 2.0, (outside - inside) / 2.0
         along = self.tangents[-1] * self.thickness / 2.0
         angles = np.radians([[45.0], [90.0], [135.0]])
-        return middle + np.cos(angles) * half + np.sin(angles) * along
+        rounded: FloatArray = middle + np.cos(angles) * half + np.sin(angles) * along
+        return rounded
 
     def seat(self) -> FloatArray:
         """The highest point of the rim, where a lid is placed, float64 (2,)."""
         rim = np.concatenate([self.outer[-1:], self._rim(), self.inner[-1:]])
-        return rim[rim[:, 1].argmax()]
+        highest: FloatArray = rim[rim[:, 1].argmax()]
+        return highest
 
     def opening(self, depth: float) -> float:
         """The smallest inner radius within `depth` of the rim."""
@@ -174,4 +179,5 @@ class Wall:
     def radius(self, height: FloatArray) -> FloatArray:
         """Outer radius at heights; constant below the foot and above the rim."""
         rising = np.maximum.accumulate(self.outer[:, 1])
-        return np.interp(height, rising, self.outer[:, 0])
+        radii: FloatArray = np.interp(height, rising, self.outer[:, 0])
+        return radii

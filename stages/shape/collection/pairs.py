@@ -24,4 +24,5 @@ def pair_bytes(pairs: IntArray) -> bytes:
 
 def pairs_of(content: bytes) -> IntArray:
     """Return the pairs, int32 (m, 2), from the bytes of `pair_bytes`."""
-    return np.ascontiguousarray(bytes_array(content).T)
+    pairs: IntArray = np.ascontiguousarray(bytes_array(content).T)
+    return pairs

@@ -16,4 +16,5 @@ def connected_components(count: int, pairs: np.ndarray) -> IntArray:
     from scipy.sparse.csgraph import connected_components as components_of
 
     graph = coo_array((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    return components_of(graph, directed=False)[1]
+    components: IntArray = components_of(graph, directed=False)[1]
+    return components

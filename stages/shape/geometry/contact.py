@@ -60,14 +60,18 @@ class ContactTest:
         """Return points (q, 3) that span the touching area, in coordinates of the part of type `a`; empty without
         contact.
         """
-        return self._patches(a, b, pose)[0]
+        points: FloatArray = self._patches(a, b, pose)[0]
+        return points
 
     def _patches(self, a: int, b: int, pose: FloatArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
         """Return points, areas and crossings of `contact_patches`, all empty without contact."""
         from stages.shape.geometry.mesh_pairs import contact_patches, near_pairs
 
         pairs = near_pairs(self.mesh(a), self.mesh(b), pose, self.tolerance)
-        return contact_patches(self.mesh(a)[0], self.mesh(b)[0], pairs, pose, self.tolerance)
+        patches: tuple[FloatArray, FloatArray, np.ndarray] = contact_patches(
+            self.mesh(a)[0], self.mesh(b)[0], pairs, pose, self.tolerance
+        )
+        return patches
 
     def kind(self, a: int, b: int, pose: FloatArray) -> ContactKind | None:
         """Return the kind of the contact by the extent of the touching area, or None without contact.

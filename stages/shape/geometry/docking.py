@@ -17,7 +17,8 @@ SAME_IMAGE = 0.01
 def symmetric_images(a: PartType, b: PartType, pose: FloatArray) -> FloatArray:
     """Return all relative poses (k, 4, 4) of `b` against `a` equal to `pose` up to symmetries of either part."""
     left = a.symmetries @ pose
-    return (left[:, None] @ b.symmetries[None]).reshape(-1, 4, 4)
+    images: FloatArray = (left[:, None] @ b.symmetries[None]).reshape(-1, 4, 4)
+    return images
 
 
 class DockingTable:

@@ -89,7 +89,8 @@ class PenetrationTest:
         odd = self._odd(scene, points, RAYS[:MAJORITY_RAYS])
         doubtful = (odd > 0) & (odd < MAJORITY_RAYS)
         odd[doubtful] += self._odd(scene, points[doubtful], RAYS[MAJORITY_RAYS:])
-        return odd >= MAJORITY_RAYS
+        is_inside: np.ndarray = odd >= MAJORITY_RAYS
+        return is_inside
 
     def _odd(self, scene: Any, points: np.ndarray, directions: FloatArray) -> np.ndarray:
         """Return along how many `directions` (d, 3) each of the points (p, 3) sees an odd number of surfaces, (p,)."""
@@ -98,7 +99,8 @@ class PenetrationTest:
         turned = np.tile(directions, (len(points), 1))
         rays = np.concatenate([np.repeat(points, len(directions), axis=0), turned], axis=1).astype(np.float32)
         hits = scene.count_intersections(o3d.core.Tensor(rays), nthreads=1).numpy()
-        return (hits.reshape(-1, len(directions)) % 2).sum(axis=1)
+        odd: np.ndarray = (hits.reshape(-1, len(directions)) % 2).sum(axis=1)
+        return odd
 
     def _scene(self, index: int) -> Any:
         import open3d as o3d
@@ -146,4 +148,5 @@ def _inside_box(columns: FloatArray, pose: FloatArray, box: FloatArray) -> Float
         columns = columns[:, (coordinates > low - slack) & (coordinates < high + slack)]
     points = transform_points(pose, columns.T)
     inside = (points > box[0]) & (points < box[1])
-    return points[inside[:, 0] & inside[:, 1] & inside[:, 2]]
+    kept: FloatArray = points[inside[:, 0] & inside[:, 1] & inside[:, 2]]
+    return kept

@@ -21,18 +21,21 @@ def invert(poses: FloatArray) -> FloatArray:
 
 def relative_poses(poses: FloatArray, edges: np.ndarray) -> FloatArray:
     """Return the pose of part `edges[:, 1]` in the coordinates of part `edges[:, 0]`, (m, 4, 4)."""
-    return invert(poses[edges[:, 0]]) @ poses[edges[:, 1]]
+    relative: FloatArray = invert(poses[edges[:, 0]]) @ poses[edges[:, 1]]
+    return relative
 
 
 def transform_points(pose: FloatArray, points: FloatArray) -> FloatArray:
     """Return `points` (n, 3) moved by one rigid transform (4, 4)."""
-    return points @ pose[:3, :3].T + pose[:3, 3]
+    moved: FloatArray = points @ pose[:3, :3].T + pose[:3, 3]
+    return moved
 
 
 def rotation_angle(pose: FloatArray) -> FloatArray:
     """Return the angle of the rotation part of (..., 4, 4) in radians, in [0, pi]."""
     trace = np.trace(pose[..., :3, :3], axis1=-2, axis2=-1)
-    return np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
+    angle: FloatArray = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
+    return angle
 
 
 def pose_vectors(poses: FloatArray, length: float) -> FloatArray:

@@ -10,16 +10,19 @@ from stages.shape.arrays import FloatArray
 def area_vectors(corners: FloatArray) -> FloatArray:
     """Return the vector along the normal of each triangle (..., 3, 3) whose length is twice the area, (..., 3)."""
     origin = corners[..., 0, :]
-    return np.cross(corners[..., 1, :] - origin, corners[..., 2, :] - origin)
+    vectors: FloatArray = np.cross(corners[..., 1, :] - origin, corners[..., 2, :] - origin)
+    return vectors
 
 
 def triangle_areas(corners: FloatArray) -> FloatArray:
     """Return the area of each triangle (..., 3, 3), float64 (...)."""
-    return np.linalg.norm(area_vectors(corners), axis=-1) / 2
+    areas: FloatArray = np.linalg.norm(area_vectors(corners), axis=-1) / 2
+    return areas
 
 
 def unit_normals(corners: FloatArray) -> FloatArray:
     """Return the unit normal of each triangle (..., 3, 3) by its winding, (..., 3); zero for one without area."""
     vectors = area_vectors(corners)
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, lengths, out=np.zeros_like(vectors), where=lengths > 0)
+    normals: FloatArray = np.divide(vectors, lengths, out=np.zeros_like(vectors), where=lengths > 0)
+    return normals

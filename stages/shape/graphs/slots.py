@@ -356,7 +356,8 @@ def _canonical(orientation: _Orientation, places: State) -> State:
     if not places:
         return places
     images = np.sort(orientation.images[:, list(places)], axis=1)
-    return min(map(tuple, images[(images >= 0).all(axis=1)].tolist()), default=places)
+    first: State = min(map(tuple, images[(images >= 0).all(axis=1)].tolist()), default=places)
+    return first
 
 
 def _turned(turn: FloatArray, pose: FloatArray) -> FloatArray:

@@ -24,7 +24,8 @@ SHRINK_SHARE = 1e-9
 
 def box_corners(centres: FloatArray, axes: FloatArray, halves: FloatArray) -> FloatArray:
     """Return the corners of boxes, float64 (n, 8, 3)."""
-    return centres[:, None] + np.einsum("ks,ns,nsc->nkc", SIGNS, halves, axes)
+    corners: FloatArray = centres[:, None] + np.einsum("ks,ns,nsc->nkc", SIGNS, halves, axes)
+    return corners
 
 
 def recognise_boxes(corners: FloatArray) -> tuple[BoolArray, FloatArray, FloatArray, FloatArray]:

@@ -155,14 +155,16 @@ class PairContacts:
             return 0.0, 0.0
         question = ("overlap", a, b, key)
         if question in self._answers:
-            return self._answers[question]
+            cached: tuple[float, float] = self._answers[question]
+            return cached
         moved = self.meshes[b].vertices @ pose[:3, :3].T + pose[:3, 3]
         low = np.maximum(self.meshes[a].bounds[0], moved.min(axis=0))
         high = np.minimum(self.meshes[a].bounds[1], moved.max(axis=0))
         answer = (0.0, 0.0)
         if (high > low).all():
             answer = overlap(self._tree(a)[0], self._tree(b)[0], pose, low, high)
-        return self._remember(question, answer)
+        remembered: tuple[float, float] = self._remember(question, answer)
+        return remembered
 
     def _patch(self, placed: PlacedParts, i: int, j: int, tolerance: float) -> tuple[bool, FloatArray, FloatArray]:
         """Return whether the parts are within `tolerance`, the corners of the patches between them, and normals out of
@@ -177,7 +179,8 @@ class PairContacts:
         a, b, pose, key = self._question(placed, i, j)
         question = ("patch", a, b, key, tolerance)
         if question in self._answers:
-            return self._answers[question]
+            cached: tuple[bool, FloatArray, FloatArray] = self._answers[question]
+            return cached
         pairs = near_pairs(self._tree(a), self._tree(b), pose, tolerance)
         corners_a, corners_b = self._tree(a)[0], self._tree(b)[0]
         closed = bool(self.solids.closed[a] and self.solids.closed[b])
@@ -193,7 +196,8 @@ class PairContacts:
             points = np.concatenate([points, other @ pose[:3, :3].T + pose[:3, 3]])
             normals = np.concatenate([normals, -outward @ pose[:3, :3].T])
         answer = (len(pairs) > 0, *flat_hulls(points, normals, tolerance))
-        return self._remember(question, answer)
+        remembered: tuple[bool, FloatArray, FloatArray] = self._remember(question, answer)
+        return remembered
 
 
 def _both_boxes(placed: PlacedParts, pairs: IntArray) -> BoolArray:
@@ -202,4 +206,7 @@ def _both_boxes(placed: PlacedParts, pairs: IntArray) -> BoolArray:
 
 def _listed(pairs: IntArray, known: IntArray, count: int) -> BoolArray:
     """Return which of `pairs` are among the pairs `known`, bool (m,)."""
-    return np.isin(pairs[:, 0] * np.int64(count) + pairs[:, 1], known[:, 0] * np.int64(count) + known[:, 1])
+    listed: BoolArray = np.isin(
+        pairs[:, 0] * np.int64(count) + pairs[:, 1], known[:, 0] * np.int64(count) + known[:, 1]
+    )
+    return listed

@@ -196,7 +196,8 @@ def _cone(normals: FloatArray, friction: float, azimuth: float, directions: int)
     steep = np.cross(normals, level)
     angles = 2 * np.pi * np.arange(directions) / directions
     rubbing = np.cos(angles)[None, :, None] * level[:, None] + np.sin(angles)[None, :, None] * steep[:, None]
-    return normals[:, None] + friction * rubbing
+    edges: FloatArray = normals[:, None] + friction * rubbing
+    return edges
 
 
 def _wrenches(

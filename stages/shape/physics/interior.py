@@ -164,10 +164,12 @@ class _System:
         )
 
     def _act(self, x: FloatArray, f: FloatArray) -> FloatArray:
-        return _act(self._wrenches, self._place, x, self._count) + self._dense @ f
+        acting: FloatArray = _act(self._wrenches, self._place, x, self._count) + self._dense @ f
+        return acting
 
     def _lift(self, y: FloatArray) -> FloatArray:
-        return _lift(self._wrenches, self._place, y)
+        lifted: FloatArray = _lift(self._wrenches, self._place, y)
+        return lifted
 
     def _solve(self, right: FloatArray) -> FloatArray:
         """Solve the normal equations by conjugate gradients, preconditioned by the factors.
@@ -195,7 +197,8 @@ class _System:
         from scipy.linalg import cho_solve_banded
 
         plain = cho_solve_banded(self._band, right, check_finite=False)
-        return plain - self._spread @ np.linalg.solve(self._small, self._dense.T @ plain)
+        near: FloatArray = plain - self._spread @ np.linalg.solve(self._small, self._dense.T @ plain)
+        return near
 
 
 def _longest(*moves: tuple[FloatArray, FloatArray]) -> float:

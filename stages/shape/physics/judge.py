@@ -195,4 +195,5 @@ def _floating(placed: PlacedParts, connected: np.ndarray, config: PhysicsConfig)
     """Return which parts no chain of connected parts leads to the ground, bool (n,)."""
     pieces = connected_components(len(placed), connected)
     low = placed.spans[:, 0, 2] <= config.connected * placed.diagonal
-    return ~np.isin(pieces, pieces[low])
+    floating: np.ndarray = ~np.isin(pieces, pieces[low])
+    return floating

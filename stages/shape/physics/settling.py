@@ -50,7 +50,8 @@ class Body:
     def support(self, near: float) -> FloatArray:
         """Return the corners, float64 (k, 2), of the outline of the points at most `near` above the ground."""
         low = self.points[self.points[:, 2] <= near, :2]
-        return low[convex_hull(low)]
+        outline: FloatArray = low[convex_hull(low)]
+        return outline
 
     def tipped(self, pivot: FloatArray, way: FloatArray, near: float) -> Body:
         """Return the body turned in direction `way` (2,) about the level axis through `pivot` (2,) on the ground.

@@ -152,7 +152,8 @@ def _reach(pieces: np.ndarray, between: ContactPatches, standing: ContactPatches
     """Return whether the body of each part rests on the ground, directly or by other bodies, bool (n,)."""
     links = np.stack([between.first, between.second], axis=1).astype(np.int32)
     groups = connected_components(int(pieces.max()) + 1, links)
-    return np.isin(groups[pieces], groups[pieces[standing.first]])
+    grounded: np.ndarray = np.isin(groups[pieces], groups[pieces[standing.first]])
+    return grounded
 
 
 def _hulls_of(standing: ContactPatches, pieces: np.ndarray) -> ContactPatches:

@@ -56,7 +56,8 @@ def mirror_score(placed: PlacedParts) -> float:
 def _long_axis(placed: PlacedParts) -> FloatArray:
     """Return the level axis along which the points of the shape spread most."""
     flat = np.concatenate(placed.points)[:, :2] - (placed.weights @ placed.centroids)[:2]
-    return np.linalg.eigh(flat.T @ flat)[1][:, 1]
+    axis: FloatArray = np.linalg.eigh(flat.T @ flat)[1][:, 1]
+    return axis
 
 
 def _spreads(placed: PlacedParts) -> FloatArray:

@@ -73,7 +73,8 @@ def projected(camera: Mapping[str, Any], points: FloatArray) -> FloatArray:
     if camera["projection"] == "perspective":
         depth = np.where(seen[:, 2:] > 0.0, seen[:, 2:], np.nan)
         seen = seen / depth
-    return seen[:, :2] @ intrinsics[:2, :2].T + intrinsics[:2, 2]
+    pixels: FloatArray = seen[:, :2] @ intrinsics[:2, :2].T + intrinsics[:2, 2]
+    return pixels
 
 
 def pixel_rays(camera: Mapping[str, Any], columns: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:

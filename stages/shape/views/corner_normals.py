@@ -29,7 +29,8 @@ def corner_normals(vertices: FloatArray, faces: IntArray, welded: np.ndarray, no
     normals: unit normals of the faces, float64 (f, 3), zero for faces without area.
     """
     min_cosine = math.cos(math.radians(CREASE_ANGLE_DEGREES))
-    return _corner_normals(vertices, faces, welded, normals, min_cosine)
+    corners: Float32Array = _corner_normals(vertices, faces, welded, normals, min_cosine)
+    return corners
 
 
 @numba.njit(cache=True, error_model="numpy")

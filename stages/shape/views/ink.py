@@ -33,7 +33,8 @@ def ink_strokes(
     for kind, line in widths.items():
         table[kind] = line
     lines = _fade(ends, strokes.kinds, table, FADING, width, height, crowding)
-    return _draw(ends, lines, width, height)
+    ink: FloatArray = _draw(ends, lines, width, height)
+    return ink
 
 
 @numba.njit(cache=True, error_model="numpy")

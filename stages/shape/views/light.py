@@ -37,7 +37,8 @@ class KeyLight:
         y = (1 - local[:, 1] * self.view.projection[1, 1]) / 2 * size
         pixel = 2.0 / (self.view.projection[0, 0] * size)
         bias = 2.0 * pixel + 0.004 * self.view.radius
-        return _filtered(self.depth, x, y, -local[:, 2], softness / pixel, bias)
+        share: FloatArray = _filtered(self.depth, x, y, -local[:, 2], softness / pixel, bias)
+        return share
 
 
 def key_light(scene: Scene, azimuth: float, elevation: float, renderer: RendererName) -> KeyLight:
@@ -60,7 +61,8 @@ def eye_positions(depth: Float32Array, view: View) -> FloatArray:
 
 def to_world(points: FloatArray, view: View) -> FloatArray:
     """Return points of eye space (n, 3) in the world."""
-    return (points - view.eye[:3, 3]) @ view.eye[:3, :3]
+    moved: FloatArray = (points - view.eye[:3, 3]) @ view.eye[:3, :3]
+    return moved
 
 
 def ground_seen(
@@ -87,7 +89,8 @@ def openness(depth: Float32Array, normal: Float32Array, view: View, reach: float
     positions = eye_positions(depth, view)
     across = 2.0 / (view.projection[0, 0] * depth.shape[1])
     raw = _openness(depth, normal.astype(np.float64), positions, reach, across, view.perspective)
-    return _smoothed(raw, depth, reach)
+    smooth: FloatArray = _smoothed(raw, depth, reach)
+    return smooth
 
 
 @numba.njit(cache=True, error_model="numpy")

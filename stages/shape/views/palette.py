@@ -35,7 +35,8 @@ def label_colors(count: int) -> ByteArray:
 def srgb_to_linear(color: ByteArray) -> FloatArray:
     """Convert uint8 sRGB to linear light 0..1."""
     value = color / 255.0
-    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+    linear: FloatArray = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+    return linear
 
 
 def linear_to_srgb(light: FloatArray) -> ByteArray:

@@ -20,4 +20,5 @@ def part_paint(shape: Shape) -> ByteArray | None:
     colors = np.concatenate([mesh.face_colors for mesh in shape.meshes])
     if np.ptp(colors, axis=0).max() > MAX_COLOR_RANGE:
         return None
-    return label_colors(len(shape.labels))[shape.part_labels]
+    painted: ByteArray = label_colors(len(shape.labels))[shape.part_labels]
+    return painted

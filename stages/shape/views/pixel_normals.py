@@ -20,7 +20,10 @@ def smooth_normals(seen: Visible) -> Float32Array:
     scene = seen.scene
     rotations = (seen.view.eye @ scene.poses)[:, :3, :3]
     parts, faces = scene.triangle_part, scene.triangle_face
-    return _interpolate(seen.triangles, seen.screen, seen.normals, scene.meshes.corner_normals, parts, faces, rotations)
+    normals: Float32Array = _interpolate(
+        seen.triangles, seen.screen, seen.normals, scene.meshes.corner_normals, parts, faces, rotations
+    )
+    return normals
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -118,7 +118,8 @@ def _ground_light(scene: Scene, view: View, light: KeyLight, hidden: BoolArray) 
     left = np.ones(height * width)
     left[pixels] = 0.6 * soft + 0.4 * wide
     shadow = ((1.0 - left.reshape(height, width)) * fade)[..., None]
-    return 1.0 - shadow * (1.0 - SHADOW)
+    light_left: FloatArray = 1.0 - shadow * (1.0 - SHADOW)
+    return light_left
 
 
 def _ink(seen: Visible, size: tuple[int, int]) -> FloatArray:
@@ -138,7 +139,8 @@ def _reduced(picture: FloatArray) -> FloatArray:
     tiles = picture.reshape(
         height // SUBPIXELS_PER_PIXEL, SUBPIXELS_PER_PIXEL, width // SUBPIXELS_PER_PIXEL, SUBPIXELS_PER_PIXEL, channels
     )
-    return tiles.mean(axis=(1, 3))
+    mean: FloatArray = tiles.mean(axis=(1, 3))
+    return mean
 
 
 @numba.njit(cache=True, error_model="numpy")

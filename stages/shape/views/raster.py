@@ -57,7 +57,8 @@ def raster(screen: FloatArray, width: int, height: int) -> IntArray:
     bits = COORDINATE_BITS - int(np.frexp(farthest)[1]) if np.isfinite(farthest) else 0
     if bits < 1:
         raise ValueError(f"corners of triangles lie {farthest:g} pixels away: the camera is inside the shape")
-    return _raster(screen, width, height, min(bits, GRID_BITS))
+    triangles: IntArray = _raster(screen, width, height, min(bits, GRID_BITS))
+    return triangles
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -132,7 +132,8 @@ class Scene:
     @cached_property
     def triangle_part(self) -> IntArray:
         """The part of each triangle, int32 (t,)."""
-        return np.repeat(np.arange(len(self), dtype=np.int32), np.diff(self.triangle_first))
+        part: IntArray = np.repeat(np.arange(len(self), dtype=np.int32), np.diff(self.triangle_first))
+        return part
 
     @cached_property
     def triangle_face(self) -> IntArray:

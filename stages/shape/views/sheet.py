@@ -169,7 +169,8 @@ def _longest(sections: Sequence[Section], title: str, fonts: Mapping[str, Any], 
 
 def _after(section: Section, fonts: Mapping[str, Any], unit: float) -> float:
     """Return where the note of a section begins, relative to its title."""
-    return fonts["head"].getlength(section.title) + 14 * unit
+    length: float = fonts["head"].getlength(section.title) + 14 * unit
+    return length
 
 
 def _note_lines(section: Section, fonts: Mapping[str, Any], width: int, unit: float) -> list[str]:

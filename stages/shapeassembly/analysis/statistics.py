@@ -56,7 +56,8 @@ def program_statistics(programs: Sequence[AssemblyProgram]) -> ProgramStatistics
 def cluster_curve(signatures: Iterable[str]) -> FloatArray:
     """Return the share of all items that have the 1, 2, 3, ... most frequent structures, float64 (structures,)."""
     counts = np.array(sorted(Counter(signatures).values(), reverse=True), dtype=np.float64)
-    return np.cumsum(counts) / max(counts.sum(), 1)
+    curve: FloatArray = np.cumsum(counts) / max(counts.sum(), 1)
+    return curve
 
 
 def cluster_curves(programs: Sequence[AssemblyProgram]) -> tuple[FloatArray, FloatArray]:

@@ -85,7 +85,8 @@ def token_distance(first: Sequence[str], second: Sequence[str]) -> int:
     from stages.shapeassembly.analysis.edit_distance import edit_distance
 
     codes = {word: index for index, word in enumerate(dict.fromkeys([*first, *second]))}
-    return edit_distance(np.array([codes[w] for w in first]), np.array([codes[w] for w in second]))
+    distance: int = edit_distance(np.array([codes[w] for w in first]), np.array([codes[w] for w in second]))
+    return distance
 
 
 def _digest(words: Sequence[str]) -> str:

@@ -208,7 +208,8 @@ def _swing(box: _Box, priors: list[Tensor], p: Tensor, goal: Tensor, axis: int, 
 
 def _skew(u: Tensor) -> Tensor:
     """Return the matrix of the cross product with `u`."""
-    return torch.linalg.cross(u.expand(3, 3), _UPRIGHT).T
+    matrix: Tensor = torch.linalg.cross(u.expand(3, 3), _UPRIGHT).T
+    return matrix
 
 
 def _rotate(box: _Box, pivot: Tensor, rotation: Tensor) -> None:

@@ -154,7 +154,8 @@ def _bound(values: FloatArray | float) -> Tensor:
 def surface_points(execution: Execution, count: int, rng: np.random.Generator) -> FloatArray:
     """Sample the surfaces of all leaf cuboids uniformly by area, float64 (count, 3)."""
     cuboids, weights = _chosen_points(execution.corners, count, rng)
-    return (execution.corners[cuboids] * weights.numpy()[:, :, None]).sum(axis=1)
+    points: FloatArray = (execution.corners[cuboids] * weights.numpy()[:, :, None]).sum(axis=1)
+    return points
 
 
 def _chosen_points(corners: FloatArray, count: int, rng: np.random.Generator) -> tuple[np.ndarray, Tensor]:

@@ -44,7 +44,8 @@ def box_corners(box: Box) -> FloatArray:
 def inside(box: Box, points: FloatArray, tolerance: float) -> BoolArray:
     """Return which of the points (n, 3) are in the box, or outside by at most `tolerance`."""
     offset = np.abs((points - box.center) @ box.axes.T)
-    return np.all(offset <= box.size / 2 + tolerance, axis=-1)
+    within: BoolArray = np.all(offset <= box.size / 2 + tolerance, axis=-1)
+    return within
 
 
 def bounding_box(points: FloatArray, axes: FloatArray) -> Box:
@@ -98,7 +99,8 @@ def box_gap(first: Box, second: Box) -> tuple[float, FloatArray, FloatArray]:
 def _nearest_in(box: Box, point: FloatArray) -> FloatArray:
     local = box.axes @ (point - box.center)
     half = box.size / 2
-    return box.center + np.minimum(np.maximum(local, -half), half) @ box.axes
+    nearest: FloatArray = box.center + np.minimum(np.maximum(local, -half), half) @ box.axes
+    return nearest
 
 
 def surface_distance(points: FloatArray, boxes: list[Box]) -> FloatArray:

@@ -66,12 +66,14 @@ def bottom_or_top(box: Box, bbox: Box, *, top: bool) -> FloatArray | None:
     centers = world_points(box, _FACE_CENTERS)
     offset = np.abs(local_points(bbox, centers)[:, 1] - edge)
     if offset.min() <= END_BAND_SHARE:
-        return centers[int(offset.argmin())]
+        center: FloatArray = centers[int(offset.argmin())]
+        return center
     points = world_points(box, _GRID)
     reaching = np.abs(local_points(bbox, points)[:, 1] - edge) <= END_BAND_SHARE
     if not reaching.any():
         points, reaching = box_corners(box), np.abs(heights - edge) <= END_BAND_SHARE
-    return points[reaching].mean(axis=0)
+    mean: FloatArray = points[reaching].mean(axis=0)
+    return mean
 
 
 def _shared(first: Box, second: Box, tolerance: float) -> FloatArray:
@@ -84,7 +86,8 @@ def _shared(first: Box, second: Box, tolerance: float) -> FloatArray:
         high = np.clip(corners.max(axis=0) + tolerance, -half, half)
         points = own.center + (low + _GRID * (high - low)) @ own.axes
         points_by_frame.append(points[inside(other, points, tolerance)])
-    return points_by_frame[0] if len(points_by_frame[0]) >= len(points_by_frame[1]) else points_by_frame[1]
+    most: FloatArray = points_by_frame[0] if len(points_by_frame[0]) >= len(points_by_frame[1]) else points_by_frame[1]
+    return most
 
 
 def _face_center(first: Box, second: Box, tolerance: float) -> FloatArray | None:

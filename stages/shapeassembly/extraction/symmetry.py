@@ -38,7 +38,8 @@ class SymmetryBody:
     def center(self) -> FloatArray:
         """The middle of the extent, float64 (3,)."""
         corners = np.concatenate(self.boxes)
-        return (corners.min(axis=0) + corners.max(axis=0)) / 2
+        middle: FloatArray = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        return middle
 
 
 @dataclass(frozen=True)

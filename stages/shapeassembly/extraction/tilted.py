@@ -115,7 +115,8 @@ def _in_turning_plane(layout: NodeLayout, part: int, other: int) -> FloatArray:
     axis /= max(float(np.linalg.norm(axis)), 1e-12)
     away = np.abs((region - box.center) @ axis)
     near = region[away <= away.min() + 1e-3 * layout.diagonal]
-    return near.mean(axis=0)
+    point: FloatArray = near.mean(axis=0)
+    return point
 
 
 def _executed(

@@ -159,4 +159,5 @@ class Instantiator:
 
 def _boxes_meet(boxes: FloatArray, box: FloatArray, slack: float) -> np.ndarray:
     """Return which boxes (n, 2, 3) are within `slack` of a box (2, 3), centres and half extents, bool (n,)."""
-    return (np.abs(boxes[:, 0] - box[0]) <= boxes[:, 1] + box[1] + slack).all(axis=1)
+    near: np.ndarray = (np.abs(boxes[:, 0] - box[0]) <= boxes[:, 1] + box[1] + slack).all(axis=1)
+    return near

@@ -90,7 +90,8 @@ def _orientations(kit: Kit, part_type: int, upright: bool) -> list[_Orientation]
 def _maps_up(part_type: PartType, up: FloatArray, other: FloatArray) -> np.ndarray:
     """Return which symmetries map one up axis to another, bool (k,)."""
     gaps = np.linalg.norm(part_type.symmetries[:, :3, :3] @ up - other, axis=1)
-    return gaps < MAX_UP_DIFFERENCE
+    near: np.ndarray = gaps < MAX_UP_DIFFERENCE
+    return near
 
 
 def _docked_types(kit: Kit, part_type: int) -> Iterator[tuple[int, FloatArray]]:

@@ -89,7 +89,8 @@ def _canonical_directions(transforms: FloatArray, small: float) -> FloatArray:
     large = np.abs(numbers) > small * max(1.0, float(np.abs(numbers).max(initial=0)))
     first = large.argmax(axis=1)
     back = numbers[np.arange(len(numbers)), first] < 0
-    return np.where(back[:, None, None], invert(transforms), transforms)
+    canonical: FloatArray = np.where(back[:, None, None], invert(transforms), transforms)
+    return canonical
 
 
 def _vectors(transforms: FloatArray, reach: float) -> FloatArray:

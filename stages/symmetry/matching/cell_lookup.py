@@ -42,7 +42,8 @@ class PackedSubset:
 def items_in(grid: SurfaceGrid, cells: np.ndarray) -> np.ndarray:
     """Return the items of ascending `cells`, int64 (m,), ascending."""
     first, count = grid.starts[cells], grid.starts[cells + 1] - grid.starts[cells]
-    return np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
+    items: np.ndarray = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
+    return items
 
 
 def keys_at(grid: SurfaceGrid, pose: FloatArray, points: FloatArray) -> np.ndarray:
@@ -54,7 +55,8 @@ def is_among(keys: np.ndarray, queries: np.ndarray) -> BoolArray:
     """Return which of `queries` (n,) are among ascending `keys`, bool (n,)."""
     if not len(keys):
         return np.zeros(len(queries), dtype=bool)
-    return keys[np.minimum(np.searchsorted(keys, queries), len(keys) - 1)] == queries
+    known: BoolArray = keys[np.minimum(np.searchsorted(keys, queries), len(keys) - 1)] == queries
+    return known
 
 
 def items_moved_into(grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> np.ndarray:
@@ -67,4 +69,5 @@ def items_moved_into(grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> np
     home = (centres - grid.origin) / grid.cell_size
     low, high = np.floor(home.min(axis=0)) - 1, np.floor(home.max(axis=0)) + 1
     items = items_in(grid, np.flatnonzero(((grid.cells >= low) & (grid.cells <= high)).all(axis=1)))
-    return items[is_among(grid.keys[cells], keys_at(grid, invert(pose), grid.points[items]))]
+    inside: np.ndarray = items[is_among(grid.keys[cells], keys_at(grid, invert(pose), grid.points[items]))]
+    return inside

@@ -51,7 +51,8 @@ def _without(grid: SurfaceGrid, lost: np.ndarray, lost_back: np.ndarray, back: F
 
 def _lands_on_surface(grid: SurfaceGrid, transform: FloatArray, items: np.ndarray) -> BoolArray:
     """Return whether a transform takes each item to an occupied cell or a neighbour of one, bool (i,)."""
-    return _near_cells(grid.points[items], transform, grid.items)
+    lands: BoolArray = _near_cells(grid.points[items], transform, grid.items)
+    return lands
 
 
 def _fill_specks(grid: SurfaceGrid, symmetric: BoolArray, differs: BoolArray) -> BoolArray:
@@ -59,7 +60,8 @@ def _fill_specks(grid: SurfaceGrid, symmetric: BoolArray, differs: BoolArray) ->
 
     Nothing is known of the cells that do not differ. The paper removes isolated voxels of scans (symmetry §4.1).
     """
-    return _filled(symmetric, differs, grid.neighbours, MAX_HOLE_CELLS, MAX_NOISE_CELLS)
+    filled: BoolArray = _filled(symmetric, differs, grid.neighbours, MAX_HOLE_CELLS, MAX_NOISE_CELLS)
+    return filled
 
 
 def r_symmetric_cells(grid: SurfaceGrid, transform: FloatArray) -> tuple[BoolArray, BoolArray]:

@@ -119,7 +119,8 @@ class _Model:
     @cached_property
     def heights(self) -> FloatArray:
         """Height of each corner along the direction, float64 (f, 3)."""
-        return self.corners @ self.direction
+        heights: FloatArray = self.corners @ self.direction
+        return heights
 
     @cached_property
     def spans(self) -> tuple[FloatArray, FloatArray]:
@@ -169,7 +170,8 @@ class _Model:
 
 def _close(signatures: FloatArray, others: FloatArray) -> BoolArray:
     """Return which signatures (n, 10) may belong to sections equal to others (n, 10), or to one (10,): bool (n,)."""
-    return np.asarray((np.abs(signatures - others) < 1 - MIN_EQUAL_SHARE).all(axis=1))
+    close: BoolArray = np.asarray((np.abs(signatures - others) < 1 - MIN_EQUAL_SHARE).all(axis=1))
+    return close
 
 
 def _directions(edges: FloatArray) -> list[FloatArray]:
@@ -203,7 +205,8 @@ def _constant_stretches(model: _Model) -> FloatArray:
     opened = np.searchsorted(np.sort(low[slanted]), levels[:-1] + SAME_PLANE_SHARE / 2 * model.extent)
     closed = np.searchsorted(np.sort(high[slanted]), levels[:-1] + 2 * SAME_PLANE_SHARE * model.extent)
     constant = (opened == closed) & (np.diff(levels) > MIN_STRETCH_SHARE * model.extent)
-    return np.column_stack([levels[:-1], levels[1:]])[constant]
+    stretches: FloatArray = np.column_stack([levels[:-1], levels[1:]])[constant]
+    return stretches
 
 
 def _joints(model: _Model, constant: FloatArray) -> ParallelCuts:
@@ -298,7 +301,8 @@ def _likeness_to_first(model: _Model, sections: Sequence[PlaneSection], offsets:
 
 def _in_rows(same: np.ndarray) -> BoolArray:
     """Return which planes equal the one before or after; `same`, bool (n - 1,): whether each equals the next."""
-    return np.r_[False, same] | np.r_[same, False]
+    in_rows: BoolArray = np.r_[False, same] | np.r_[same, False]
+    return in_rows
 
 
 def _shifts(model: _Model, vertices: FloatArray) -> Iterator[float]:

@@ -131,7 +131,8 @@ def _heights(corners: FloatArray, sides: np.ndarray) -> FloatArray:
     face, k = sides // 3, sides % 3
     start, end, top = (corners[face, (k + turn) % 3] for turn in range(3))
     cross = np.linalg.norm(np.cross(end - start, top - start), axis=1)
-    return cross / np.linalg.norm(end - start, axis=1)
+    heights: FloatArray = cross / np.linalg.norm(end - start, axis=1)
+    return heights
 
 
 @numba.njit(cache=True)

@@ -153,7 +153,10 @@ def fragments(
     Returns, in the order of the triangles, the cell of each fragment, int64 (m, 3); its triangle, int64 (m,); a point
     inside it and its area, float64 (m, 4).
     """
-    return _all_fragments(np.ascontiguousarray(corners), origin, size, box[0], box[1])
+    cut: tuple[np.ndarray, np.ndarray, FloatArray] = _all_fragments(
+        np.ascontiguousarray(corners), origin, size, box[0], box[1]
+    )
+    return cut
 
 
 @numba.njit(cache=True)

@@ -149,4 +149,5 @@ def _first_of_corner(corner: np.ndarray, kinds: FloatArray) -> np.ndarray:
     ordered = corner[order]
     starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]][: len(ordered)])
     leader = np.repeat(order[starts], np.diff(np.r_[starts, len(order)]))
-    return order[(kinds[order] == kinds[leader]).all(axis=1)]
+    chosen: np.ndarray = order[(kinds[order] == kinds[leader]).all(axis=1)]
+    return chosen

@@ -114,7 +114,8 @@ class SurfaceGrid:
 
     def centres(self, cells: np.ndarray | slice = slice(None)) -> FloatArray:
         """Return the centres of cells, by their indices, float64 (m, 3)."""
-        return self.origin + (self.cells[cells] + 0.5) * self.cell_size
+        centres: FloatArray = self.origin + (self.cells[cells] + 0.5) * self.cell_size
+        return centres
 
 
 def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
@@ -178,7 +179,8 @@ def estimate_grid_size(corners: FloatArray, radius: float) -> int:
 def has_area(corners: FloatArray) -> BoolArray:
     """Find the triangles (f, 3, 3) that have area, bool (f,)."""
     sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
-    return 2 * triangle_areas(corners) > MIN_HEIGHT_SHARE * sides**2
+    chosen: BoolArray = 2 * triangle_areas(corners) > MIN_HEIGHT_SHARE * sides**2
+    return chosen
 
 
 @numba.njit(cache=True)

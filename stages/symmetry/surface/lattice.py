@@ -13,7 +13,8 @@ BITS_PER_AXIS = 21
 
 def pack(cells: np.ndarray) -> np.ndarray:
     """Pack non-negative cells int64 (n, 3) into one number each, int64 (n,), in lexicographic order."""
-    return (cells[:, 0] << 2 * BITS_PER_AXIS) | (cells[:, 1] << BITS_PER_AXIS) | cells[:, 2]
+    packed: np.ndarray = (cells[:, 0] << 2 * BITS_PER_AXIS) | (cells[:, 1] << BITS_PER_AXIS) | cells[:, 2]
+    return packed
 
 
 def unpack(keys: np.ndarray) -> np.ndarray:

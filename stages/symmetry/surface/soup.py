@@ -145,7 +145,10 @@ def centres_in(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray)
     """Find the triangles whose centres lie in ascending `cells` moved by `pose` (4, 4), bool (t,)."""
     chosen = grid.cells[cells]
     low, high = (chosen.min(axis=0), chosen.max(axis=0)) if len(chosen) else (np.zeros(3, int), np.full(3, -1))
-    return _centres_in(soup.corners, invert(pose), grid.origin, grid.cell_size, grid.keys[cells], low, high)
+    inside: BoolArray = _centres_in(
+        soup.corners, invert(pose), grid.origin, grid.cell_size, grid.keys[cells], low, high
+    )
+    return inside
 
 
 @numba.njit(cache=True)

@@ -32,7 +32,8 @@ def weld(corners: FloatArray, tolerance: float) -> tuple[IntArray, FloatArray]:
 
 def _rounded(points: FloatArray, tolerance: float) -> FloatArray:
     """Round points (n, 3) to a lattice of `tolerance`, where points of one vertex are equal."""
-    return np.round(points / tolerance) + 0.0 if tolerance else points + 0.0
+    rounded: FloatArray = np.round(points / tolerance) + 0.0 if tolerance else points + 0.0
+    return rounded
 
 
 class WeldedSurface:

@@ -54,9 +54,11 @@ def cuboid_rows(boxes: Sequence[Box]) -> FloatArray:
     right = [row for row in range(len(vectors)) if row not in left]
     kept = np.concatenate([vectors, mirrored[:, None]], axis=1)[right]
     centers, sizes = np.round(kept[:, CENTER], 2), np.round(kept[:, SIZE], 2)
-    return kept[np.lexsort((*sizes.T, centers[:, 2], centers[:, 0], centers[:, 1]))]
+    rows: FloatArray = kept[np.lexsort((*sizes.T, centers[:, 2], centers[:, 0], centers[:, 1]))]
+    return rows
 
 
 def mirror_cuboids(vectors: FloatArray) -> FloatArray:
     """Return box vectors (n, 9) mirrored left to right."""
-    return vectors * np.array([-1, 1, 1, 1, 1, 1, 1, -1, -1])
+    mirrored: FloatArray = vectors * np.array([-1, 1, 1, 1, 1, 1, 1, -1, -1])
+    return mirrored

@@ -94,7 +94,8 @@ def _sample_numbers(
     component = (weights + rng.gumbel(size=weights.shape)).argmax(axis=1)
     rows = np.arange(len(component))
     noise = temperature * rng.standard_normal((len(component), NUMBERS_PER_STEP))
-    return means[rows, component] + deviations[rows, component] * noise
+    numbers: FloatArray = means[rows, component] + deviations[rows, component] * noise
+    return numbers
 
 
 def _boxes(vectors: FloatArray, mirrored: BoolArray) -> tuple[Box, ...]:

@@ -54,7 +54,8 @@ class IndependentEdgeDecoder(EdgeCategoriesModel):
         self.logits = nn.Linear(config.hidden, categories)
 
     def forward(self, batch: CategoryBatch) -> Tensor:
-        return self.logits(self.reader(batch))
+        logits: Tensor = self.logits(self.reader(batch))
+        return logits
 
 
 class AutoregressiveEdgeDecoder(EdgeCategoriesModel):
@@ -87,7 +88,8 @@ class AutoregressiveEdgeDecoder(EdgeCategoriesModel):
         states = self.inputs(batch, self.reader(batch), self.frames(batch), tokens)
         for block in self.blocks:
             states, _, _ = block(states, None)
-        return self.logits(self.norm(states))
+        logits: Tensor = self.logits(self.norm(states))
+        return logits
 
     @torch.no_grad()
     def frames(self, batch: CategoryBatch) -> Tensor:
@@ -102,7 +104,8 @@ class AutoregressiveEdgeDecoder(EdgeCategoriesModel):
 
     def step(self, frames: Tensor, here: Tensor, pose: Tensor) -> Tensor:
         """Return the frames, float (n, 4, 4), of poses float (n, 4, 4) relative to tokens `here`, int64 (n,)."""
-        return _at(frames, here.clamp(min=0)[:, None])[:, 0] @ pose
+        composed: Tensor = _at(frames, here.clamp(min=0)[:, None])[:, 0] @ pose
+        return composed
 
     def inputs(self, batch: CategoryBatch, features: Tensor, frames: Tensor, tokens: Tensor) -> Tensor:
         """Return the inputs of some tokens, float (n, t, width).
@@ -121,7 +124,8 @@ class AutoregressiveEdgeDecoder(EdgeCategoriesModel):
         last = _at(frames, before).masked_fill(is_first, 0.0)
         places = torch.cat([frame[..., :3, :].flatten(-2) for frame in (start, other, last)], dim=-1)
         choice = batch.categories.gather(1, before).masked_fill(tokens == 0, DUMMY_CATEGORY)
-        return self.ends(ends) + self.places(places) + self.choice(choice)
+        inputs: Tensor = self.ends(ends) + self.places(places) + self.choice(choice)
+        return inputs
 
 
 def make_model(config: EdgeCategoriesConfig, tables: CategoryTables, cycles: int) -> EdgeCategoriesModel:

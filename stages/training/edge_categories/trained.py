@@ -192,7 +192,8 @@ class CategoryDecoding:
             # The parent comes first: where both ends allow nothing, the other end of a cycle is ignored.
             allowed = allowed & torch.from_numpy(self._fitting(ends[:, self.token].numpy(), types))
             logits = masked(logits, allowed)
-        return torch.log_softmax(logits, dim=-1).numpy()
+        scores: FloatArray = torch.log_softmax(logits, dim=-1).numpy()
+        return scores
 
     def take(self, categories: np.ndarray) -> None:
         """Choose the categories of the next token, int (strings,)."""
@@ -232,7 +233,8 @@ class CategoryDecoding:
         """
         part_types = self._types[np.arange(len(self)), np.maximum(parts, 0)]
         unknown = (parts < 0) | (part_types < 0) | (not self._is_masked)
-        return unknown[:, None] | (types == part_types[:, None])
+        fits: np.ndarray = unknown[:, None] | (types == part_types[:, None])
+        return fits
 
     def _next_logits(self) -> Tensor:
         if not isinstance(self._module, AutoregressiveEdgeDecoder):
@@ -241,7 +243,8 @@ class CategoryDecoding:
         for number, block in enumerate(self._module.blocks):
             states, keys, values = block(states, self._cache[number])
             self._cache[number] = keys, values
-        return self._module.logits(self._module.norm(states[:, 0]))
+        logits: Tensor = self._module.logits(self._module.norm(states[:, 0]))
+        return logits
 
 
 def load_edge_categories(path: Path, kit: Kit) -> TrainedEdgeCategories:

@@ -101,4 +101,5 @@ class MessagePassing(nn.Module):
         states = [features]
         for layer in self.rounds:
             states.append(leaky_relu(layer(torch.cat([states[-1], shares @ states[-1]], dim=-1)), 0.2))
-        return self.joined(torch.cat(states, dim=-1))
+        outputs: Tensor = self.joined(torch.cat(states, dim=-1))
+        return outputs

@@ -40,7 +40,8 @@ class TrainedPartGraphVae:
     def encode(self, shapes: Sequence[Execution]) -> LatentPoints:
         """Encode executed programs: posterior means, float32 (n, latent). Raises Rejected as `graph_nodes`."""
         graphs = GraphCorpus.of([graph_nodes(shape) for shape in shapes])
-        return self.module.encode(batch_of(graphs, np.arange(len(graphs))))[0].numpy()
+        means: LatentPoints = self.module.encode(batch_of(graphs, np.arange(len(graphs))))[0].numpy()
+        return means
 
     def sample_points(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> LatentPoints:
         """Draw points of the aggregate posterior, as `LatentGaussian.sample_points`."""
@@ -88,7 +89,8 @@ class TrainedPartGraphVae:
 
     def _have_parts(self, codes: torch.Tensor) -> np.ndarray:
         """Return which nodes of codes (n, hidden) have a part, bool (n,)."""
-        return (self.module.decode(codes).exists > 0).any(dim=1).numpy()
+        flags: np.ndarray = (self.module.decode(codes).exists > 0).any(dim=1).numpy()
+        return flags
 
 
 def load_part_graph_vae(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedPartGraphVae:

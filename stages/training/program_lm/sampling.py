@@ -144,4 +144,5 @@ def sample_words(
     last = np.argmax(sums >= top_p[:, None] * sums[:, -1:], axis=1)
     uniform = rng.random(len(sums)) * np.take_along_axis(sums, last[:, None], axis=1)[:, 0]
     rank = np.argmax(sums > uniform[:, None], axis=1)
-    return np.take_along_axis(order, rank[:, None], axis=1)[:, 0]
+    words: npt.NDArray[np.int64] = np.take_along_axis(order, rank[:, None], axis=1)[:, 0]
+    return words

@@ -80,7 +80,8 @@ Word = tuple[TokenField, int, float]
 
 def first_word(field: TokenField) -> int:
     """Return the first word of a field; its other words follow."""
-    return _STARTS[_KIND.get(field, _NUMBER_KIND)]
+    start: int = _STARTS[_KIND.get(field, _NUMBER_KIND)]
+    return start
 
 
 def field_words() -> BoolArray:

@@ -80,7 +80,8 @@ class LineDecoder(nn.Module):
 
     def command(self, states: Tensor, boxes: Tensor) -> Tensor:
         """Return logits (q, 7), from states (q, hidden) and sizes of the bounding boxes (q, 3)."""
-        return self._command(torch.cat([states, boxes], dim=-1))
+        logits: Tensor = self._command(torch.cat([states, boxes], dim=-1))
+        return logits
 
     def cuboid(self, states: Tensor, boxes: Tensor) -> tuple[Tensor, Tensor]:
         """Return sizes (q, 3) and the logit (q,) of the aligned flag."""
@@ -89,11 +90,13 @@ class LineDecoder(nn.Module):
 
     def indices(self, states: Tensor, commands: Tensor) -> Tensor:
         """Return logits (q, 3, 11) of the cuboids in lines of commands, one-hot (q, 7)."""
-        return self._indices(torch.cat([states, commands], dim=-1)).view(-1, 3, SLOT_COUNT)
+        logits: Tensor = self._indices(torch.cat([states, commands], dim=-1)).view(-1, 3, SLOT_COUNT)
+        return logits
 
     def attach(self, states: Tensor, slots: Tensor, sizes: Tensor) -> Tensor:
         """Return both points (q, 6) of an attachment of cuboids, one-hot (q, 2, 11), with sizes (q, 2, 3)."""
-        return self._attach(torch.cat([states, slots.flatten(1), sizes.flatten(1)], dim=-1))
+        points: Tensor = self._attach(torch.cat([states, slots.flatten(1), sizes.flatten(1)], dim=-1))
+        return points
 
     def squeeze(self, states: Tensor, slots: Tensor, sizes: Tensor) -> tuple[Tensor, Tensor]:
         """Return logits (q, 6) of the face, and u, v (q, 2), of cuboids (q, 3, 11) with sizes (q, 3, 3)."""

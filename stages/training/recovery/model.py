@@ -47,7 +47,8 @@ class RecoveryNet(nn.Module):
         embeddings = self.encoder(inputs)[None]
         if self.other is not None:
             embeddings = torch.where(self.continuous[:, None, None], self.other(inputs), embeddings)
-        return self.decoders(embeddings, noise)
+        outputs: Tensor = self.decoders(embeddings, noise)
+        return outputs
 
 
 class Dgcnn(nn.Module):
@@ -119,7 +120,8 @@ class Vgg(nn.Module):
 
     def forward(self, drawings: Tensor) -> Tensor:
         features = self.layers(drawings.contiguous(memory_format=torch.channels_last))
-        return self.embedding(features.flatten(1)).relu()
+        embedded: Tensor = self.embedding(features.flatten(1)).relu()
+        return embedded
 
 
 class HalveResolution(nn.Module):
@@ -177,4 +179,5 @@ def _uniform(parameters: int, before: int, after: int, inputs: int) -> nn.Parame
 
 def _normed(norm: nn.Module, features: Tensor) -> Tensor:
     """Apply `norm` over clouds and points together."""
-    return norm(features.flatten(0, 1)).view(features.shape)
+    normed: Tensor = norm(features.flatten(0, 1)).view(features.shape)
+    return normed

@@ -47,7 +47,8 @@ def edge_maximum(features: Tensor, neighbors: Tensor) -> Tensor:
     returns: float (clouds, n, width)
     """
     function = _EdgeMaximum if features.device.type == "cpu" else _EdgeMaximumOnGpu
-    return function.apply(features, neighbors)  # type: ignore[no-untyped-call]
+    edges: Tensor = function.apply(features, neighbors)  # type: ignore[no-untyped-call]
+    return edges
 
 
 class _EdgeMaximum(torch.autograd.Function):

@@ -30,7 +30,8 @@ def even_points(vertices: FloatArray, faces: IntArray, n: int) -> FloatArray:
     hit = np.minimum(np.searchsorted(cumulative, steps / n * cumulative[-1]), len(faces) - 1)
     a, b = (steps / PLASTIC_NUMBER) % 1.0, (steps / PLASTIC_NUMBER**2) % 1.0
     a, b = np.where(a + b > 1.0, 1.0 - a, a), np.where(a + b > 1.0, 1.0 - b, b)
-    return first[hit] + a[:, None] * along[hit] + b[:, None] * across[hit]
+    points: FloatArray = first[hit] + a[:, None] * along[hit] + b[:, None] * across[hit]
+    return points
 
 
 def shape_points(parts: Sequence[Part], n: int) -> FloatArray:

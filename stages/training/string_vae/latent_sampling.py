@@ -121,7 +121,8 @@ def gaussian_points(samples: LatentPoints, count: int, rng: np.random.Generator)
     """Sample points of the Gaussian with mean and covariance of `samples`: float32 (count, latent)."""
     centre: LatentPoints = samples.mean(axis=0)
     weights = rng.standard_normal((count, len(samples))) / np.sqrt(len(samples))
-    return (centre + weights @ (samples - centre)).astype(np.float32)
+    points: LatentPoints = (centre + weights @ (samples - centre)).astype(np.float32)
+    return points
 
 
 def sample(

@@ -119,7 +119,8 @@ def triplet_loss(points: Tensor, histograms: Tensor, margin: float, noise: Gener
         torch.where(differences[0] < differences[1], gaps[0], gaps[1]),
         torch.where(differences[0] < differences[1], gaps[1], gaps[0]),
     )
-    return (relu(nearer - farther + margin) * (differences[0] != differences[1])).mean()
+    loss: Tensor = (relu(nearer - farther + margin) * (differences[0] != differences[1])).mean()
+    return loss
 
 
 def _divergence(mean: Tensor, log_variance: Tensor) -> Tensor:

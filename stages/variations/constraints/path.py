@@ -137,7 +137,8 @@ def _lowered(resizer: Resizer, assembly: Assembly, route: Sequence[int]) -> Asse
 
 def _named(kit: Kit, names: Sequence[str]) -> np.ndarray:
     """Return which labels of the kit are among the names, bool (labels,)."""
-    return np.isin(kit.labels, list(names))
+    is_named: np.ndarray = np.isin(kit.labels, list(names))
+    return is_named
 
 
 CONSTRAINT = GlobalConstraint(needs=("entries", "exits"), may=("through",), test=_test, repair=_repair)

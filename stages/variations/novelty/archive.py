@@ -51,7 +51,8 @@ class Archive:
 
     def crowds(self, places: np.ndarray) -> np.ndarray:
         """Return how common the variants at k places int (k, 2) are, int64 (k,), small numbers for rare ones."""
-        return self._cells.counts[places[:, 0]] * self._histograms.counts[places[:, 1]]
+        crowds: np.ndarray = self._cells.counts[places[:, 0]] * self._histograms.counts[places[:, 1]]
+        return crowds
 
     def has_histogram(self, histogram: int) -> bool:
         """Return whether a variant with this histogram was counted."""

@@ -140,7 +140,8 @@ def _tails(shape: ShapeTables) -> np.ndarray:
 
 def _handed(rotations: FloatArray) -> IntArray:
     """Return 1 for rotations (n, 3, 3), -1 for reflections, int64 (n,)."""
-    return np.where(np.linalg.det(rotations) < 0, -1, 1)
+    handed: IntArray = np.where(np.linalg.det(rotations) < 0, -1, 1)
+    return handed
 
 
 def _groups(kit: Kit) -> Groups:

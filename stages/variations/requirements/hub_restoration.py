@@ -198,7 +198,8 @@ class HubRestorer:
         answers = self.oracle.around(types[near], poses[near], hub, place)
         if (answers == FORBIDDEN_CONTACT).any():
             return None
-        return near[answers != NO_CONTACT].tolist()
+        touched: list[int] = near[answers != NO_CONTACT].tolist()
+        return touched
 
 
 def hub_restorer(task: Task, kit: str) -> HubRestorer:
@@ -242,7 +243,8 @@ def _look_same(part_type: PartType, poses: FloatArray, pose: FloatArray, toleran
     images = pose @ part_type.symmetries
     length = part_type.diagonal / 2
     gaps = pose_vectors(images, length)[:, None] - pose_vectors(poses, length)[None]
-    return (np.linalg.norm(gaps, axis=2) <= tolerance).any(axis=0)
+    same: np.ndarray = (np.linalg.norm(gaps, axis=2) <= tolerance).any(axis=0)
+    return same
 
 
 def _near(boxes: FloatArray, box: FloatArray, slack: float) -> np.ndarray:

@@ -23,4 +23,5 @@ def named_labels(kit: Kit, names: Iterable[str], key: str) -> BoolArray:
             close = nearest_word(name, kit.labels)
             hint = f"did you mean {close}?" if close else f"it has {', '.join(kit.labels)}"
             raise ConfigError(f"{key}: kit {kit.name} has no parts called {name}; {hint}")
-    return np.isin(kit.labels, names)
+    is_named: BoolArray = np.isin(kit.labels, names)
+    return is_named

@@ -47,7 +47,8 @@ def spanning_hubs(kit: Kit) -> dict[int, int]:
 def _spanning(kit: Kit, exemplar: Exemplar) -> set[int]:
     types = exemplar.whole.types
     bare = _spans(kit, exemplar) & ~np.isin(types, kit.grammar.hubs)
-    return set(kit.label_of[types[bare]].tolist())
+    labels: set[int] = set(kit.label_of[types[bare]].tolist())
+    return labels
 
 
 def _spans(kit: Kit, exemplar: Exemplar) -> BoolArray:
@@ -55,4 +56,5 @@ def _spans(kit: Kit, exemplar: Exemplar) -> BoolArray:
     whole = exemplar.whole
     boxes = world_boxes(kit.types, whole.types, whole.poses)
     extent = np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0))
-    return np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) >= MIN_SPAN * extent
+    spans: BoolArray = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) >= MIN_SPAN * extent
+    return spans

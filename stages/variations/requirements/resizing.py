@@ -18,7 +18,8 @@ def heights_of(kit: Kit, assembly: Assembly) -> FloatArray:
     """Return the height of each part's centroid, float64 (n,)."""
     centroids = np.stack([kit.types[index].centroid for index in assembly.types])
     placed, up = assembly.placements, UP[kit.up]
-    return np.einsum("nj,nj->n", placed[:, up, :3], centroids) + placed[:, up, 3]
+    heights: FloatArray = np.einsum("nj,nj->n", placed[:, up, :3], centroids) + placed[:, up, 3]
+    return heights
 
 
 def spans_of(kit: Kit, assembly: Assembly) -> FloatArray:
@@ -35,7 +36,8 @@ def rigid_types(kit: Kit, rigid: Sequence[str]) -> BoolArray:
 
     Raise ConfigError for a label that no part has.
     """
-    return named_labels(kit, rigid, "variations.search.stretch.rigid")[kit.label_of]
+    is_rigid: BoolArray = named_labels(kit, rigid, "variations.search.stretch.rigid")[kit.label_of]
+    return is_rigid
 
 
 class Resizer:

@@ -115,7 +115,8 @@ class OperatorSelector:
         """Return the probability of each choice: an equal share for exploration, the rest by squared gain per work."""
         end = self._exchanged
         if self.config.method == "growth":
-            return np.eye(len(self.choices))[end]
+            only: FloatArray = np.eye(len(self.choices))[end]
+            return only
         possible = np.array([exemplars > 1 or draw in (PLAIN, RARE) for draw, *_ in self.choices[:end]])
         rates = np.where(possible, (self._gains[:end] + 1.0) / (self._work[:end] + 50.0), 0.0) ** 2
         explored: FloatArray = self.config.novelty.exploration * possible / possible.sum()

@@ -140,7 +140,8 @@ class FoundVariants:
 
     def described(self, index: int) -> dict[str, Any]:
         """Return the lineage of one variant."""
-        return json.loads(self._lineage[self.numbers[index]])
+        lineage: dict[str, Any] = json.loads(self._lineage[self.numbers[index]])
+        return lineage
 
     def lineages(self) -> Iterator[dict[str, Any]]:
         """Yield the lineage of each variant that the search found, kept or not, in order of their numbers."""
@@ -226,4 +227,5 @@ def write_kept(
 def _mapped(path: Path) -> np.ndarray:
     """Return an array on disk, mapped; an empty one, which cannot be mapped, is loaded."""
     empty = len(np.load(path, mmap_mode=None, allow_pickle=False)) == 0 if path.stat().st_size < 4096 else False
-    return np.load(path, mmap_mode=None if empty else "r", allow_pickle=False)
+    array: np.ndarray = np.load(path, mmap_mode=None if empty else "r", allow_pickle=False)
+    return array

@@ -71,7 +71,8 @@ def cut_families(near: Near, count: int, wanted: Mapping[str, int], rng: np.rand
 
 def _near_of(near: Near, some: Indices, index: int, among: Indices) -> Indices:
     """Return what is near among some of the variants, by their indices among these."""
-    return among[np.isin(some[among], near(int(some[index]), some[among]))]
+    near_ones: Indices = among[np.isin(some[among], near(int(some[index]), some[among]))]
+    return near_ones
 
 
 def _cut(

@@ -50,7 +50,8 @@ def split_candidates(kit: Kit, pool: PoolIndex, config: VariationsConfig, rng: n
     count = min(math.ceil(config.selection.oversample * config.samples_per_kit), len(pool))
     if count == len(pool):
         return np.arange(count)
-    return np.sort(select_diverse(kit, pool.counts, pool.features, count, config.selection, rng))
+    chosen: Indices = np.sort(select_diverse(kit, pool.counts, pool.features, count, config.selection, rng))
+    return chosen
 
 
 def choose_by_family(
@@ -89,7 +90,8 @@ def _near(pool: PoolIndex, ancestry: Ancestry, considered: Indices, shapes: Pack
         close = np.isin(considered[among], kin[considered[index]]) | (graph_of[among] == graph_of[index])
         rest = np.flatnonzero(~close)
         close[rest[shapes.shares(index, among[rest], min_share, min_share) > 0.0]] = True
-        return among[close & (among != index)]
+        near_ones: Indices = among[close & (among != index)]
+        return near_ones
 
     return near
 

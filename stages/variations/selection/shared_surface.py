@@ -131,14 +131,16 @@ class PackedShapes:
     def _bounds(self, shape: int, others: Indices) -> FloatArray:
         """Return upper bounds of what a shape shares with others, by the types of their parts, float64 (k,)."""
         common = np.minimum(self._counts[shape], self._counts[others]) @ self._tables.area
-        return common / np.maximum(self._tables.areas[shape], self._tables.areas[others])
+        bounds: FloatArray = common / np.maximum(self._tables.areas[shape], self._tables.areas[others])
+        return bounds
 
 
 def _seeds(areas: FloatArray) -> Indices:
     """Return SEEDS_PER_SHAPE parts, evenly spread over the surface of a shape, int64, in a scattered order."""
     reach = areas.cumsum()
     area_at = (np.arange(SEEDS_PER_SHAPE) * 7 % SEEDS_PER_SHAPE + 0.5) / SEEDS_PER_SHAPE * reach[-1]
-    return np.searchsorted(reach, area_at).clip(0, len(areas) - 1)
+    seeds: Indices = np.searchsorted(reach, area_at).clip(0, len(areas) - 1)
+    return seeds
 
 
 @numba.njit(cache=True)

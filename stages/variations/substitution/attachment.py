@@ -64,7 +64,8 @@ class AttachmentTest:
 
     def _down(self, assembly: Assembly) -> BoolArray:
         """Return which side of each part faces down, bool (n, 6)."""
-        return -np.einsum("nji,j->ni", assembly.poses[:, :3, :3], self._up) @ AXES.T >= MIN_AXIS_COSINE
+        faces_down: BoolArray = -np.einsum("nji,j->ni", assembly.poses[:, :3, :3], self._up) @ AXES.T >= MIN_AXIS_COSINE
+        return faces_down
 
     def _corners(self, assembly: Assembly) -> tuple[FloatArray, FloatArray]:
         """Return the boxes of the parts in their own coordinates, float64 (n, 2, 3), and their corners in the world,
@@ -100,7 +101,8 @@ class AttachmentTest:
 
 def _at(turned: np.ndarray, held: BoolArray) -> BoolArray:
     """Return where a part is held, (6, 6), as if it were turned."""
-    return held[np.ix_(turned, turned)]
+    as_turned: BoolArray = held[np.ix_(turned, turned)]
+    return as_turned
 
 
 def _turned_sides(rotations: FloatArray) -> list[np.ndarray]:

@@ -95,7 +95,8 @@ def _cut_edges(kit: Kit, side: Side, darts: np.ndarray) -> tuple[FloatArray, Flo
 def _angles(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the angles between directions (b, 3), float64 (b,), in radians."""
     lengths = np.maximum(np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), 1e-12)
-    return np.arccos(np.clip((a * b).sum(axis=1) / lengths, -1.0, 1.0))
+    angles: FloatArray = np.arccos(np.clip((a * b).sum(axis=1) / lengths, -1.0, 1.0))
+    return angles
 
 
 def _turns(edges: FloatArray, own: FloatArray, up: int) -> FloatArray:

@@ -86,7 +86,8 @@ def _first(flat: FloatArray, heights: FloatArray, across: FloatArray) -> FloatAr
     reach = np.linalg.norm(flat, axis=1)
     keys = [*(np.round(flat @ axis, 6) for axis in across[::-1]), heights.round(6), -reach.round(6)]
     first = flat[int(np.lexsort(keys)[0])]
-    return first / np.linalg.norm(first)
+    direction: FloatArray = first / np.linalg.norm(first)
+    return direction
 
 
 def _normal(sites: FloatArray, axes: FloatArray) -> FloatArray:
@@ -104,4 +105,5 @@ def _normal(sites: FloatArray, axes: FloatArray) -> FloatArray:
     leanings = [float(normal @ axes[0]), float(((sites @ normal) ** 3).sum() / np.abs(sites).max() ** 3)]
     leanings += [float(normal @ axis) for axis in axes[1:]]
     leaning = next((value for value in leanings if abs(value) > SAME_DIRECTION), 1.0)
-    return normal if leaning > 0 else -normal
+    side: FloatArray = normal if leaning > 0 else -normal
+    return side

@@ -103,7 +103,8 @@ def _best(
         return None
     gaps = np.array([_gap(kit, move, moved, still, rows, frame) for move in transforms])
     closest = np.flatnonzero(gaps <= gaps.min() + kit.pose_tolerance)
-    return transforms[closest[int(rng.random() * len(closest))]]
+    best: FloatArray = transforms[closest[int(rng.random() * len(closest))]]
+    return best
 
 
 def transforms_onto(
@@ -117,7 +118,8 @@ def transforms_onto(
     if moved.assembly.types[own] != still.assembly.types[other]:
         return np.empty((0, 4, 4))
     symmetries = kit.types[moved.assembly.types[own]].symmetries
-    return frame @ still.assembly.poses[other] @ symmetries @ invert(moved.assembly.poses[own])
+    transforms: FloatArray = frame @ still.assembly.poses[other] @ symmetries @ invert(moved.assembly.poses[own])
+    return transforms
 
 
 def _coincide(kit: Kit, transform: FloatArray, moved: Side, still: Side, row: np.ndarray, frame: FloatArray) -> bool:
@@ -147,4 +149,5 @@ def _gap(kit: Kit, transform: FloatArray, moved: Side, still: Side, rows: np.nda
 def _centre(kit: Kit, side: Side, dart: int) -> FloatArray:
     """Return the centroid of the part that a dart leads to, float64 (4,)."""
     part = side.graph.tails[side.graph.twins[dart]]
-    return side.assembly.poses[part] @ np.append(kit.types[side.assembly.types[part]].centroid, 1.0)
+    centre: FloatArray = side.assembly.poses[part] @ np.append(kit.types[side.assembly.types[part]].centroid, 1.0)
+    return centre

@@ -59,7 +59,8 @@ class Operations:
 
     def boundary(self, number: int) -> np.ndarray:
         """Return the boundary of one operation, int64 (b, 2)."""
-        return self.pairs[self.starts[number] : self.starts[number + 1]]
+        rows: np.ndarray = self.pairs[self.starts[number] : self.starts[number + 1]]
+        return rows
 
 
 def find_operations(a: OrderedGraph, b: OrderedGraph, violations: int = 0, by_docking: bool = False) -> Operations:

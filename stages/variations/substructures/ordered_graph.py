@@ -23,7 +23,8 @@ class OrderedGraph(NamedTuple):
 
     def neighbours(self, node: int) -> list[int]:
         """Return the nodes around `node`, in order."""
-        return self.tails[self.twins[self.starts[node] : self.starts[node + 1]]].tolist()
+        around: list[int] = self.tails[self.twins[self.starts[node] : self.starts[node + 1]]].tolist()
+        return around
 
     def around(self, dart: int) -> list[int]:
         """Return the darts of a node in order, from one of them."""
@@ -34,14 +35,16 @@ class OrderedGraph(NamedTuple):
         """Return the edges as pairs of nodes i < j in lexicographic order, int32 (m, 2)."""
         heads = self.tails[self.twins]
         pairs = np.stack([self.tails, heads], axis=1)[self.tails < heads]
-        return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].astype(np.int32)
+        edges: np.ndarray = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].astype(np.int32)
+        return edges
 
     def docking_labels(self) -> np.ndarray:
         """Return the dockings of `edges`, seen from either end, counted from 0, int32 (m, 2)."""
         heads = self.tails[self.twins]
         forth = np.flatnonzero(self.tails < heads)
         forth = forth[np.lexsort((heads[forth], self.tails[forth]))]
-        return np.stack([self.labels[forth], self.labels[self.twins[forth]]], axis=1).astype(np.int32) - 1
+        labels: np.ndarray = np.stack([self.labels[forth], self.labels[self.twins[forth]]], axis=1).astype(np.int32) - 1
+        return labels
 
 
 def ordered_graph(

@@ -82,7 +82,8 @@ class RegionSwaps:
         regions = (self.regions == np.arange(self.regions.shape[1])).sum(axis=1)
         again = np.minimum(2 ** np.minimum(regions, 16) - 2 - regions, MAX_COMPOSITIONS_PER_REGION * regions)
         composed = len(self) + np.repeat(np.arange(len(regions)), again)
-        return rng.permutation(np.concatenate([np.arange(len(self)), composed])).tolist()
+        numbers: list[int] = rng.permutation(np.concatenate([np.arange(len(self)), composed])).tolist()
+        return numbers
 
     def draw(self, rng: np.random.Generator, number: int) -> tuple[int, np.ndarray]:
         """Return the alignment and the regions, bool (n + m,), of a number of `order`.

@@ -25,7 +25,8 @@ def piece_of(graph: OrderedGraph, cut: np.ndarray) -> np.ndarray:
 
     These are what the darts point to and all that is connected with it without crossing the cut.
     """
-    return cut_off(graph, np.ascontiguousarray(cut))
+    inside: np.ndarray = cut_off(graph, np.ascontiguousarray(cut))
+    return inside
 
 
 def replace_piece(base: OrderedGraph, giver: OrderedGraph, boundary: np.ndarray) -> Replacement | None:

@@ -105,7 +105,8 @@ def _as_made(kit: Kit, sample: Sample) -> Assembly:
 def _found(kit: Kit, assembly: Assembly, poses: FloatArray, others: Assembly) -> BoolArray:
     """Return which parts of an assembly, moved to `poses`, are among those `there`, bool (n,)."""
     gaps = np.abs(poses[:, None] - others.poses).max(axis=(2, 3))
-    return ((gaps < kit.pose_tolerance) & (assembly.types[:, None] == others.types)).any(axis=1)
+    is_there: BoolArray = ((gaps < kit.pose_tolerance) & (assembly.types[:, None] == others.types)).any(axis=1)
+    return is_there
 
 
 def _row(kit: Kit, key: str, drawn: DrawnReplacement) -> list[Cell]:

@@ -413,7 +413,8 @@ def _order(rng: np.random.Generator, operations: Operations, ways: int) -> list[
     numbers = rng.permutation(ways)
     is_plain = numbers % max(len(operations), 1) < operations.plain
     rank = np.where(is_plain, 2 * np.cumsum(is_plain), 2 * np.cumsum(~is_plain) + 1)
-    return numbers[np.argsort(-rank, kind="stable")].tolist()
+    order: list[int] = numbers[np.argsort(-rank, kind="stable")].tolist()
+    return order
 
 
 def _side(kit: Kit, parent: Parent, graph_of: Callable[[Kit, Assembly, IntArray], OrderedGraph]) -> Side:

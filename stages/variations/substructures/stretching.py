@@ -80,7 +80,8 @@ def _touching(kit: Kit, side: Side, darts: np.ndarray) -> FloatArray:
     outer, inner = boxes[side.graph.tails[darts]], boxes[side.graph.tails[side.graph.twins[darts]]]
     ends = np.stack([np.maximum(outer[:, 0], inner[:, 0]), np.minimum(outer[:, 1], inner[:, 1])], axis=1)
     corners = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(8, 3)
-    return ends[:, corners, np.arange(3)]
+    common_corners: FloatArray = ends[:, corners, np.arange(3)]
+    return common_corners
 
 
 def _affine(points: FloatArray, aims: FloatArray, like: FloatArray) -> FloatArray:

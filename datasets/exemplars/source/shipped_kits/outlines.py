@@ -23,13 +23,15 @@ def chamfered(width: float, height: float, cut: float, x: float = 0.0, y: float 
     a, b = width / 2, height / 2
     corners = [(a, cut - b), (a, b - cut), (a - cut, b), (cut - a, b)]
     corners += [(-u, -v) for u, v in corners]
-    return np.array(corners) + np.array([x, y])
+    placed: FloatArray = np.array(corners) + np.array([x, y])
+    return placed
 
 
 def regular(sides: int, apothem: float, turn: float = 0.0) -> FloatArray:
     """Return the corners (sides, 2) of a regular polygon with the middle of one side at angle `turn` (degrees)."""
     angles = np.radians(turn + (np.arange(sides) - 0.5) * 360.0 / sides)
-    return np.stack([np.cos(angles), np.sin(angles)], axis=1) * (apothem / np.cos(np.pi / sides))
+    corners: FloatArray = np.stack([np.cos(angles), np.sin(angles)], axis=1) * (apothem / np.cos(np.pi / sides))
+    return corners
 
 
 def arch(width: float, height: float, rise: float, segments: int = 6, y: float = 0.0) -> FloatArray:
@@ -37,7 +39,8 @@ def arch(width: float, height: float, rise: float, segments: int = 6, y: float =
     angles = np.linspace(0.0, np.pi, segments + 1)
     head = np.stack([np.cos(angles) * width / 2, np.sin(angles) * rise + height - rise], axis=1)
     sill = np.array([[-width / 2, 0.0], [width / 2, 0.0]])
-    return np.concatenate([sill, head]) + np.array([0.0, y])
+    placed: FloatArray = np.concatenate([sill, head]) + np.array([0.0, y])
+    return placed
 
 
 def mirrored(*right: tuple[float, float]) -> FloatArray:
@@ -51,7 +54,8 @@ def grown(outline: FloatArray, distance: float) -> FloatArray:
     normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
     before = np.roll(normals, 1, axis=0)
     spread = 1.0 + (normals * before).sum(axis=1)
-    return outline + distance * (normals + before) / spread[:, None]
+    moved: FloatArray = outline + distance * (normals + before) / spread[:, None]
+    return moved
 
 
 def triangulate(points: FloatArray, loops: Sequence[Sequence[int]]) -> list[tuple[int, int, int]]:

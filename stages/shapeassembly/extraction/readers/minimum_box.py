@@ -44,7 +44,8 @@ def _largest_sides(normals: FloatArray, triangles: FloatArray) -> FloatArray:
     total = np.bincount(kind.ravel(), areas, len(kinds))
     first = np.unique(kind.ravel(), return_index=True)[1]
     chosen = np.argsort(-total, kind="stable")[:MAX_HULL_SIDES]
-    return flipped[first[chosen]]
+    sides: FloatArray = flipped[first[chosen]]
+    return sides
 
 
 def _flat(points: FloatArray, upright: Box) -> Box:
