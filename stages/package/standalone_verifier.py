@@ -19,11 +19,13 @@ import json
 import struct
 import sys
 import tarfile
+import threading
+import time
 import zlib
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
@@ -46,6 +48,7 @@ OUTLINE_PIXELS = 4.0
 """Largest distance of a drawing's outline from that of the mesh, besides the line width."""
 INK_LEVEL = 128
 FAULTS_SHOWN = 20
+SECONDS_BETWEEN_LINES = 5.0
 DISTINCT = ("key", "shape graph", "mesh")
 """What no two splits share; a key is there once."""
 NOT_CHECKED = "not checked: physical stability (only rootedness is), strings and programs, the Parquet index"
@@ -57,29 +60,35 @@ class DatasetFindings:
 
     faults: sentences, each with its file
     checked: numbers of things checked
-    split_of: for keys, shape graphs and meshes, by kind: the split and the sample where each was first seen
     classes: numbers of shapes and parts, by field, class and split
+    samples: of a shard: the sample that has a key, a shape graph or a mesh, by kind and digest
+    split_of: of the dataset: the split where each was first seen
     """
 
     faults: list[str] = field(default_factory=list)
     checked: Counter[str] = field(default_factory=Counter)
-    split_of: dict[str, dict[str, tuple[str, str]]] = field(default_factory=lambda: {kind: {} for kind in DISTINCT})
     classes: Counter[tuple[str, int, str]] = field(default_factory=Counter)
+    samples: dict[str, dict[bytes, str]] = field(default_factory=lambda: {kind: {} for kind in DISTINCT})
+    split_of: dict[str, dict[bytes, str]] = field(default_factory=lambda: {kind: {} for kind in DISTINCT})
 
-    def see(self, kind: str, name: str, split: str, sample: str) -> None:
-        """Note where a key, a shape graph or a mesh is, and whether it is in another split too."""
-        first_split, first = self.split_of[kind].setdefault(name, (split, sample))
-        if first != sample and (kind == "key" or first_split != split):
-            self.faults.append(f"{sample}: its {kind} is that of {first} in {first_split} too")
+    def note(self, kind: str, content: bytes, sample: str) -> None:
+        """Note what a sample of a shard has."""
+        digest = hashlib.blake2b(content, digest_size=16).digest()
+        if kind == "key" and digest in self.samples[kind]:
+            self.faults.append(f"{sample}: is there twice")
+        self.samples[kind][digest] = sample
 
-    def add(self, other: DatasetFindings) -> None:
-        """Add the findings of a shard."""
+    def add(self, other: DatasetFindings, split: str) -> None:
+        """Add the findings of a shard of a split."""
         self.faults += other.faults
         self.checked.update(other.checked)
         self.classes.update(other.classes)
-        for kind, names in other.split_of.items():
-            for name, (split, sample) in names.items():
-                self.see(kind, name, split, sample)
+        for kind, samples in other.samples.items():
+            known = self.split_of[kind]
+            for digest, sample in samples.items():
+                if digest in known and (kind == "key" or known[digest] != split):
+                    self.faults.append(f"{sample}: its {kind} is in {known[digest]} too")
+                known.setdefault(digest, split)
 
 
 def verify(folder: Path, samples: int | None = 100, seed: int = 0, workers: int = 1) -> DatasetFindings:
@@ -98,19 +107,21 @@ def verify(folder: Path, samples: int | None = 100, seed: int = 0, workers: int 
         findings.faults.append(f"manifest.json or classes.json cannot be read: {error!r}")
         return findings
     count = total if samples is None else min(samples, total)
-    chosen = set(np.random.default_rng(seed).permutation(total)[:count].tolist())
+    chosen = np.sort(np.random.default_rng(seed).choice(total, count, replace=False))
     labels = {number: str(name) for number, (name, _, _) in classes.items()}
     jobs, first = [], 0
     for number, (path, split, size) in enumerate(counts):
         if path in listed:
-            places = {place - first for place in chosen if first <= place < first + size}
+            inside = chosen[slice(*np.searchsorted(chosen, (first, first + size)))]
+            places = set((inside - first).tolist())
             jobs.append(ShardJob(folder, path, split, members, labels, share_split, places, (seed, number)))
         else:
             findings.faults.append(f"{path}: is in manifest.json and not in checksums.txt")
         first += size
     with ProcessPoolExecutor(workers) if workers > 1 else nullcontext() as pool:
-        for result in pool.map(check_shard, jobs) if pool else map(check_shard, jobs):
-            findings.add(result)
+        results = pool.map(check_shard, jobs) if pool else map(check_shard, jobs)
+        for job, result in zip(jobs, results, strict=True):
+            findings.add(result, job.split)
     for path, split, size in counts:
         if findings.checked.pop(path, 0) != size:
             findings.faults.append(f"{path}: does not have the {size} samples that manifest.json counts in {split}")
@@ -277,11 +288,11 @@ def record_faults(
             yield f"counts {record['physics']['components']} components; joints.npy makes {components}"
     if "txt" in members and not members["txt"].decode().startswith(record["text"]):
         yield "its text is not that of the record"
-    findings.see("key", record["key"], job.split, sample)
+    findings.note("key", record["key"].encode(), sample)
     if job.graphs_share_split:
-        findings.see("shape graph", record["graph"], job.split, sample)
+        findings.note("shape graph", record["graph"].encode(), sample)
     if "glb" in members:
-        findings.see("mesh", hashlib.sha256(members["glb"]).hexdigest(), job.split, sample)
+        findings.note("mesh", members["glb"], sample)
 
 
 def label_faults(record: dict[str, Any], arrays: dict[str, np.ndarray]) -> Iterator[str]:
@@ -528,6 +539,24 @@ def unfiltered(kind: int, line: np.ndarray, above: np.ndarray) -> np.ndarray:
     return result
 
 
+@contextmanager
+def still_running() -> Iterator[None]:
+    """Print the time that has passed to stderr, every few seconds, while the block runs."""
+    start, ended = time.monotonic(), threading.Event()
+
+    def refresh() -> None:
+        while not ended.wait(SECONDS_BETWEEN_LINES):
+            print(f"verifying, {time.monotonic() - start:.0f} s elapsed", file=sys.stderr)
+
+    thread = threading.Thread(target=refresh, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
 def main() -> int:
     """Verify, print, and return the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
@@ -537,7 +566,8 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=1, help="number of processes")
     options = parser.parse_args()
     samples = None if options.samples == "all" else int(options.samples)
-    findings = verify(options.folder, samples, options.seed, options.workers)
+    with still_running():
+        findings = verify(options.folder, samples, options.seed, options.workers)
     print("\n".join(findings.faults[:FAULTS_SHOWN]), end="\n" * bool(findings.faults))
     if len(findings.faults) > FAULTS_SHOWN:
         print(f"and {len(findings.faults) - FAULTS_SHOWN} more")

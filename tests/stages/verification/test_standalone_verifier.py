@@ -6,6 +6,7 @@ import ast
 import io
 import subprocess
 import sys
+import tarfile
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,22 @@ def test_a_forged_sample_is_found_without_the_project(folder: Path, name: str) -
 def test_a_forged_folder_is_found_without_the_project(folder: Path, name: str) -> None:
     forge(folder, name, np.random.default_rng(0))
     assert verify(folder, 0).faults
+
+
+def test_a_sample_that_is_there_twice_is_found(folder: Path) -> None:
+    from pipeline.shards import read_shard
+    from tests.stages.verification.forge import reseal
+
+    path = next(path for path in sorted(folder.glob("data/*/*.tar")) if len(list(read_shard(path))) > 1)
+    samples = list(read_shard(path))
+    key, members = samples[0]
+    with tarfile.open(path, "a") as tar:
+        for name, content in members.items():
+            entry = tarfile.TarInfo(f"{key}.{name}")
+            entry.size = len(content)
+            tar.addfile(entry, io.BytesIO(content))
+    reseal(folder)
+    assert any(f"{key}: is there twice" in fault for fault in verify(folder, 0).faults)
 
 
 def test_shard_outside_the_folder_is_not_opened(folder: Path) -> None:
