@@ -17,7 +17,7 @@ NUMBERS = {
     "GeoCode": (3, 17),
 }
 """Tables and figures of each paper."""
-VERDICTS = ("beaten", "level", "behind", "reproduced", "partly", "not here", "concept")
+VERDICTS = ("beaten", "level", "behind", "reproduced", "partly", "not here", "missing", "concept")
 
 
 def rows(paper: str) -> list[list[str]]:
