@@ -21,6 +21,7 @@ from eval.generated.set_metrics import (
     set_metrics,
     shape_descriptors,
 )
+from pipeline.display import ticking
 from stages.shape.arrays import FloatArray
 
 COLUMNS = (
@@ -81,7 +82,8 @@ def _figures(
 
     count = min(len(generated), len(reference))
     generated, reference = _subset(generated, count), _subset(reference, count)
-    of_generated, of_reference, diversity = nearest_by_chamfer(generated, reference, workers)
+    with ticking("eval", f"comparing {count} and {count} shapes"):
+        of_generated, of_reference, diversity = nearest_by_chamfer(generated, reference, workers)
     chamfer = set_metrics(of_generated, of_reference)
     emd = set_metrics(*_nearest_by_emd(generated[:emd_shapes], reference[:emd_shapes], emd_points, workers))
     return (

@@ -9,19 +9,20 @@ import numpy as np
 
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.shapes import split_shapes
+from pipeline.display import ticking
 from pipeline.errors import ConfigError
 from pipeline.randomness import decision_rng
 from stages.model_files.read import read_model
+from stages.model_files.scene_file import READERS
 from stages.package.layout import MANIFEST
 from stages.points.area_sampling import sample_shape, sample_surface
 from stages.shape.arrays import FloatArray
 from stages.shape.collection.assignment import SPLITS
+from stages.shape.input_file import without_sidecars
 from stages.shape.shape import Shape
 
 Sampler = Callable[[np.random.Generator], FloatArray]
 """Samples the cloud of a shape, float64 (n, 3)."""
-
-MODEL_FILES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off", ".dae")
 
 
 def clouds_of_set(name: str, run: DatasetRun, kit: str, max_shapes: int, points: int) -> FloatArray:
@@ -55,7 +56,7 @@ def clouds_of_path(path: Path, max_shapes: int, points: int) -> FloatArray:
         return _selected(str(path), shapes, max_shapes)
     if not path.is_dir():
         raise ConfigError(f"{path} is no set of shapes: give a folder of models, a dataset, or an .npy of clouds")
-    files = sorted(file for file in path.rglob("*") if file.suffix.lower() in MODEL_FILES)
+    files, _ = without_sidecars(sorted(file for file in path.rglob("*") if file.suffix.lower() in READERS))
     samplers = ((str(file.relative_to(path)), _points_of_file(file, points)) for file in files)
     return _selected(str(path), samplers, max_shapes)
 
@@ -94,13 +95,14 @@ def _exemplars(run: DatasetRun, kit: str, points: int) -> Iterable[tuple[str, Sa
 def _selected(name: str, samplers: Iterable[tuple[str, Sampler]], max_shapes: int) -> FloatArray:
     """Sample a cloud of `max_shapes` shapes, which are chosen by their keys alone."""
     clouds: dict[tuple[float, int], FloatArray] = {}
-    for index, (key, sampler) in enumerate(samplers):
-        rng = decision_rng(0, "generation", key, index)
-        rank = (rng.random(), index)
-        if len(clouds) < max_shapes or rank < max(clouds):
-            clouds[rank] = sampler(rng)
-        if len(clouds) > max_shapes:
-            del clouds[max(clouds)]
+    with ticking("eval", f"sampling the shapes of {name}"):
+        for index, (key, sampler) in enumerate(samplers):
+            rng = decision_rng(0, "generation", key, index)
+            rank = (rng.random(), index)
+            if len(clouds) < max_shapes or rank < max(clouds):
+                clouds[rank] = sampler(rng)
+            if len(clouds) > max_shapes:
+                del clouds[max(clouds)]
     return _enough(name, np.array([clouds[rank] for rank in sorted(clouds)], dtype=np.float64))
 
 
