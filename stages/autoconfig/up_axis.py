@@ -28,8 +28,12 @@ FORMAT_AXES: Mapping[str, Literal["y", "z"]] = {".obj": "y", ".stl": "z"}
 MAX_LOG_RATIO = 3.0
 MIN_FOOT_AREA, MIN_MIRROR_DISTANCE = 3e-3, 2e-3
 """Noise levels of feet and of distances, as shares of a model's size (squared, for feet)."""
+GLTF_SUFFIXES = (".glb", ".gltf")
+GLTF_REASON = "glTF is y up by its specification"
 MIN_EVIDENCE = 0.1
 """Sum of log odds from which the evidence decides."""
+MIN_EVIDENCE_AGAINST_GLTF = 1.5
+"""Sum of log odds that overrules the specification of glTF: it takes a model that would fall over, and a small foot."""
 MIRROR_SAMPLES = 1500
 """Points of a model that are compared with its mirror image."""
 MIN_TURN_RADIANS = 0.05
@@ -52,12 +56,13 @@ REASONS = {
 def resolve_up_axis(models: Sequence[Model], identified: IdentifiedParts) -> tuple[Literal["y", "z"], str]:
     """Return the axis that points up in `models`, whose parts are `identified`, and the reason as a sentence.
 
-    A format in which a file states its axis is believed (COLLADA). glTF fixes y whatever the content, and other formats
-    say nothing. For these, four kinds of evidence are weighed. Would the models fall over, their centre not being above
-    the hull of their lowest points? Along which axis is the foot larger? Along which axis do the models differ more
-    from their mirror image, since objects have a top and a bottom more often than a front and a back? What is the
-    convention of the format? If the evidence is too weak, the axis about which equal parts are rotated is taken, else
-    y.
+    A format in which a file states its axis is believed (COLLADA). glTF is y up by its specification, which only strong
+    evidence from the shapes overrules; the reason then says how to overrule it back. Other formats say nothing.
+
+    Four kinds of evidence are weighed. Would the models fall over, their centre not being above the hull of their
+    lowest points? Along which axis is the foot larger? Along which axis do the models differ more from their mirror
+    image, since objects have a top and a bottom more often than a front and a back? What is the convention of the
+    format? If the evidence is too weak, the axis about which equal parts are rotated is taken, else y.
     """
     stated = {model.up for model in models}
     if len(stated) == 1 and None not in stated:
@@ -66,6 +71,8 @@ def resolve_up_axis(models: Sequence[Model], identified: IdentifiedParts) -> tup
             return axis_in_file, "the file states it"
     evidence = list(map(_evidence, models))
     odds = {reason: float(np.mean([of_model[reason] for of_model in evidence])) for reason in REASONS}
+    if all(model.path.suffix.lower() in GLTF_SUFFIXES for model in models):
+        return _axis_of_gltf(odds)
     total = sum(odds.values())
     if abs(total) >= MIN_EVIDENCE:
         sign = 1.0 if total > 0 else -1.0
@@ -76,6 +83,17 @@ def resolve_up_axis(models: Sequence[Model], identified: IdentifiedParts) -> tup
         if turns[index] > MIN_TURN_MAJORITY * (turns[1] + turns[2]):
             return axis, f"equal parts are turned about {axis}, {turns[index]} of {turns[1] + turns[2]} times"
     return "y", "neither the foot nor the turns of equal parts tell, and y is the convention"
+
+
+def _axis_of_gltf(odds: Mapping[str, float]) -> tuple[Literal["y", "z"], str]:
+    """Return the axis of glTF files whose shapes give the log odds `odds` for y, and the reason."""
+    shape = sum(odds.values())
+    if shape > -MIN_EVIDENCE:
+        return "y", GLTF_REASON
+    if shape > -MIN_EVIDENCE_AGAINST_GLTF:
+        return "y", f"{GLTF_REASON}; set `up: z` if the model lies on its side"
+    strongest = REASONS[min(odds, key=lambda reason: odds[reason])]
+    return "z", f"{strongest}, although {GLTF_REASON}; set `up: y` to keep to it"
 
 
 def _evidence(model: Model) -> dict[str, float]:

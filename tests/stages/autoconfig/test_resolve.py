@@ -47,20 +47,48 @@ def turned(shape: Sequence[Placed]) -> list[Placed]:
     return [(name, Z_UP @ at) for name, at in shape]
 
 
+def silent(models: Sequence[Model]) -> list[Model]:
+    """Return the models as if their format said nothing about the up axis."""
+    return [replace(model, path=model.path.with_suffix(".off")) for model in models]
+
+
 class TestUpAxis:
     @pytest.mark.parametrize(("turn", "axis"), [(False, "y"), (True, "z")])
     def test_model_stands_on_its_broad_side(self, turn: bool, axis: str) -> None:
         shape = turned(ring(2, 3)) if turn else ring(2, 3)
-        models = models_of(ROAD, [shape])
+        models = silent(models_of(ROAD, [shape]))
         assert resolve_up_axis(models, identify_parts(models, config_of([shape])))[0] == axis
 
     def test_tower_stands_with_its_centre_above_its_foot(self) -> None:
         # wider and deeper from storey to storey: along z it would stand on a side of its top, the larger foot
         storeys = {f"storey{k}": box(1 + 0.3 * k, 1.0, 1 + 0.4 * k) for k in range(6)}
         shape = [(name, pose(0, k, 0)) for k, name in enumerate(storeys)]
-        models = models_of(storeys, [shape])
+        models = silent(models_of(storeys, [shape]))
         axis, reason = resolve_up_axis(models, identify_parts(models, config_of([shape])))
         assert (axis, "not above its foot" in reason) == ("y", True)
+
+    @pytest.mark.parametrize(
+        ("sizes", "axis", "words"),
+        [
+            ((8.0, 0.5, 3.0), "y", "by its specification"),
+            ((8.0, 3.0, 0.5), "y", "set `up: z` if the model lies on its side"),
+        ],
+    )
+    def test_plank_in_gltf_is_y_up_unless_it_would_fall_over(
+        self, sizes: tuple[float, float, float], axis: str, words: str
+    ) -> None:
+        shape = [("plank", pose(0, 0, 0)), ("plank", pose(sizes[0], 0, 0))]
+        models = models_of({"plank": box(*sizes)}, [shape])
+        found, reason = resolve_up_axis(models, identify_parts(models, config_of([shape])))
+        assert (found, words in reason) == (axis, True)
+
+    def test_table_that_falls_over_overrules_gltf_and_says_how_to_overrule_it_back(self) -> None:
+        legs = [("leg", pose(x, y, 0)) for x in (-2, 2) for y in (-1, 1)]
+        shape = [*legs, ("top", pose(0, 0, 2.25))]
+        meshes = {"leg": box(0.2, 0.2, 4.0), "top": box(5.0, 3.0, 0.5)}
+        models = models_of(meshes, [shape])
+        axis, reason = resolve_up_axis(models, identify_parts(models, config_of([shape])))
+        assert (axis, "set `up: y` to keep to it" in reason) == ("z", True)
 
     def test_axis_stated_by_the_file_is_believed(self) -> None:
         models = [replace(model, up="z") for model in models_of(ROAD, [ring(2, 3)])]
@@ -72,7 +100,7 @@ class TestUpAxis:
         corners = [(x, y, z) for x in (0, 4) for y in (0, 4) for z in (0, 4)]
         shape = [("brick", pose(*at)) for at in corners]
         shape += [("fin", pose(2, 2, 2) @ Z_UP @ pose(0, 0, 0, turns)) for turns in range(4)]
-        models = models_of(brick, [shape])
+        models = silent(models_of(brick, [shape]))
         axis, reason = resolve_up_axis(models, identify_parts(models, config_of([shape])))
         assert (axis, "3 of 3 times" in reason) == ("z", True)
 

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
 
@@ -19,7 +18,6 @@ from tests.toy_kits.chains_and_rings import ROAD, ring
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parents[3]
-Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
 def run(folder: Path, stages: tuple[str, ...], out: str = "out") -> str:
@@ -42,7 +40,7 @@ def record(folder: Path, stage: str, shard: str, out: str = "out") -> dict[str, 
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """Return a run with a kit of rings that leaves all keys at `auto`, and one that states all."""
     folder = tmp_path_factory.mktemp("autoconfig")
-    shapes = [[(name, Z_UP @ at) for name, at in ring(*size)] for size in ((1, 1), (2, 3))]
+    shapes = [ring(*size) for size in ((1, 1), (2, 3))]
     paths = [write_model(folder / f"ring{k}.glb", ROAD, shape) for k, shape in enumerate(shapes)]
     kits = [{"name": "open", "shapes": paths}, stated({"name": "stated", "shapes": paths})]
     config = {"name": "toy", "seed": 5, "autoconfig": {"max_tries": 200}, "exemplars": {"kits": kits}}
@@ -58,15 +56,15 @@ def test_only_kits_with_auto_keys_are_resolved(made: tuple[Path, str]) -> None:
 def test_kit_is_built_with_the_recorded_settings(made: tuple[Path, str]) -> None:
     summary = record(made[0], "autoconfig", "open")["summary"]
     built = record(made[0], "exemplars", "open")["summary"]
-    assert summary["resolved"]["up"] == "z"
+    assert summary["resolved"]["up"] == "y"
     assert (built["resolved"], built["reasons"]) == (summary["resolved"], summary["reasons"])
     kit = json.loads((made[0] / "out" / ".work" / "toy" / "exemplars" / "open.json").read_text(encoding="utf-8"))
-    assert (kit["up"], kit["strictness"]) == ("z", summary["resolved"]["grammar"])
+    assert (kit["up"], kit["strictness"]) == ("y", summary["resolved"]["grammar"])
     assert record(made[0], "exemplars", "stated")["summary"]["resolved"] == {}
 
 
 def test_resolved_settings_are_printed(made: tuple[Path, str]) -> None:
-    assert "open: up: z: the lowest points span" in made[1]
+    assert "open: up: y: glTF is y up by its specification" in made[1]
 
 
 def test_near_copies_are_rejected_if_auto_finds_enough_other_variants(tmp_path: Path) -> None:
@@ -102,7 +100,7 @@ def test_exemplars_are_resized_if_there_are_too_few_layouts_as_inspect_predicts(
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     text = run(tmp_path, ("autoconfig", "exemplars", "variations", "proportions"))
-    assert "rings: fallback: rows: 100% of what is drawn holds together; of other layouts about 16" in text
+    assert "rings: fallback: rows: 100% of what is drawn holds together; of other layouts about 19" in text
     work = tmp_path / "out" / ".work" / "toy"
     assert not list((work / "variations").glob("toy-*.tar"))
     samples = [sample for shard in (work / "proportions").glob("toy-*.tar") for sample in read_samples(shard)]
