@@ -303,7 +303,9 @@ def test_workers_are_kept_from_stage_to_stage_and_records_hold_the_memory_of_one
     sock = Stage("sock", __name__, LoomsConfig, ("wool",), lambda _: knit, write_worker, lambda _: 0)
     stages, paths = {"wool": wool, "sock": sock}, DatasetPaths(tmp_path, "toys")
     config = Config("toys", "1.0.0", 0, dict.fromkeys(stages, LoomsConfig()), tmp_path / "toys.yaml")
+    held = b"wool" * HELD_BYTES
     run_stages(stages, stages, config, paths, 1)
+    assert len(held) == 4 * HELD_BYTES, "more than what a worker needs is held by the process that starts it"
     workers = [(paths.stage(name).root / "a.json").read_text(encoding="utf-8") for name in stages]
     assert workers[0] == workers[1]
     peaks = [json.loads((paths.stage(name).records / "a.json").read_bytes())["peak_bytes"] for name in stages]
