@@ -36,8 +36,8 @@ pytestmark = pytest.mark.skipif(not FOLDERS, reason="the public exemplars are no
 def build(folder: Path, mirrored: bool = False, kinds: tuple[ContactKind, ...] = ALL_KINDS) -> Kit:
     path = folder / "model.glb"
     contact = ContactConfig(tolerance=TOLERANCES.get(folder.name[:3], 1e-3), kinds=kinds)
-    config = KitConfig(name="real", shapes=(path,), contact=contact, mirror_images_match=mirrored).resolve(STRICTEST)
-    return build_kit(config, [read_parts(path)])[0]
+    config = KitConfig(name="real", shapes=(path,), parts="nodes", contact=contact, mirror_images_match=mirrored)
+    return build_kit(config.resolve(STRICTEST), [read_parts(path, "nodes")])[0]
 
 
 def measured(folder: Path) -> dict[str, Any]:

@@ -37,7 +37,7 @@ def loaded(path: Path, monkeypatch: pytest.MonkeyPatch) -> Config:
 def test_every_config_that_comes_with_the_project_is_valid(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if "../shared" in path.read_text(encoding="utf-8") and not EXEMPLARS.is_dir():
         pytest.skip("its models are not next to the project")
-    own = {"default": "shapemill-default", "shapeassembly": "furniture-programs"}
+    own = {"default": "shapemill-default", "images": "shapemill-images", "shapeassembly": "furniture-programs"}
     assert loaded(path, monkeypatch).name == own.get(path.stem, path.stem)
 
 
