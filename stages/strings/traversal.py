@@ -8,6 +8,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from stages.shape.geometry.sorting import sort_values
+
 
 @numba.njit(cache=True)
 def _arcs(n, edges, edge_order):
@@ -152,11 +154,11 @@ def _written(types, events, nodes, first, target, edge, tree, letters):
             else:
                 partner[begins] = rank[target[arc]] * m + k
                 begins += 1
-        ending[:ends].sort()
+        sort_values(ending[:ends])
         for code in ending[:ends]:
             codes[length] = letters + 2 + code
             length += 1
-        partner[:begins].sort()
+        sort_values(partner[:begins])
         lowest = 0
         for key in partner[:begins]:
             while taken[lowest]:

@@ -6,6 +6,7 @@ import numba
 import numpy as np
 
 from stages.shape.geometry.hash_tables import OWN_CELL, cell_hash
+from stages.shape.geometry.sorting import sort_order
 
 
 @numba.njit(cache=True)
@@ -33,7 +34,7 @@ def distinct_images(vectors, labels, tolerance, same):
     heads, following = np.full(size, -1), np.full(len(vectors), -1)
     kept = np.empty(len(vectors), dtype=np.int64)
     count = 0
-    for candidate in np.argsort(labels, kind="mergesort"):
+    for candidate in sort_order(labels):
         vector = vectors[candidate]
         nearest, least_gap, is_written = -1, np.inf, False
         for turn in range(27):

@@ -13,6 +13,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.polygons import cut, polygon_area
+from stages.shape.geometry.sorting import sort_order
 
 MAX_LEAF_TRIANGLES = 4
 
@@ -59,7 +60,7 @@ def _split(low, high):
             links[node] = -begin - 1, end - begin
             continue
         own = order[begin:end].copy()
-        order[begin:end] = own[np.argsort(centres[own, axis], kind="mergesort")]
+        order[begin:end] = own[sort_order(centres[own, axis])]
         middle = begin + (end - begin) // 2
         waiting[depth] = middle, end, node, 1
         waiting[depth + 1] = begin, middle, node, 0

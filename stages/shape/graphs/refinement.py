@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from stages.shape.geometry.sorting import sort_order, sort_values
+
 
 class _Partition(NamedTuple):
     """Nodes in cells, all int64 (n,).
@@ -115,7 +117,7 @@ def _arcs(n, edges, forward, backward):
 def _partition(colors):
     """Return the cells of a colouring, by colour."""
     n = len(colors)
-    order = np.argsort(colors, kind="mergesort")
+    order = sort_order(colors)
     position = np.empty(n, dtype=np.int64)
     start = np.zeros(n, dtype=np.int64)
     size = np.zeros(n, dtype=np.int64)
@@ -152,7 +154,7 @@ def _arcs_by_class(nodes, first, source, kind, members, newest, used):
             newest[c] = arcs
             arcs += 1
     if kinds > 1:
-        used[:kinds].sort()
+        sort_values(used[:kinds])
     return kinds
 
 
@@ -183,7 +185,7 @@ def _touch(partition, members, arc, count, touched, moved, parted):
         count[v] += 1
         arc = older[arc]
     if broken > 1:
-        parted[:broken].sort()
+        sort_values(parted[:broken])
     return reached, broken
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.polygons import convex_hull, cut
+from stages.shape.geometry.sorting import sort_values
 
 MIN_OPPOSED_COSINE = 0.98
 """Faces press on each other if their normals are opposed within about 11 degrees."""
@@ -264,7 +265,9 @@ def overlap(ca, cb, pose, low, high):
                 p, q = count_one[i, j], count_two[i, j]
                 if p < 2 or q < 2 or p % 2 == 1 or q % 2 == 1:
                     continue
-                a, b = np.sort(heights_a[i, j, :p]), np.sort(heights_b[i, j, :q])
+                a, b = heights_a[i, j, :p], heights_b[i, j, :q]
+                sort_values(a)
+                sort_values(b)
                 for x in range(0, p, 2):
                     for y in range(0, q, 2):
                         shared = min(a[x + 1], b[y + 1]) - max(a[x], b[y])

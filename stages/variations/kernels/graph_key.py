@@ -6,6 +6,7 @@ import numba
 import numpy as np
 
 from stages.shape.geometry.hash_tables import mix
+from stages.shape.geometry.sorting import sort_values
 from stages.variations.kernels.structs import N_EDGES, N_PARTS
 
 
@@ -33,7 +34,7 @@ def graph_key(label_of, ws, with_labels):
         for i in range(v):
             ws.colour[i] = ws.fresh[i]
             ranked[i] = ws.fresh[i]
-        ranked.sort()
+        sort_values(ranked)
         classes_now = 1
         for i in range(1, v):
             if ranked[i] != ranked[i - 1]:

@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from stages.shape.geometry.sorting import sort_order
+
 
 class Groups(NamedTuple):
     """The symmetry groups of part types."""
@@ -159,7 +161,7 @@ def _rarest_first(joints, target):
                 chosen[count] = k
                 times[count] = target.label_starts[label + 1] - target.label_starts[label]
                 count += 1
-    return chosen[np.argsort(times[:count], kind="mergesort")]
+    return chosen[sort_order(times[:count])]
 
 
 @numba.njit(cache=True)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stages.shape.arrays import Float32Array, FloatArray, IntArray
+from stages.shape.geometry.sorting import sort_order
 from stages.shape.geometry.triangles import triangle_areas
 from stages.shape.kit import Assembly, Kit
 
@@ -158,7 +159,7 @@ def _shares(tables, shape, others, least, enough):
             kind = tables.kinds[shape, seed]
             targets = tables.firsts[other, kind + 1] - tables.firsts[other, kind]
             work[seed] = targets * (tables.symmetries_from[kind + 1] - tables.symmetries_from[kind])
-        order = np.argsort(work, kind="mergesort")
+        order = sort_order(work)
         best = floor = np.nextafter(least * larger, 0.0)
         stop = max(min(enough * larger, 0.999 * area), least * larger)
         for first in range(misses + 1):
