@@ -78,10 +78,15 @@ def check_exists(path: Path) -> None:
         raise ConfigError(f"{path}: no such file" + (f"; did you mean {near[0]}?" if near else ""))
 
 
+def is_sidecar(path: Path) -> bool:
+    """Return whether a path is a `._name` file, which macOS puts next to each file on disks of other systems."""
+    return path.name.startswith("._")
+
+
 def without_sidecars(files: Iterable[Path]) -> tuple[list[Path], int]:
-    """Return the files of a folder without the `._name` files that macOS puts next to them, and the number of those."""
+    """Return the files of a folder without sidecars, and the number of those."""
     listed = list(files)
-    kept = [file for file in listed if not file.name.startswith("._")]
+    kept = [file for file in listed if not is_sidecar(file)]
     return kept, len(listed) - len(kept)
 
 

@@ -9,6 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from pipeline.paths import file_digest
+from stages.shape.input_file import is_sidecar
 from stages.shapeassembly.syntax.limits import MAX_TEXT_CHARACTERS
 
 
@@ -22,7 +23,7 @@ def existing_programs(path: Path) -> Path:
 
 
 def program_texts(path: Path, folder: str = "") -> Iterator[tuple[str, str]]:
-    """Yield name below `path` and text of every `.txt` file, sorted by name.
+    """Yield name below `path` and text of every `.txt` file, sorted by name, without the `._` files of macOS.
 
     Invalid UTF-8 is replaced and overlong files are cut, so that the parser rejects them.
     folder: only files below this folder.
@@ -37,7 +38,7 @@ def program_texts(path: Path, folder: str = "") -> Iterator[tuple[str, str]]:
         members = {
             entry.name: entry
             for entry in archive.getmembers()
-            if entry.isfile() and entry.name.endswith(".txt") and _below(entry.name, folder)
+            if _is_program(Path(entry.name)) and entry.isfile() and _below(entry.name, folder)
         }
         texts = {}
         # A compressed archive is read in its own order.
@@ -52,6 +53,10 @@ def listed_names(path: Path, name: str) -> list[str]:
     """Return the lines of a `.txt` list below `path`, without empty ones. Raises KeyError where it does not exist."""
     lists = dict(program_texts(path, name.rpartition("/")[0]))
     return lists[name].split()
+
+
+def _is_program(path: Path) -> bool:
+    return path.suffix == ".txt" and not is_sidecar(path)
 
 
 def _below(name: str, folder: str) -> bool:
@@ -69,7 +74,7 @@ def source_digest(path: Path) -> str:
 
 
 def _text_files(path: Path) -> list[tuple[str, Path]]:
-    files = [file for file in path.rglob("*.txt") if file.is_file() and not file.is_symlink()]
+    files = [file for file in path.rglob("*.txt") if _is_program(file) and file.is_file() and not file.is_symlink()]
     return sorted((file.relative_to(path).as_posix(), file) for file in files)
 
 
