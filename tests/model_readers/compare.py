@@ -21,6 +21,8 @@ MAX_DIFFERENCE = 1e-4
 """Of lengths, areas and volumes, as shares of the diagonal, the area, and diagonal times area."""
 MAX_POLYGON_DIFFERENCE = 0.05
 """Of the results of triangulating polygons that are not flat, or touch themselves."""
+MAX_OUTLINE_DIFFERENCE = 0.005
+"""Of the area of triangulated polygons and that of their outlines, which are not all flat."""
 FIELDS = ("triangles", "points", "bounds", "area", "volume", "names", "materials", "colors")
 
 
@@ -87,6 +89,10 @@ def _explanation(field: str, path: Path, ours: Contents, peer: str, other: Conte
         scale = ours.area * float(np.linalg.norm(ours.high - ours.low)) if field == "volume" else first
         if abs(first - second) <= MAX_POLYGON_DIFFERENCE * scale:
             return f"{peer} triangulates polygons otherwise"
+    if field == "area" and suffix == ".obj":
+        outlines, fans = polygon_areas(path)
+        if abs(ours.area - outlines) <= MAX_OUTLINE_DIFFERENCE * outlines and _nearly(other.area, fans):
+            return f"{peer} makes fans of polygons that are not convex"
     if field == "bounds" and suffix in (".glb", ".gltf") and b'"skins"' in path.read_bytes():
         return f"{peer} leaves skins out"
     if field == "materials" and peer == "trimesh":
@@ -98,6 +104,28 @@ def _explanation(field: str, path: Path, ours: Contents, peer: str, other: Conte
     return None
 
 
+def polygon_areas(path: Path) -> tuple[float, float]:
+    """Return the areas of all polygons of an OBJ file: of their outlines, projected, and of fans from first corners."""
+    points: list[list[float]] = []
+    outlines = fans = 0.0
+    for line in decode_text(path.read_bytes()).splitlines():
+        key, *fields = line.split() or [""]
+        if key == "v":
+            points.append([float(field) for field in fields[:3]])
+        elif key == "f":
+            numbers = [int(field.split("/")[0]) for field in fields]
+            corners = np.array([points[number - 1 if number > 0 else number] for number in numbers])
+            sides = corners[1:] - corners[0]
+            crosses = np.cross(sides[:-1], sides[1:]) / 2
+            outlines += float(np.linalg.norm(crosses.sum(axis=0)))
+            fans += float(np.linalg.norm(crosses, axis=1).sum())
+    return outlines, fans
+
+
+def _nearly(first: float, second: float) -> bool:
+    return abs(first - second) <= MAX_DIFFERENCE * abs(second)
+
+
 def _agree(field: str, path: Path, ours: Contents, other: Contents) -> bool:
     diagonal = float(np.linalg.norm(ours.high - ours.low))
     if field == "bounds":
@@ -106,7 +134,7 @@ def _agree(field: str, path: Path, ours: Contents, other: Contents) -> bool:
             ends = [(np.sort(high - low), np.zeros(3)) for low, high in ends]
         return bool(np.abs(np.array(ends[0]) - np.array(ends[1])).max() <= MAX_DIFFERENCE * diagonal)
     if field == "area":
-        return abs(ours.area - other.area) <= MAX_DIFFERENCE * ours.area
+        return _nearly(other.area, ours.area)
     if field == "volume":
         return abs(ours.volume - other.volume) <= MAX_DIFFERENCE * diagonal * ours.area
     if field == "names":

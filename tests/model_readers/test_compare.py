@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.hostile.good import write_good
-from tests.model_readers.compare import compare
+from tests.model_readers.compare import compare, polygon_areas
 
 ROOT = Path(__file__).resolve().parents[2]
 PUBLIC = Path("/usr/share/assimp/models")
@@ -44,3 +44,10 @@ def test_valid_file_of_every_format_has_the_shape_that_trimesh_finds(tmp_path: P
 def test_public_model_is_read_as_by_trimesh(name: str) -> None:
     if (PUBLIC / name).exists():
         assert compare(PUBLIC / name).differing == ()
+
+
+def test_areas_of_polygons_that_are_not_convex_are_explained(tmp_path: Path) -> None:
+    notched = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 1 1 0\nv 0 4 0\n"
+    (tmp_path / "notched.obj").write_text(f"{notched}o notched\nf 2 3 4 5 1\n", encoding="utf-8")
+    assert polygon_areas(tmp_path / "notched.obj") == pytest.approx((10.0, 18.0))
+    assert compare(tmp_path / "notched.obj").explained == ("area: trimesh makes fans of polygons that are not convex",)
