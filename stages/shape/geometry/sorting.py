@@ -40,7 +40,7 @@ def sort_order(keys):
 
 @numba.njit(cache=True)
 def sort_values(values):
-    """Sort values (n,), of which none is NaN, ascending in place: Shell sort with Knuth's gaps."""
+    """Sort values (n,) ascending in place, by Shell sort with Knuth's gaps. No value is NaN."""
     gap = 1
     while 9 * gap < len(values):
         gap = 3 * gap + 1
