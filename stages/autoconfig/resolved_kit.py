@@ -59,7 +59,8 @@ class ResolvedKit:
 
 def read_and_resolve(config: KitConfig, limits: ReadLimits, tries: int, require: Sequence[str]) -> ResolvedKit:
     """Read the models of a kit and resolve its `auto` keys, as `resolve_settings` and `use_sections_if_empty` do."""
-    models = [read_parts(shape.path, config.parts, limits, config.units) for shape in config.shapes]
+    texture_size = config.appearance.kept_texture_size
+    models = [read_parts(shape.path, config.parts, limits, config.units, texture_size) for shape in config.shapes]
     return resolve_models(config, models, limits, tries, require)
 
 
@@ -88,7 +89,8 @@ def use_sections_if_empty(first: ResolvedKit, limits: ReadLimits, tries: int, re
         return first
     config = first.config.model_copy(update={"parts": "sections"})
     try:
-        models = [read_parts(model.path, config.parts, limits, config.units) for model in first.models]
+        texture_size = config.appearance.kept_texture_size
+        models = [read_parts(model.path, config.parts, limits, config.units, texture_size) for model in first.models]
         identified = identify_parts(models, config)
     except ConfigError:
         return first

@@ -46,8 +46,11 @@ class Observation:
 
 def read_kit(config: KitConfig) -> Kit:
     """Return the kit of the model files of `config`. Raises ConfigError, as `build_kit` and `read_parts` do."""
-    kit, _ = build_kit(config, [read_parts(shape.path, config.parts, units=config.units) for shape in config.shapes])
-    return kit
+    texture_size = config.appearance.kept_texture_size
+    models = [
+        read_parts(shape.path, config.parts, units=config.units, texture_size=texture_size) for shape in config.shapes
+    ]
+    return build_kit(config, models)[0]
 
 
 def build_kit(config: KitConfig, models: Sequence[Model]) -> tuple[Kit, Observation]:
@@ -157,6 +160,13 @@ def _kept_parts(
         if left_out:
             parts = "1 part is" if len(left_out) == 1 else f"{len(left_out)} parts are"
             warnings.append(f"{model.path.name}: {parts} left out of the model: {listed_names(left_out)}")
+        others = [part for owner, part in identified.other_looks if owner is model]
+        if others:
+            parts = "1 part has" if len(others) == 1 else f"{len(others)} parts have"
+            warnings.append(
+                f"{model.path.name}: {parts} other colours or materials than the first part of their type, whose look "
+                f"all have: {listed_names(others)}"
+            )
     kept = [np.flatnonzero(~np.isin(assembly.types, hubs)) for assembly in assemblies]
     for model, assembly, keep in zip(models, assemblies, kept, strict=True):
         if not len(keep):

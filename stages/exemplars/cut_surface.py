@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from stages.model_files.scene import ModelScene, Placement, Surface
+from stages.shape.appearance import Appearance, barycentric, joined
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 from stages.symmetry.pieces import RADIUS_SHARE, SurfacePiece, repeated_pieces
@@ -48,13 +49,14 @@ def _cut(scene: ModelScene, pieces_of: Callable[[FloatArray, IntArray], list[Sur
     if not real.any():
         return scene
     colors = np.concatenate([scene.surfaces[placement.surface].face_colors for placement in scene.placements])
+    look = _world_look(scene)
     pieces = pieces_of(vertices, faces)
     width = max(2, len(str(len(pieces))))
     surfaces: list[Surface] = []
     placements: list[Placement] = []
     for number, piece in enumerate(pieces):
         name = f"piece-{number:0{width}d}"
-        surfaces.append(_surface(name, piece, colors))
+        surfaces.append(_surface(name, piece, colors, look, vertices[faces]))
         placements += [Placement(f"{name}.{copy}", None, number, pose) for copy, pose in enumerate(piece.poses)]
     flat = len(faces) - int(real.sum())
     warnings = (*scene.warnings, f"{flat} triangles without area are left out") if flat else scene.warnings
@@ -84,7 +86,26 @@ def _world_mesh(scene: ModelScene) -> tuple[FloatArray, IntArray]:
     return np.concatenate(moved), np.concatenate(faces).astype(np.int32)
 
 
-def _surface(name: str, piece: SurfacePiece, colors: ByteArray) -> Surface:
-    """Return the surface of a piece, with corners at equal positions welded."""
-    indices, vertices = weld(piece.triangles.corners, 0.0)
-    return Surface(name, vertices, indices, colors[piece.triangles.faces])
+def _world_look(scene: ModelScene) -> Appearance | None:
+    """Return the look of the faces of `_world_mesh`."""
+    looks: list[Appearance | None] = []
+    for placement in scene.placements:
+        look, linear = scene.surfaces[placement.surface].appearance, placement.pose[:3, :3]
+        if look is not None:
+            look = look.turned(linear).mirrored() if np.linalg.det(linear) < 0 else look.turned(linear)
+        looks.append(look)
+    return joined(looks, [len(scene.surfaces[placement.surface].faces) for placement in scene.placements])
+
+
+def _surface(
+    name: str, piece: SurfacePiece, colors: ByteArray, look: Appearance | None, corners: FloatArray
+) -> Surface:
+    """Return the surface of a piece, with corners at equal positions welded.
+
+    colors, look: of the faces of the whole mesh, whose corners are `corners` (f, 3, 3)
+    """
+    soup = piece.triangles
+    indices, vertices = weld(soup.corners, 0.0)
+    if look is not None:
+        look = look.interpolated(soup.faces, barycentric(corners[soup.faces], soup.corners))
+    return Surface(name, vertices, indices, colors[soup.faces], appearance=look)

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -17,6 +18,7 @@ from stages.exemplars.label_map import apply_label_map
 from stages.exemplars.model import Model, RawPart
 from stages.exemplars.repair import repair_mesh
 from stages.exemplars.settings import KitConfig
+from stages.shape.appearance import NO_MATERIAL, Appearance
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, PartType
@@ -32,6 +34,7 @@ class IdentifiedParts:
     left_out: model, name and reason of each part that is not used: it has no triangle with area, or it coincides with
         another of its type.
     aliases: for each type its other names in the models, in order of appearance.
+    other_looks: model and name of each part whose colours or materials are not those of its type's first part.
     """
 
     types: tuple[PartType, ...]
@@ -40,6 +43,7 @@ class IdentifiedParts:
     repairs: Mapping[str, int]
     left_out: tuple[tuple[Model, str, str], ...]
     aliases: tuple[tuple[str, ...], ...]
+    other_looks: tuple[tuple[Model, str], ...] = ()
 
     @property
     def median_diagonal(self) -> float:
@@ -57,6 +61,7 @@ class _Type:
     part: PartType
     label: str | None
     names: dict[str, None]
+    look: frozenset[Any]
 
 
 def identify_parts(models: Sequence[Model], config: KitConfig) -> IdentifiedParts:
@@ -71,6 +76,7 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> IdentifiedPart
     assemblies: list[Assembly] = []
     part_names: list[tuple[str, ...]] = []
     left_out: list[tuple[Model, str, str]] = []
+    other_looks: list[tuple[Model, str]] = []
     for model, parts in zip(models, apply_label_map(models, config), strict=True):
         known: dict[tuple[str, str | None], tuple[int, FloatArray] | None] = {}
         names: list[str] = []
@@ -88,6 +94,8 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> IdentifiedPart
             index, into_part = identified
             if model.segmentation != "components":  # whose names are only numbers
                 types[index].names[_type_name(part)] = None
+            if _look_of(part) != types[index].look:
+                other_looks.append((model, part.name))
             names.append(part.name)
             indices.append(index)
             poses.append(part.pose @ into_part)
@@ -99,7 +107,8 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> IdentifiedPart
     part_types = tuple(known_type.part for known_type in types)
     aliases = tuple(tuple(known_type.names)[1:] for known_type in types)
     whole = IdentifiedParts(
-        part_types, tuple(assemblies), tuple(part_names), dict(sorted(repairs.items())), (), aliases
+        *(part_types, tuple(assemblies), tuple(part_names), dict(sorted(repairs.items())), (), aliases),
+        tuple(other_looks),
     )
     for number, model in enumerate(models):
         earlier = coincident_parts(part_types, assemblies[number], config.pose_tolerance * whole.median_diagonal)
@@ -136,7 +145,7 @@ def _identify(
 ) -> tuple[int, FloatArray] | None:
     """Return the type of a part, added to `types` if new, and the transform (4, 4) from type to part coordinates; None
     for a part without area."""
-    vertices, faces, colors, repair = repair_mesh(part.vertices, part.faces, part.face_colors)
+    vertices, faces, sources, repair = repair_mesh(part.vertices, part.faces)
     repairs.update(repair.changes)
     if len(faces) == 0:
         return None
@@ -156,15 +165,33 @@ def _identify(
         name=_fresh_name(part, [known_type.part.name for known_type in types]),
         vertices=centred,
         faces=faces,
-        face_colors=colors,
+        face_colors=part.face_colors[sources],
         frame=extremal_frame(centred, np.zeros(3)),
         symmetries=symmetries,
         meaning=_type_name(part) if config.types == "meaning" else "",
+        appearance=_repaired_look(part, vertices[faces], sources),
     )
-    types.append(_Type(shape, part_type, label, {_type_name(part): None}))
+    types.append(_Type(shape, part_type, label, {_type_name(part): None}, _look_of(part)))
     into_part = np.eye(4)
     into_part[:3, 3] = shape.centroid
     return len(types) - 1, into_part
+
+
+def _look_of(part: RawPart) -> frozenset[Any]:
+    """Return the materials of a part, or the colours of its faces if it has none."""
+    look = part.appearance
+    if look is not None and look.face_material.max(initial=NO_MATERIAL) > NO_MATERIAL:
+        return frozenset(look.materials[number] for number in np.unique(look.face_material) if number != NO_MATERIAL)
+    return frozenset(map(tuple, np.unique(part.face_colors, axis=0).tolist()))
+
+
+def _repaired_look(part: RawPart, corners: FloatArray, sources: np.ndarray) -> Appearance | None:
+    """Return the look of the repaired faces with `corners` (k, 3, 3), whose faces in the file are `sources` (k,)."""
+    if part.appearance is None:
+        return None
+    given = part.vertices[part.faces[sources]]
+    place = (corners[:, :, None] == given[:, None]).all(axis=3).argmax(axis=2)
+    return part.appearance.select(sources, place).facing(corners)
 
 
 def _fresh_name(part: RawPart, taken: Sequence[str]) -> str:

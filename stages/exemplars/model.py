@@ -9,6 +9,7 @@ from typing import Literal
 from stages.exemplars.settings import Segmentation
 from stages.model_files.packing import pack_scene, unpack_scene
 from stages.model_files.scene import ModelScene, Placement, Surface
+from stages.shape.appearance import Appearance
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 STATED_IN_CONFIG = "as the config says"
@@ -26,6 +27,7 @@ class RawPart:
     vertices: float64 (v, 3) in part coordinates, the origin in the middle of the part's box.
     faces: int32 (f, 3).
     face_colors: uint8 (f, 3) sRGB.
+    appearance: materials, texture coordinates and normals, if the file has them and they are kept.
     """
 
     name: str
@@ -35,6 +37,7 @@ class RawPart:
     vertices: FloatArray
     faces: IntArray
     face_colors: ByteArray
+    appearance: Appearance | None = None
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,10 @@ def pack_model(model: Model) -> bytes:
     index_of = {name: index for index, name in enumerate(meshes)}
     scene = ModelScene(
         "objects",
-        tuple(Surface(name, mesh.vertices, mesh.faces, mesh.face_colors) for name, mesh in meshes.items()),
+        tuple(
+            Surface(name, mesh.vertices, mesh.faces, mesh.face_colors, appearance=mesh.appearance)
+            for name, mesh in meshes.items()
+        ),
         tuple(Placement(part.name, part.label, index_of[part.mesh_name], part.pose) for part in model.parts),
         model.warnings,
         model.up,
@@ -85,7 +91,10 @@ def unpack_model(path: Path, content: bytes) -> Model:
     scene, stated = unpack_scene(content)
     meshes = scene.surfaces
     parts = [
-        RawPart(part.name, mesh.name, part.label, part.pose, mesh.vertices, mesh.faces, mesh.face_colors)
+        RawPart(
+            *(part.name, mesh.name, part.label, part.pose, mesh.vertices, mesh.faces, mesh.face_colors),
+            mesh.appearance,
+        )
         for part, mesh in ((placement, meshes[placement.surface]) for placement in scene.placements)
     ]
     return Model(path, tuple(parts), stated["segmentation"], stated["why"], scene.warnings, scene.up, scene.unit)

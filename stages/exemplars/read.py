@@ -12,6 +12,7 @@ from stages.exemplars.model import Model, pack_model, unpack_model
 from stages.exemplars.rigid_parts import rigid_parts
 from stages.exemplars.segmentation import CUTS, segment_into_parts
 from stages.exemplars.settings import METRES, Segmentation, Units
+from stages.model_files.kept_appearance import keep_appearance
 from stages.model_files.limits import ReadLimits
 from stages.model_files.read import ReadFailed, read_bounded
 from stages.model_files.scene import ModelScene
@@ -19,7 +20,11 @@ from stages.model_files.scene_file import check_size, first_warnings, read_scene
 
 
 def read_parts(
-    path: Path, segmentation: Segmentation = "auto", limits: ReadLimits | None = None, units: Units = "auto"
+    path: Path,
+    segmentation: Segmentation = "auto",
+    limits: ReadLimits | None = None,
+    units: Units = "auto",
+    texture_size: int | None = None,
 ) -> Model:
     """Return the parts of a model file, cut as `segmentation` says; as `parse_parts`.
 
@@ -30,12 +35,12 @@ def read_parts(
     """
     limits = limits or ReadLimits()
     try:
-        return _read_in_child(path, segmentation, limits, units)
+        return _read_in_child(path, segmentation, limits, units, texture_size)
     except ReadFailed as error:
         if segmentation not in ("auto", *CUTS):
             raise
         reason = error.reason
-    model = _read_in_child(path, "auto", limits, units, may_cut=False)
+    model = _read_in_child(path, "auto", limits, units, texture_size, may_cut=False)
     if segmentation == "auto":
         warning = f"cutting it by symmetry failed: {reason}; its parts are taken in other ways"
         return replace(model, warnings=first_warnings([*model.warnings, warning]))
@@ -46,9 +51,17 @@ def read_parts(
 
 
 def _read_in_child(
-    path: Path, segmentation: Segmentation, limits: ReadLimits, units: Units, may_cut: bool = True
+    path: Path,
+    segmentation: Segmentation,
+    limits: ReadLimits,
+    units: Units,
+    texture_size: int | None,
+    may_cut: bool = True,
 ) -> Model:
-    content = read_bounded(path, lambda: pack_model(parse_parts(path, segmentation, limits, units, may_cut)), limits)
+    def read() -> bytes:
+        return pack_model(parse_parts(path, segmentation, limits, units, texture_size, may_cut))
+
+    content = read_bounded(path, read, limits)
     try:
         return unpack_model(path, content)
     except ValueError:
@@ -56,17 +69,23 @@ def _read_in_child(
 
 
 def parse_parts(
-    path: Path, segmentation: Segmentation, limits: ReadLimits, units: Units = "auto", may_cut: bool = True
+    path: Path,
+    segmentation: Segmentation,
+    limits: ReadLimits,
+    units: Units = "auto",
+    texture_size: int | None = None,
+    may_cut: bool = True,
 ) -> Model:
     """Return the parts of a model file, in the calling process; in metres if `units` or the file states the unit.
 
+    texture_size: largest side of textures, in pixels; None leaves colours of faces alone.
     may_cut: whether `auto` may cut one mesh by its symmetries.
 
     Opens nothing outside the folder of `path`. Scale, shear and mirroring of the scene move into the vertices, so that
     poses are rigid. A model far from the origin is moved there, with a warning. Raises ConfigError, with the file, the
     element and the remedy, for a file without usable parts, and any error that a reader did not foresee.
     """
-    scene = _in_metres(read_scene(path), units)
+    scene = _in_metres(keep_appearance(read_scene(path), texture_size), units)
     check_size(path, scene, limits)
     segmented, source, why = segment_into_parts(path, scene, segmentation, may_cut)
     check_size(path, segmented, limits)

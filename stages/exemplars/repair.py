@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.exemplars.coincident_patches import flat_patches
 from stages.exemplars.orientation import face_outward, flipped_faces
-from stages.shape.arrays import ByteArray, FloatArray, IntArray
+from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.connected_faces import connected_corners, connected_faces
 
 MIN_FACE_HEIGHT = 1e-7
@@ -24,9 +24,7 @@ class Repair:
     changes: dict[str, int] = field(default_factory=dict)
 
 
-def repair_mesh(
-    vertices: FloatArray, faces: IntArray, face_colors: ByteArray
-) -> tuple[FloatArray, IntArray, ByteArray, Repair]:
+def repair_mesh(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, np.ndarray, Repair]:
     """Return the mesh without duplicates, faces without area and non-manifold edges, oriented outward.
 
     Vertices at equal positions are merged within each solid; solids that only touch stay apart, and a surface that
@@ -37,9 +35,9 @@ def repair_mesh(
 
     vertices: float64 (v, 3).
     faces: int32 (f, 3).
-    face_colors: uint8 (f, 3), which stay with their faces.
 
-    The result is three empty arrays for a mesh whose faces have no area.
+    Returns vertices, faces, which of the given faces each is, int64 (k,), and the changes; empty arrays for a mesh
+    whose faces have no area.
     """
     used = np.unique(faces)
     whole = _distinct_corners(vertices, faces)
@@ -65,7 +63,7 @@ def repair_mesh(
     return (
         points[kept],
         renumbered.reshape(-1, 3).astype(np.int32),
-        face_colors[unique[high]],
+        unique[high],
         Repair({kind: count for kind, count in changes.items() if count}),
     )
 

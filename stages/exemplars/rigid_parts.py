@@ -46,6 +46,7 @@ def rigid_parts(path: Path, scene: ModelScene) -> tuple[tuple[RawPart, ...], lis
                 surface.vertices,
                 surface.faces,
                 surface.face_colors,
+                surface.appearance,
             )
         )
     return tuple(parts), warnings
@@ -156,10 +157,14 @@ def _stretched(surface: Surface, stretch: FloatArray, names: UniqueNames) -> Sur
         words.append("x".join(f"{abs(factor):g}" for factor in factors))
     elif abs(factors[0]) != 1.0:
         words.append(f"{abs(factors[0]):g}")
+    look = surface.appearance
+    if look is not None and words:
+        look = look.turned(stretch).mirrored() if mirrored else look.turned(stretch)
     stem = surface.name + ("@" + ",".join(words) if words else "")
     return replace(
         surface,
         name=names(stem),
         vertices=surface.vertices @ stretch.T if words else surface.vertices,
         faces=np.ascontiguousarray(surface.faces[:, ::-1]) if mirrored else surface.faces,
+        appearance=look,
     )

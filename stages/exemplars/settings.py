@@ -68,6 +68,30 @@ class HubConfig(StrictModel):
     )
 
 
+class AppearanceConfig(StrictModel):
+    """What variants keep of the look of their exemplars."""
+
+    keep: Literal["colors", "textures"] = Field(
+        "colors",
+        description="`colors`: one colour a face. `textures`: the materials of the files, with their names, textures, "
+        "texture coordinates and normals.",
+    )
+    texture_size: int = Field(
+        512, ge=16, le=4096, description="Largest side of a texture; larger ones are reduced; unit: pixels."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _keep_alone(cls, stated: Any) -> Any:
+        """Accept what to keep in place of the keys."""
+        return {"keep": stated} if isinstance(stated, str) else stated
+
+    @property
+    def kept_texture_size(self) -> int | None:
+        """The size of textures for `read_parts`: None where colours alone are kept."""
+        return self.texture_size if self.keep == "textures" else None
+
+
 class ShapeFile(StrictModel):
     """One model file."""
 
@@ -160,6 +184,11 @@ class KitConfig(StrictModel):
         "auto",
         description="Unit of the numbers in the model files; shapes are made in metres. `auto` takes what files say: "
         "glTF is in metres, DAE is converted. OBJ, PLY, STL and OFF say nothing; their shapes keep their numbers.",
+    )
+
+    appearance: AppearanceConfig = Field(
+        default_factory=AppearanceConfig,
+        description="What variants keep of the look of their exemplars: `colors`, `textures`, or the keys below.",
     )
 
     @model_validator(mode="after")

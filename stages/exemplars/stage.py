@@ -42,7 +42,10 @@ def run_shard(task: Task) -> Outcome:
         resolution = json.loads(task.input("autoconfig", f"{config.name}.json").read_bytes())
         resolved = resolution["resolved"]
         config = config.resolve(resolved).model_copy(update={"parts": resolved.get("parts", config.parts)})
-    models = [read_parts(shape.path, config.parts, section.limits, config.units) for shape in config.shapes]
+    texture_size = config.appearance.kept_texture_size
+    models = [
+        read_parts(shape.path, config.parts, section.limits, config.units, texture_size) for shape in config.shapes
+    ]
     kit, observation = build_kit(config, models)
     kinds = [kind for of_exemplar in observation.kinds for kind in of_exemplar]
     with task.output(f"{kit.name}.json") as text, task.output(f"{kit.name}.tar") as arrays:

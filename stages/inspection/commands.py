@@ -97,7 +97,8 @@ def inspect(
         return
     read = []
     for path in paths:
-        read.append(read_parts(path, config.parts, limits, config.units))
+        texture_size = config.appearance.kept_texture_size
+        read.append(read_parts(path, config.parts, limits, config.units, texture_size))
         if not as_json:
             print(f"{path}: {len(read[-1].parts)} parts by {read[-1].segmentation}", file=sys.stderr, flush=True)
     with nullcontext() if as_json else ticking("inspect", "looking for settings and trying them out"):
@@ -130,7 +131,8 @@ def _print_table(config: KitConfig, paths: list[Path], limits: ReadLimits, tries
     for number, path in enumerate(paths):
         try:
             alone = config.model_copy(update={"shapes": (ShapeFile(path=path),)})
-            report = inspect_models(alone, [read_parts(path, config.parts, limits, config.units)], tries, limits)
+            models = [read_parts(path, config.parts, limits, config.units)]
+            report = inspect_models(alone, models, tries, limits)
         except ConfigError as error:
             print(error, file=sys.stderr)
             continue

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping
-from typing import Literal
 
 import numpy as np
 
+from stages.shape.appearance import Wrap
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.input_file import content_fault
 
 IMAGE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TGA", "TIFF", "DDS", "PPM")
 """The formats that are tried, whatever the file's name: for others Pillow starts programs (EPS) or runs long."""
 
-Wrap = Literal["repeat", "mirror", "clamp"]
-"""What a texture shows outside its borders: itself again, its mirror image, or the pixels of the border."""
 _WRAPS: Mapping[Wrap, Callable[[FloatArray], FloatArray]] = {
     "repeat": lambda at: at % 1.0,
     "mirror": lambda at: 1.0 - np.abs(1.0 - at % 2.0),
@@ -66,12 +64,18 @@ def wrap_coordinates(uv: FloatArray, wrap_u: Wrap, wrap_v: Wrap) -> FloatArray:
 
 
 def decode_image(content: bytes) -> ByteArray:
-    """Return the pixels of an image file, uint8 (h, w, 3), first row at the top. Raises OSError for other formats."""
+    """Return the pixels of an image file, uint8 (h, w, 3), first row at the top, or (h, w, 4) if it is not opaque.
+
+    Raises OSError for other formats.
+    """
     from PIL import Image, UnidentifiedImageError
 
     try:
         with Image.open(io.BytesIO(content), formats=IMAGE_FORMATS) as image:
-            return np.asarray(image.convert("RGB"))
+            if not image.has_transparency_data:
+                return np.asarray(image.convert("RGB"))
+            pixels = np.asarray(image.convert("RGBA"))
+            return np.ascontiguousarray(pixels[:, :, :3]) if (pixels[:, :, 3] == 255).all() else pixels
     except Image.DecompressionBombError:
         raise OSError(f"it has more than {2 * (Image.MAX_IMAGE_PIXELS or 0):,} pixels") from None
     except UnidentifiedImageError:
@@ -87,7 +91,7 @@ def decode_image(content: bytes) -> ByteArray:
 def sample_texture(
     image: ByteArray, uv: FloatArray, faces: IntArray, wrap_u: Wrap = "repeat", wrap_v: Wrap = "repeat"
 ) -> ByteArray:
-    """Return the pixel of `image` (h, w, 3) under the centroid of each face, uint8 (f, 3).
+    """Return the colour of `image` (h, w, 3 or 4) under the centroid of each face, uint8 (f, 3).
 
     uv: float64 (n, 2), origin at the lower left of the image.
     faces: int32 (f, 3), indices into uv.
@@ -97,7 +101,7 @@ def sample_texture(
     middle = uv[faces].mean(axis=1)
     column, row = (wrap_coordinates(middle * (1.0, -1.0) + (0.0, 1.0), wrap_u, wrap_v) * (width, height)).T
     column, row = np.floor(column).astype(np.int64), np.floor(row).astype(np.int64)
-    pixels: ByteArray = image[np.minimum(row, height - 1), np.minimum(column, width - 1)]
+    pixels: ByteArray = image[np.minimum(row, height - 1), np.minimum(column, width - 1), :3]
     return pixels
 
 

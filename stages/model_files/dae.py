@@ -20,6 +20,15 @@ from stages.model_files.dae_primitives import polygon_triangles, vertex_position
 from stages.model_files.enclosure import Enclosure, Outside
 from stages.model_files.markup import check_markup
 from stages.model_files.scene import GREY, INVALID, ModelScene, Placement, SceneNode, Surface, type_label
+from stages.model_files.source_materials import (
+    alpha_mode_of,
+    appearance_of,
+    linear_color,
+    painted_faces_without_material,
+    stated_number,
+    stated_numbers,
+)
+from stages.shape.appearance import NO_MATERIAL, Material, Texture, TextureImage, given_normals
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 _MAX_DEPTH = 200
@@ -60,7 +69,8 @@ class _Reader:
         self.enclosure = enclosure
         self.document = document
         self.warnings = warnings
-        self.images: dict[str, ByteArray | None] = {}
+        self.images: dict[str, TextureImage | None] = {}
+        self.not_kept: list[str] = []
         self.tree: list[SceneNode] = []
 
     def scene(self) -> ModelScene:
@@ -84,7 +94,8 @@ class _Reader:
         up = getattr(self.document.assetInfo, "upaxis", None)
         placed = self.in_metres(surfaces, placements, X_TO_Y if up == "X_UP" else np.eye(4))
         warnings = tuple(dict.fromkeys(self.warnings))
-        return ModelScene("nodes", *placed, warnings, "z" if up == "Z_UP" else "y", 1.0, tuple(self.tree))
+        not_kept = tuple(dict.fromkeys(self.not_kept))
+        return ModelScene("nodes", *placed, warnings, "z" if up == "Z_UP" else "y", 1.0, tuple(self.tree), not_kept)
 
     def in_metres(
         self, surfaces: list[Surface], placements: list[Placement], turn: FloatArray
@@ -132,6 +143,8 @@ class _Reader:
         vertices, faces = [np.empty((0, 3))], [np.empty((0, 3), np.int32)]
         colors, paint = [np.empty((0, 3), np.uint8)], [np.empty((0, 3), np.uint8)]
         material = [np.empty(0, np.int32)]
+        materials: list[Material | None] = []
+        vertex_paint, uv, normals = [np.empty((0, 3), np.uint8)], [np.empty((0, 3, 2))], [np.empty((0, 3, 3))]
         painted = False
         offset = 0
         for placed in geometries:
@@ -149,15 +162,19 @@ class _Reader:
                 name = getattr(target, "name", None) or getattr(target, "id", None) or primitive.material
                 if name is not None and name not in names:
                     names.append(name)
+                    materials.append(self.material(name, target))
                 own_colors, own_paint = self.face_colors(primitive, target, table, rows)
                 vertices.append(points)
                 faces.append(triangles + np.int32(offset))
                 colors.append(own_colors)
                 paint.append(own_colors if own_paint is None else own_paint)
                 painted |= own_paint is not None
+                vertex_paint.append(np.full((len(rows), 3), 255, np.uint8) if own_paint is None else own_paint)
+                uv.append(self.corner_values(primitive, "TEXCOORD", table, rows, 2))
+                normals.append(self.corner_values(primitive, "NORMAL", table, rows, 3))
                 material.append(np.full(len(triangles), -1 if name is None else names.index(name), dtype=np.int32))
                 offset += len(points)
-        return Surface(
+        whole = Surface(
             name=geometries[0].geometry.name or geometries[0].geometry.id,
             vertices=np.concatenate(vertices),
             faces=np.concatenate(faces),
@@ -165,6 +182,61 @@ class _Reader:
             materials=tuple(names),
             face_material=np.concatenate(material),
             paint=np.concatenate(paint) if painted else None,
+        )
+        face_material = np.concatenate(material)
+        is_known = np.array([*(target is not None for target in materials), False])  # the last for no material
+        face_material = np.where(is_known[face_material], face_material, NO_MATERIAL).astype(np.int32)
+        known = [Material(name) if own is None else own for name, own in zip(names, materials, strict=True)]
+        face_material, without = painted_faces_without_material(face_material, known, np.concatenate(vertex_paint))
+        self.not_kept += [f"material {name!r}: faces with vertex colours have these alone" for name in without]
+        at, stated = np.concatenate(uv) * (1.0, -1.0) + (0.0, 1.0), np.concatenate(normals)
+        corner_normals = given_normals(whole.vertices[whole.faces], stated) if stated.any() else None
+        return replace(whole, appearance=appearance_of(known, face_material, at, corner_normals))
+
+    def corner_values(self, primitive: Any, name: str, table: np.ndarray, rows: IntArray, width: int) -> FloatArray:
+        """Return texture coordinates or normals of the corners of faces, (f, 3, width), or zeros."""
+        nothing = np.zeros((len(rows), 3, width))
+        if not primitive.sources.get(name):
+            return nothing
+        offset, *_, source = primitive.sources[name][0]
+        values, at = np.asarray(source.data, dtype=np.float64), table[:, offset][rows]
+        if values.ndim != 2 or values.shape[1] < width or at.min(initial=0) < 0 or at.max(initial=-1) >= len(values):
+            return nothing
+        return np.asarray(values[at][:, :, :width])
+
+    def material(self, name: str, target: Any) -> Material | None:
+        """Return a material; None for one that is not in the file."""
+        effect = getattr(target, "effect", None)
+        if effect is None:
+            return None
+        diffuse, image = effect.diffuse, None
+        red, green, blue = (1.0, 1.0, 1.0)
+        if isinstance(diffuse, tuple):
+            red, green, blue = linear_color(stated_numbers(diffuse[:3], (0.0, 0.0, 0.0)))
+        elif diffuse is not None:
+            image = self.image(diffuse.sampler.surface.image.path)
+        alpha = 1.0
+        if isinstance(effect.transparent, tuple) and len(effect.transparent) == 4:
+            share = stated_number(effect.transparency, 1.0)
+            if getattr(effect, "opaque_mode", None) == "RGB_ZERO":
+                alpha = 1.0 - share * sum(stated_numbers(effect.transparent[:3], (0.0, 0.0, 0.0))) / 3.0
+            else:
+                alpha = share * stated_number(effect.transparent[3], 1.0)
+        elif effect.transparent is None and effect.transparency is not None:
+            alpha = stated_number(effect.transparency, 1.0)
+        glow = effect.emission if isinstance(effect.emission, tuple) else (0.0, 0.0, 0.0)
+        maps = [key for key in ("emission", "transparent", "bumpmap") if hasattr(getattr(effect, key, None), "sampler")]
+        if maps:
+            self.not_kept.append(f"material {name!r}: {', '.join(maps)} textures are not kept")
+        shine = effect.shininess if isinstance(effect.shininess, int | float) else 0.0
+        return Material(
+            name,
+            (red, green, blue, alpha or 1.0),
+            None if image is None else Texture(image),
+            roughness=float(np.sqrt(2.0 / (2.0 + max(float(np.nan_to_num(shine)), 0.0)))),
+            emissive=linear_color(stated_numbers(glow[:3], (0.0, 0.0, 0.0))),
+            alpha_mode=alpha_mode_of(alpha or 1.0, None if image is None else image.pixels),
+            double_sided=True,
         )
 
     def corners(self, primitive: Any) -> tuple[np.ndarray, IntArray] | None:
@@ -203,14 +275,14 @@ class _Reader:
             if image is not None:
                 offset, *_, source = primitive.sources["TEXCOORD"][0]
                 uv = np.asarray(source.data, dtype=np.float64)[:, :2]
-                colors = sample_texture(image, uv[table[:, offset]], rows)
+                colors = sample_texture(image.pixels, uv[table[:, offset]], rows)
         return colors, paint
 
-    def image(self, name: str) -> ByteArray | None:
+    def image(self, name: str) -> TextureImage | None:
         if name not in self.images:
             self.images[name] = None
             try:
-                self.images[name] = decode_image(self.enclosure.read(name, "image", encoded=True))
+                self.images[name] = TextureImage.of(decode_image(self.enclosure.read(name, "image", encoded=True)))
             except Outside:
                 self.warnings.append(
                     f"texture {name!r} is outside the folder of the model and is not opened; its faces are grey"

@@ -7,14 +7,14 @@ breaks a node with several materials into parts with random names, and loses wha
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.model_files.colors import (
-    Wrap,
     decode_image,
     face_paint,
     linear_from_srgb,
@@ -34,9 +34,18 @@ from stages.model_files.scene import (
     Surface,
     type_label,
 )
+from stages.model_files.source_materials import (
+    appearance_of,
+    painted_faces_without_material,
+    stated_number,
+    stated_numbers,
+)
+from stages.shape.appearance import Appearance, Material, Texture, TextureImage, Wrap, given_normals
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 _MODE_TRIANGLES, _MODE_STRIP, _MODE_FAN = 4, 5, 6
+_GLOSSY = "KHR_materials_pbrSpecularGlossiness"
+_NEAREST_FILTER = 9728
 _WRAPS: Mapping[int, Wrap] = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
 
 
@@ -61,7 +70,9 @@ class _Reader:
         self.file = file
         self.header = file.header
         self.warnings: list[str] = []
-        self.images: dict[int, ByteArray | None] = {}
+        self.images: dict[int, TextureImage | None] = {}
+        self.read_materials: dict[int, Material] = {}
+        self.not_kept: list[str] = []
         self.tree: list[SceneNode] = []
         self.hidden = 0
         self.parents: dict[int, int] | None = None
@@ -90,6 +101,7 @@ class _Reader:
             tuple(dict.fromkeys(self.warnings)),
             unit=1.0,
             nodes=tuple(self.tree),
+            not_kept=tuple(dict.fromkeys(self.not_kept)),
         )
 
     def walk(self) -> Iterator[tuple[int, FloatArray, int]]:
@@ -152,6 +164,7 @@ class _Reader:
         name = self.name("mesh", index) or f"mesh{index}"
         materials = self.header.get("materials", [])
         vertices, faces, colors, material, paint = [np.empty((0, 3))], [np.empty((0, 3), np.int32)], [], [], []
+        vertex_paint, uv, normals = [], [], []
         painted = False
         offset = 0
         for number, primitive in enumerate(mesh["primitives"]):
@@ -163,15 +176,19 @@ class _Reader:
             own_vertices = own_vertices + self.morph(primitive, weights, element)
             if skin >= 0:
                 own_vertices = self.skinned(skin, primitive["attributes"], own_vertices, element)
-            linear, own_paint = self.face_colors(primitive, own_faces, element)
+            own_uv = self.texture_coordinates(primitive, element)
+            linear, own_paint = self.face_colors(primitive, own_faces, own_uv, element)
             colors.append(srgb_from_linear(linear))
             paint.append(colors[-1] if own_paint is None else own_paint)
+            vertex_paint.append(np.full((len(own_faces), 3), 255, np.uint8) if own_paint is None else own_paint)
             painted |= own_paint is not None
             material.append(np.full(len(own_faces), primitive.get("material", -1), dtype=np.int32))
+            uv.append(np.zeros((len(own_faces), 3, 2)) if own_uv is None else own_uv[own_faces])
+            normals.append(None if skin >= 0 else self.normals(primitive, own_faces, element))
             vertices.append(own_vertices)
             faces.append(own_faces + np.int32(offset))
             offset += len(own_vertices)
-        return Surface(
+        whole = Surface(
             name=name,
             vertices=np.concatenate(vertices),
             faces=np.concatenate(faces),
@@ -180,6 +197,111 @@ class _Reader:
             face_material=np.concatenate(material) if material else np.empty(0, np.int32),
             paint=np.concatenate(paint) if painted else None,
         )
+        return replace(whole, appearance=self.appearance(whole, vertex_paint, uv, normals))
+
+    def appearance(
+        self,
+        surface: Surface,
+        vertex_paint: list[ByteArray],
+        uv: list[FloatArray],
+        normals: list[FloatArray | None],
+    ) -> Appearance | None:
+        """Return the look of a surface from what its primitives have.
+
+        vertex_paint: vertex colours of the faces, white without them
+        normals: None for a primitive without; those get the normals of their faces if others have normals
+        """
+        if surface.face_material is None or not uv:
+            return None
+        used = set(np.unique(surface.face_material).tolist())
+        materials = [
+            self.material(number) if number in used else Material(name) for number, name in enumerate(surface.materials)
+        ]
+        face_material, painted = painted_faces_without_material(
+            surface.face_material, materials, np.concatenate(vertex_paint)
+        )
+        self.not_kept += [f"material {name!r}: faces with vertex colours have these alone" for name in painted]
+        corner_normals = None
+        if any(own is not None for own in normals):
+            missing = [np.zeros((*own.shape[:2], 3)) for own in uv]
+            stated = np.concatenate([gap if own is None else own for own, gap in zip(normals, missing, strict=True)])
+            corner_normals = given_normals(surface.vertices[surface.faces], stated)
+        return appearance_of(materials, face_material, np.concatenate(uv), corner_normals)
+
+    def normals(self, primitive: dict[str, Any], faces: IntArray, element: str) -> FloatArray | None:
+        """Return the normals of the corners of a primitive's faces, (f, 3, 3), if it has them and they do not move."""
+        attributes = primitive["attributes"]
+        if "NORMAL" not in attributes or primitive.get("targets"):
+            return None
+        try:
+            normals: FloatArray = self.file.accessor(attributes["NORMAL"], element).astype(np.float64)[faces]
+        except (ArithmeticError, LookupError, TypeError, ValueError):
+            self.not_kept.append(f"{element} has normals that cannot be read")
+            return None
+        return normals if normals.shape == (len(faces), 3, 3) else None
+
+    def material(self, index: int) -> Material:
+        """Return a material; what of it is not kept is noted."""
+        if index not in self.read_materials:
+            stated = self.header["materials"][index]
+            name = self.name("material", index) or f"material{index}"
+            surface = stated.get("pbrMetallicRoughness", {})
+            factor = surface.get("baseColorFactor")
+            metallic, roughness = surface.get("metallicFactor", 1.0), surface.get("roughnessFactor", 1.0)
+            glossy = stated.get("extensions", {}).get(_GLOSSY)
+            if glossy is not None:
+                factor, metallic = glossy.get("diffuseFactor"), 0.0
+                roughness = 1.0 - stated_number(glossy.get("glossinessFactor"), 1.0)
+            red, green, blue, alpha = stated_numbers(factor, (1.0, 1.0, 1.0, 1.0))
+            glow_red, glow_green, glow_blue = stated_numbers(stated.get("emissiveFactor"), (0.0, 0.0, 0.0))
+            mode = str(stated.get("alphaMode", "OPAQUE")).lower()
+            self.read_materials[index] = Material(
+                name,
+                (red, green, blue, alpha),
+                self.sampled_texture(stated),
+                stated_number(metallic, 1.0),
+                stated_number(roughness, 1.0),
+                (glow_red, glow_green, glow_blue),
+                "mask" if mode == "mask" else "blend" if mode == "blend" else "opaque",
+                stated_number(stated.get("alphaCutoff"), 0.5),
+                stated.get("doubleSided") is True,
+            )
+            others = [key for key in ("normalTexture", "occlusionTexture", "emissiveTexture") if key in stated]
+            others += ["metallicRoughnessTexture"] if "metallicRoughnessTexture" in surface else []
+            others += [extension for extension in stated.get("extensions", {}) if extension != _GLOSSY]
+            if others:
+                self.not_kept.append(f"material {name!r}: {', '.join(map(str, others))} is not kept")
+        return self.read_materials[index]
+
+    def sampled_texture(self, material: dict[str, Any]) -> Texture | None:
+        """Return the texture of a material's base colour, if its image can be read."""
+        reference = _base_texture(material)
+        if reference is None:
+            return None
+        stated = self.header["textures"][reference["index"]]
+        image = self.texture(stated)
+        if image is None:
+            return None
+        sampler = self.header["samplers"][stated["sampler"]] if "sampler" in stated else {}
+        wrap_u, wrap_v = (_WRAPS.get(sampler.get(key, 0), "repeat") for key in ("wrapS", "wrapT"))
+        return Texture(image, wrap_u, wrap_v, sampler.get("magFilter") == _NEAREST_FILTER)
+
+    def texture_coordinates(self, primitive: dict[str, Any], element: str) -> FloatArray | None:
+        """Return the coordinates at which the base colour texture of a primitive is read at its vertices, (n, 2)."""
+        if "material" not in primitive:
+            return None
+        texture = _base_texture(self.header["materials"][primitive["material"]])
+        if texture is None:
+            return None
+        placing = texture.get("extensions", {}).get("KHR_texture_transform", {})
+        coordinates = f"TEXCOORD_{placing.get('texCoord', texture.get('texCoord', 0))}"
+        if coordinates not in primitive["attributes"]:
+            return None
+        uv = self.file.accessor(primitive["attributes"][coordinates], element).astype(np.float64)
+        turn = placing.get("rotation", 0.0)
+        spin = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+        placed: FloatArray = uv * placing.get("scale", (1.0, 1.0)) @ spin.T + placing.get("offset", (0.0, 0.0))
+        return placed
 
     def triangles(self, primitive: dict[str, Any], element: str) -> tuple[FloatArray, IntArray] | None:
         """Return vertices and faces of a primitive; None for points, lines and primitives without vertices."""
@@ -275,13 +397,13 @@ class _Reader:
         raise Malformed(f"node {index} is below itself")
 
     def face_colors(
-        self, primitive: dict[str, Any], faces: IntArray, element: str
+        self, primitive: dict[str, Any], faces: IntArray, uv: FloatArray | None, element: str
     ) -> tuple[FloatArray, ByteArray | None]:
         """Return linear colours (f, 3) of the faces of a primitive, and its vertex colours as face paint, if any."""
         attributes = primitive["attributes"]
         paint = None
         if "material" in primitive:
-            linear = self.material_colors(self.header["materials"][primitive["material"]], attributes, faces, element)
+            linear = self.material_colors(self.header["materials"][primitive["material"]], uv, faces)
         elif "COLOR_0" in attributes:
             linear = np.ones((len(faces), 3))
         else:
@@ -292,35 +414,22 @@ class _Reader:
             paint = face_paint(srgb_from_linear(vertex_colors), faces)
         return linear, paint
 
-    def material_colors(
-        self, material: dict[str, Any], attributes: dict[str, int], faces: IntArray, element: str
-    ) -> FloatArray:
-        surface = material.get("pbrMetallicRoughness", {})
-        factor, texture = surface.get("baseColorFactor"), surface.get("baseColorTexture")
-        glossy = material.get("extensions", {}).get("KHR_materials_pbrSpecularGlossiness")
+    def material_colors(self, material: dict[str, Any], uv: FloatArray | None, faces: IntArray) -> FloatArray:
+        factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
+        glossy = material.get("extensions", {}).get(_GLOSSY)
         if glossy is not None:
-            factor, texture = glossy.get("diffuseFactor"), glossy.get("diffuseTexture")
+            factor = glossy.get("diffuseFactor")
         linear = np.tile(np.array(factor or (1.0, 1.0, 1.0, 1.0), dtype=np.float64)[:3], (len(faces), 1))
-        if texture is None:
+        texture = self.sampled_texture(material)
+        if texture is None or uv is None:
             return linear
-        placing = texture.get("extensions", {}).get("KHR_texture_transform", {})
-        coordinates = f"TEXCOORD_{placing.get('texCoord', texture.get('texCoord', 0))}"
-        stated = self.header["textures"][texture["index"]]
-        image = self.texture(stated)
-        if image is None or coordinates not in attributes:
-            return linear
-        uv = self.file.accessor(attributes[coordinates], element).astype(np.float64)
-        turn = placing.get("rotation", 0.0)
-        spin = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
-        uv = uv * placing.get("scale", (1.0, 1.0)) @ spin.T + placing.get("offset", (0.0, 0.0))
-        uv[:, 1] = 1.0 - uv[:, 1]
-        sampler = self.header["samplers"][stated["sampler"]] if "sampler" in stated else {}
-        wrap_u, wrap_v = (_WRAPS.get(sampler.get(key, 0), "repeat") for key in ("wrapS", "wrapT"))
-        textured: FloatArray = linear * linear_from_srgb(sample_texture(image, uv, faces, wrap_u, wrap_v))
+        at = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
+        colors = sample_texture(texture.image.pixels, at, faces, texture.wrap_u, texture.wrap_v)
+        textured: FloatArray = linear * linear_from_srgb(colors)
         return textured
 
-    def texture(self, stated: dict[str, Any]) -> ByteArray | None:
-        """Return the pixels of the first readable image of a texture: those of extensions, then the fallback."""
+    def texture(self, stated: dict[str, Any]) -> TextureImage | None:
+        """Return the first readable image of a texture: those of extensions, then the fallback."""
         before = len(self.warnings)
         for holder in [*stated.get("extensions", {}).values(), stated]:
             if holder.get("source") is not None:
@@ -330,8 +439,8 @@ class _Reader:
                     return image
         return None
 
-    def image(self, index: int) -> ByteArray | None:
-        """Return the pixels of an image, decoded once; None, with a warning, for one that is not readable."""
+    def image(self, index: int) -> TextureImage | None:
+        """Return an image, decoded once; None, with a warning, for one that is not readable."""
         if index not in self.images:
             image = self.header["images"][index]
             try:
@@ -339,7 +448,7 @@ class _Reader:
                     content = self.file.view(image["bufferView"], f"image {index}")[0]
                 else:
                     content = self.file.enclosure.read(image["uri"], f"image {index}", encoded=True)
-                self.images[index] = decode_image(content)
+                self.images[index] = TextureImage.of(decode_image(content))
             except Outside:
                 self.images[index] = None
                 self.warnings.append(f"image {index} is a file outside the folder of the model, which is not opened")
@@ -348,6 +457,14 @@ class _Reader:
                 fault = "is missing" if isinstance(error, FileNotFoundError) else f"cannot be read: {error}"
                 self.warnings.append(f"image {index} ({image.get('uri', 'embedded')[:80]}) {fault}")
         return self.images[index]
+
+
+def _base_texture(material: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the reference of a material to the texture of its base colour."""
+    glossy = material.get("extensions", {}).get(_GLOSSY)
+    if glossy is not None:
+        return cast("dict[str, Any] | None", glossy.get("diffuseTexture"))
+    return cast("dict[str, Any] | None", material.get("pbrMetallicRoughness", {}).get("baseColorTexture"))
 
 
 def _local_matrix(node: dict[str, Any]) -> FloatArray:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pipeline.bounded import ChildFailed, in_child
 from pipeline.errors import ConfigError
+from stages.model_files.kept_appearance import keep_appearance
 from stages.model_files.limits import ReadLimits
 from stages.model_files.packing import pack_scene, unpack_scene
 from stages.model_files.scene import ModelScene
@@ -28,8 +29,10 @@ class ReadFailed(ConfigError):
         )
 
 
-def read_model(path: Path, limits: ReadLimits | None = None) -> ModelScene:
+def read_model(path: Path, limits: ReadLimits | None = None, texture_size: int | None = None) -> ModelScene:
     """Return the scene of a model file: GLB, glTF, OBJ with MTL, PLY, STL, OFF or DAE.
+
+    texture_size: largest side of textures, in pixels; None leaves colours of faces alone
 
     Its placements are the nodes or objects of the file, each with its surface, world matrix and name, in file order.
     No placement lacks triangles, and all coordinates are finite. Opens nothing outside the folder of `path`. Raises
@@ -39,7 +42,7 @@ def read_model(path: Path, limits: ReadLimits | None = None) -> ModelScene:
     limits = limits or ReadLimits()
 
     def read() -> bytes:
-        scene = read_scene(path)
+        scene = keep_appearance(read_scene(path), texture_size)
         check_size(path, scene, limits)
         return pack_scene(replace(scene, warnings=first_warnings(scene.warnings)))
 

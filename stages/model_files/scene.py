@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from stages.shape.appearance import Appearance
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 INVALID = "is missing or invalid"
@@ -33,6 +34,7 @@ class Surface:
     face_colors: uint8 (f, 3) sRGB.
     face_material: int32 (f,), index into `materials`, -1 for a face without material.
     paint: uint8 (f, 3) sRGB, the face or vertex colours of the file, without materials; None if it has none.
+    appearance: materials with textures, texture coordinates and normals; None if the file has none.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Surface:
     materials: tuple[str, ...] = ()
     face_material: IntArray | None = None
     paint: ByteArray | None = None
+    appearance: Appearance | None = None
 
     def select(self, faces: np.ndarray) -> Surface:
         """Return the surface of the faces with indices `faces`, without unused vertices."""
@@ -54,6 +57,7 @@ class Surface:
             materials=self.materials,
             face_material=None if self.face_material is None else self.face_material[faces],
             paint=None if self.paint is None else self.paint[faces],
+            appearance=None if self.appearance is None else self.appearance.select(faces),
         )
 
 
@@ -94,6 +98,7 @@ class ModelScene:
     up: the axis that points up as the file states it, if its format lets files choose.
     unit: metres of one unit of the coordinates, if the format or the file says; DAE files are converted to metres.
     nodes: the node tree, parents before their children; empty for formats without one.
+    not_kept: what materials of the file have that no appearance holds, a sentence each.
     """
 
     kind: Literal["nodes", "objects"]
@@ -103,6 +108,7 @@ class ModelScene:
     up: Literal["y", "z"] | None = None
     unit: float | None = None
     nodes: tuple[SceneNode, ...] = ()
+    not_kept: tuple[str, ...] = ()
 
 
 def type_label(name: str) -> str:

@@ -157,4 +157,10 @@ def _used_nodes(
 
 
 def _plainly_named(surface: Surface) -> Surface:
-    return replace(surface, name=plain_name(surface.name), materials=tuple(map(plain_name, surface.materials)))
+    look = surface.appearance
+    if look is not None:
+        look = replace(
+            look, materials=tuple(replace(material, name=plain_name(material.name)) for material in look.materials)
+        )
+    materials = tuple(map(plain_name, surface.materials))
+    return replace(surface, name=plain_name(surface.name), materials=materials, appearance=look)

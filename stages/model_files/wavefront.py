@@ -7,7 +7,7 @@ one material library only, counts negative indices from the end of the file, and
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,12 +18,14 @@ from stages.model_files.colors import color_bytes, face_paint, sample_texture, u
 from stages.model_files.enclosure import Enclosure
 from stages.model_files.polygons import triangulate
 from stages.model_files.scene import GREY, ModelScene, Placement, Surface, type_label
+from stages.model_files.source_materials import appearance_of, painted_faces_without_material
 from stages.model_files.wavefront_materials import WavefrontMaterial, read_libraries
 from stages.model_files.wavefront_text import TextLine, decode_text, text_lines
+from stages.shape.appearance import NO_MATERIAL, Appearance, Material, given_normals
 from stages.shape.arrays import ByteArray, IntArray
 
 _WITHOUT_SHAPE = {
-    "vn", "s", "mg", "bevel", "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj", "ctech", "stech",
+    "s", "mg", "bevel", "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj", "ctech", "stech",
 }  # fmt: skip
 """Keywords that change how a model is rendered, and not which faces and colours it has."""
 _FREE_FORM = "free-form curves and surfaces"
@@ -53,8 +55,10 @@ class _Lines:
     colors: list[tuple[int, list[float]]] = field(default_factory=list)
     brushed: list[str] = field(default_factory=list)
     texture: list[list[float]] = field(default_factory=list)
+    normals: list[list[float]] = field(default_factory=list)
     corners: list[int] = field(default_factory=list)
     texture_corners: list[int] = field(default_factory=list)
+    normal_corners: list[int] = field(default_factory=list)
     counts: list[int] = field(default_factory=list)
     states: list[tuple[int, str | None, str | None, str | None]] = field(default_factory=list)
     libraries: list[TextLine] = field(default_factory=list)
@@ -74,7 +78,8 @@ def read_wavefront(path: Path, enclosure: Enclosure) -> ModelScene:
         f"{len(numbers):,} lines that begin with {keyword[:40]!r}, the first of them line {numbers[0]}, are not read"
         for keyword, numbers in lines.unknown.items()
     ]
-    materials = read_libraries(lines.libraries, enclosure, warnings)
+    not_kept: list[str] = []
+    materials = read_libraries(lines.libraries, enclosure, warnings, not_kept)
     vertices = np.array(lines.positions, dtype=np.float64).reshape(-1, 3)
     corners = np.array(lines.corners, dtype=np.int64)
     triangles, polygon = triangulate(vertices, corners, np.array(lines.counts, dtype=np.int64))
@@ -99,6 +104,9 @@ def read_wavefront(path: Path, enclosure: Enclosure) -> ModelScene:
         face_material=face_material,
         paint=paint,
     )
+    if len(faces):
+        look = _appearance(whole, materials, lines, triangles, np.where(is_painted, 0, 255), not_kept)
+        whole = replace(whole, appearance=look)
     owner, objects = _objects(lines.states, path.stem)
     face_owner = owner[polygon]
     order = np.argsort(face_owner, kind="stable")
@@ -108,7 +116,50 @@ def read_wavefront(path: Path, enclosure: Enclosure) -> ModelScene:
         for name, start, end in zip(objects, starts, starts[1:], strict=False)
     ]
     placements = [Placement(name, type_label(name), index, np.eye(4)) for index, name in enumerate(objects)]
-    return ModelScene("objects", tuple(surfaces), tuple(placements), tuple(warnings))
+    return ModelScene(
+        "objects", tuple(surfaces), tuple(placements), tuple(warnings), not_kept=tuple(dict.fromkeys(not_kept))
+    )
+
+
+def _appearance(
+    surface: Surface,
+    stated: Mapping[str, WavefrontMaterial],
+    lines: _Lines,
+    triangles: IntArray,
+    whiteness: np.ndarray,
+    not_kept: list[str],
+) -> Appearance | None:
+    """Return the look of all faces.
+
+    triangles: corners of the faces, as indices into the corners of the file, int32 (f, 3)
+    whiteness: 0 for faces whose vertices have colours, else 255, int (f,)
+    """
+    known = [stated.get(name) for name in surface.materials]
+    materials = [
+        Material(name) if own is None else own.described(name)
+        for name, own in zip(surface.materials, known, strict=True)
+    ]
+    is_known = np.array([*(own is not None for own in known), False])  # the last for no material
+    face_material = np.asarray(surface.face_material)
+    face_material = np.where(is_known[face_material], face_material, NO_MATERIAL).astype(np.int32)
+    paint = np.repeat(whiteness.astype(np.uint8)[:, None], 3, axis=1)
+    face_material, painted = painted_faces_without_material(face_material, materials, paint)
+    not_kept += [f"material {name!r}: faces with vertex colours have these alone" for name in painted]
+    uv = normals = None
+    if lines.texture:
+        table = np.array([*lines.texture, [0.0, 0.0]])
+        at = np.array(lines.texture_corners, dtype=np.int64)[triangles]
+        uv = table[np.where((at >= 0) & (at < len(lines.texture)), at, -1)]
+        for number, own in enumerate(known):
+            if own is not None and own.image is not None:
+                uv[face_material == number] = uv[face_material == number] * own.scale + own.offset
+        uv[:, :, 1] = 1.0 - uv[:, :, 1]
+    if lines.normals:
+        directions = np.array([*lines.normals, [0.0, 0.0, 0.0]])
+        at = np.array(lines.normal_corners, dtype=np.int64)[triangles]
+        stated_normals = directions[np.where((at >= 0) & (at < len(lines.normals)), at, -1)]
+        normals = given_normals(surface.vertices[surface.faces], stated_normals)
+    return appearance_of(materials, face_material, uv, normals)
 
 
 def _parse(path: Path) -> _Lines:
@@ -129,6 +180,8 @@ def _parse(path: Path) -> _Lines:
                 _parse_vertex(lines, _numbers(rest))
             elif keyword == "vt":
                 lines.texture.append([*_numbers(rest), 0.0, 0.0][:2])
+            elif keyword == "vn":
+                lines.normals.append(_direction(rest))
             elif keyword in ("f", "fo"):
                 _parse_face(lines, rest.partition("#")[0].split(), line)
                 lines.states.append((number, current, group, material))
@@ -163,6 +216,15 @@ def _numbers(rest: str) -> list[float]:
     return [float(word) for word in rest.partition("#")[0].split()]
 
 
+def _direction(rest: str) -> list[float]:
+    """Return the normal of a `vn` line; zero for what is no direction."""
+    try:
+        x, y, z, *_ = _numbers(rest)
+    except ValueError:
+        return [0.0, 0.0, 0.0]
+    return [x, y, z]
+
+
 def _parse_vertex(lines: _Lines, numbers: Sequence[float]) -> None:
     """Append a vertex: x, y, z, then a weight, a colour, or both. Raises ValueError for fewer than three numbers."""
     x, y, z, *more = numbers
@@ -177,12 +239,13 @@ def _parse_face(lines: _Lines, words: Sequence[str], line: TextLine) -> None:
     """Append a face. Raises ValueError for an index that is zero, no number, or before the first."""
     for word in words:
         vertex, _, rest = word.partition("/")
-        texture = rest.partition("/")[0]
+        texture, _, normal = rest.partition("/")
         index = _index(vertex, len(lines.positions))
         if index >= len(lines.positions):
             lines.forward.append((index, line))
         lines.corners.append(index)
         lines.texture_corners.append(_index(texture, len(lines.texture)) if texture else -1)
+        lines.normal_corners.append(_normal_index(normal, len(lines.normals)) if normal else -1)
     lines.counts.append(len(words))
     if len(words) < 3:
         lines.left_out["faces with fewer than three corners"] += 1
@@ -194,6 +257,14 @@ def _index(word: str, count: int) -> int:
     if number == 0 or index < 0:
         raise ValueError(word)
     return index
+
+
+def _normal_index(word: str, count: int) -> int:
+    """Return the index of a normal, -1 for an invalid one: the normal of the face replaces it."""
+    try:
+        return _index(word, count)
+    except ValueError:
+        return -1
 
 
 def _objects(states: Sequence[tuple[int, str | None, str | None, str | None]], stem: str) -> tuple[IntArray, list[str]]:
@@ -274,5 +345,6 @@ def _face_colors(
         textured = has_material & ((uv_faces >= 0) & (uv_faces < len(uv))).all(axis=1)
         if material.image is not None and textured.any():
             placed = uv * material.scale + material.offset
-            colors[textured] = sample_texture(material.image, placed, uv_faces[textured], material.wrap, material.wrap)
+            pixels, wrap = material.image.pixels, material.wrap
+            colors[textured] = sample_texture(pixels, placed, uv_faces[textured], wrap, wrap)
     return colors

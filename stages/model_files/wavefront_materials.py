@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from stages.model_files.colors import Wrap, color_bytes, decode_image, srgb_from_linear
+from stages.model_files.colors import color_bytes, decode_image, srgb_from_linear
 from stages.model_files.enclosure import Enclosure, Outside
 from stages.model_files.scene import GREY
+from stages.model_files.source_materials import alpha_mode_of, linear_color, stated_number
 from stages.model_files.wavefront_text import TextLine, decode_text, text_lines
+from stages.shape.appearance import Material, Texture, TextureImage, Wrap
 from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.input_file import content_fault
 
 _OPTION_NUMBERS = {"-mm": 2, "-o": 3, "-s": 3, "-t": 3}
 """Largest number of values of the options of maps; the other options take one word."""
+_READ_NUMBERS = {"d", "tr", "ns", "pm", "pr", "ke"}
+_NOT_KEPT_MAPS = {"map_d", "map_bump", "bump", "norm", "map_ke", "map_ks", "map_pr", "map_pm", "refl"}
 _LINEAR_FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 MAX_BRIGHT_COLOR = 4.0
 """Up to here colours beyond 1 are bright; larger ones range to 255."""
@@ -27,28 +32,47 @@ class WavefrontMaterial:
     """A material.
 
     color: uint8 (3,) sRGB.
-    image: uint8 (h, w, 3), the texture.
+    image: the texture.
     scale, offset: of texture coordinates, (2,).
+    alpha: 1 is opaque.
+    emissive: linear red, green, blue.
     """
 
     color: ByteArray = field(default_factory=lambda: np.array(GREY, np.uint8))
-    image: ByteArray | None = None
+    image: TextureImage | None = None
     scale: tuple[float, float] = (1.0, 1.0)
     offset: tuple[float, float] = (0.0, 0.0)
     wrap: Wrap = "repeat"
+    alpha: float = 1.0
+    metallic: float = 0.0
+    roughness: float = 1.0
+    emissive: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def described(self, name: str) -> Material:
+        """Return the material with the meanings of glTF; both of its sides are seen."""
+        texture = None if self.image is None else Texture(self.image, self.wrap, self.wrap)
+        red, green, blue = (1.0, 1.0, 1.0) if texture is not None else linear_color((self.color / 255.0).tolist())
+        return Material(
+            *(name, (red, green, blue, self.alpha), texture, self.metallic, self.roughness, self.emissive),
+            alpha_mode=alpha_mode_of(self.alpha, None if self.image is None else self.image.pixels),
+            double_sided=True,
+        )
 
 
 def read_libraries(
-    lines: Sequence[TextLine], enclosure: Enclosure, warnings: list[str]
+    lines: Sequence[TextLine], enclosure: Enclosure, warnings: list[str], not_kept: list[str]
 ) -> dict[str, WavefrontMaterial]:
-    """Return the materials of all `mtllib` lines, by name; warn of what is missing or not read."""
+    """Return the materials of all `mtllib` lines, by name; warn of what is missing or not read.
+
+    not_kept: gets what an appearance does not hold of a material, a sentence each
+    """
     materials: dict[str, WavefrontMaterial] = {}
     for line in {line.full: line for line in lines}.values():
         for content in _library_contents(line, enclosure, warnings):
             if other := content_fault(content):
                 warnings.append(f"material library {line.rest!r} {other}; its faces are grey")
                 continue
-            _Library(enclosure, materials, warnings).read(decode_text(content))
+            _Library(enclosure, materials, warnings, not_kept).read(decode_text(content))
     return materials
 
 
@@ -77,10 +101,17 @@ def _library_contents(line: TextLine, enclosure: Enclosure, warnings: list[str])
 
 
 class _Library:
-    def __init__(self, enclosure: Enclosure, materials: dict[str, WavefrontMaterial], warnings: list[str]) -> None:
+    def __init__(
+        self,
+        enclosure: Enclosure,
+        materials: dict[str, WavefrontMaterial],
+        warnings: list[str],
+        not_kept: list[str],
+    ) -> None:
         self.enclosure = enclosure
         self.materials = materials
         self.warnings = warnings
+        self.not_kept = not_kept
         self.diffuse: dict[str, FloatArray] = {}
         self.ambient: dict[str, FloatArray] = {}
 
@@ -100,6 +131,10 @@ class _Library:
                 self.read_map(self.materials.setdefault(name, WavefrontMaterial()), line)
             elif keyword == "map_ka":
                 ambient_maps[name] = line
+            elif keyword in _READ_NUMBERS:
+                self.read_number(self.materials.setdefault(name, WavefrontMaterial()), keyword, line.rest.split())
+            elif keyword in _NOT_KEPT_MAPS:
+                self.not_kept.append(f"material {name!r}: {keyword} is not kept")
         for name, line in ambient_maps.items():
             if name in self.materials and self.materials[name].image is None and name not in self.diffuse:
                 self.read_map(self.materials[name], line)
@@ -110,6 +145,25 @@ class _Library:
             self.warnings.append(f"colours of materials reach {largest:g} and are taken to range from 0 to 255")
         for name, color in colors.items():
             self.materials.setdefault(name, WavefrontMaterial()).color = color_bytes(color / limit)
+
+    def read_number(self, material: WavefrontMaterial, keyword: str, words: Sequence[str]) -> None:
+        """Read opacity, shininess, metal, roughness or glow; a material that nobody would see is opaque."""
+        value = stated_number(words[0] if words else None, math.nan)
+        if keyword == "ke":
+            numbers = [stated_number(word, 0.0) for word in words[:3]]
+            material.emissive = linear_color(numbers if len(numbers) == 3 else numbers[:1] * 3 or [0.0] * 3)
+        elif math.isnan(value):
+            return
+        elif keyword == "d":
+            material.alpha = value or 1.0
+        elif keyword == "tr" and material.alpha == 1.0:
+            material.alpha = 1.0 - value or 1.0
+        elif keyword == "pm":
+            material.metallic = value
+        elif keyword == "pr":
+            material.roughness = value
+        elif keyword == "ns":
+            material.roughness = math.sqrt(2.0 / (2.0 + max(float(words[0]), 0.0)))
 
     def color(self, line: TextLine) -> FloatArray | None:
         """Return the colour of a line: one number or three, as sRGB or as CIE XYZ; None, with a warning, for others."""
@@ -134,7 +188,7 @@ class _Library:
         names = dict.fromkeys(_map_file(rest, material) for rest in line.file_names())
         for number, name in enumerate(names, start=1):
             try:
-                material.image = decode_image(self.enclosure.read(name, "map_Kd"))
+                material.image = TextureImage.of(decode_image(self.enclosure.read(name, "map_Kd")))
                 return
             except Outside:
                 self.warnings.append(

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stages.shape.appearance import unit_vectors
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.contact import world_boxes
 from stages.shape.geometry.pose import transform_points
@@ -28,6 +29,9 @@ MIN_SCALED_LENGTH_SHARE = 0.15
 MAX_FREE_INTERVALS = 12
 """Along an axis with more intervals all follow the size of the whole. With more lengths, own factors vary less."""
 FACTOR_DECIMALS = 3
+
+SLOPE_STEP_SHARE = 1e-3
+"""How far from a corner to the middle of its face the map is looked at, since a corner may lie on a knot."""
 
 Warp = tuple[FloatArray, FloatArray, FloatArray]
 """For each axis the factors of its intervals, float64 (k,)."""
@@ -139,12 +143,33 @@ def warped(shape: Shape, lattice: Lattice, warp: Sequence[FloatArray]) -> Shape:
     for part, (kind, pose) in enumerate(zip(original.types.tolist(), original.poses, strict=True)):
         mesh = shape.meshes[kind]
         positions = transform_points(pose, mesh.vertices)
-        moved = np.column_stack([_mapped(positions[:, axis], lattice.knots[axis], images[axis]) for axis in range(3)])
+        moved = _mapped_points(positions, lattice.knots, images)
         centre = (moved.min(axis=0) + moved.max(axis=0)) / 2
         poses[part, :3, 3] = centre
-        meshes.append(WarpedMesh(shape.part_names[part], moved - centre, mesh.faces, mesh.face_colors, mesh))
+        look = None if mesh.appearance is None else mesh.appearance.turned(pose[:3, :3])
+        if look is not None and look.normals is not None:
+            normals = unit_vectors(look.normals / _slopes(positions[mesh.faces], lattice.knots, images))
+            look = replace(look, normals=normals)
+        name = shape.part_names[part]
+        meshes.append(WarpedMesh(name, moved - centre, mesh.faces, mesh.face_colors, mesh, appearance=look))
     assembly = Assembly(np.arange(len(meshes), dtype=np.int16), poses, original.edges)
     return replace(shape, meshes=tuple(meshes), assembly=assembly, own_names=shape.part_names)
+
+
+def _mapped_points(points: FloatArray, knots: Sequence[FloatArray], images: Sequence[FloatArray]) -> FloatArray:
+    """Return moved points, float64 (v, 3)."""
+    moved: FloatArray = np.column_stack([_mapped(points[:, axis], knots[axis], images[axis]) for axis in range(3)])
+    return moved
+
+
+def _slopes(corners: FloatArray, knots: Sequence[FloatArray], images: Sequence[FloatArray]) -> FloatArray:
+    """Return by how much a map stretches each axis at the corners of faces (f, 3, 3), on the side of the face."""
+    inner = corners + SLOPE_STEP_SHARE * (corners.mean(axis=1, keepdims=True) - corners)
+    slopes: FloatArray = np.empty_like(inner)
+    for axis, (ends, moved) in enumerate(zip(knots, images, strict=True)):
+        factors = np.concatenate([[1.0], np.diff(moved) / np.diff(ends), [1.0]])
+        slopes[:, :, axis] = factors[np.searchsorted(ends, inner[:, :, axis])]
+    return slopes
 
 
 def _mapped(positions: FloatArray, knots: FloatArray, images: FloatArray) -> FloatArray:

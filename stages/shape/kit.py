@@ -14,6 +14,7 @@ from typing import Literal
 
 import numpy as np
 
+from stages.shape.appearance import Appearance
 from stages.shape.arrays import ByteArray, FloatArray, IntArray, TypeArray
 from stages.shape.geometry.triangles import triangle_areas
 
@@ -42,12 +43,14 @@ class PartMesh:
     vertices: float64 (v, 3)
     faces: int32 (f, 3)
     face_colors: sRGB, uint8 (f, 3)
+    appearance: materials, texture coordinates and normals, or None for a surface of face colours
     """
 
     name: str
     vertices: FloatArray
     faces: IntArray
     face_colors: ByteArray
+    appearance: Appearance | None = field(default=None, kw_only=True)
 
     @property
     def label(self) -> str:

@@ -10,6 +10,15 @@ from typing import Any
 import numpy as np
 
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes, read_shard
+from stages.shape.appearance import (
+    Appearance,
+    Material,
+    TextureImage,
+    describe_materials,
+    restore_materials,
+    shared_materials,
+)
+from stages.shape.arrays import IntArray
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType, labels_of
 
@@ -18,6 +27,7 @@ def kit_json(kit: Kit) -> dict[str, Any]:
     """Return the kit as readable JSON: types, exemplars, neighbourhoods by label, dockings by type name."""
     names, labels = kit.type_names(), kit.labels
     table = DockingTable.of(kit)
+    materials, _ = describe_materials(_looks(kit)[0])
     return {
         "kit": kit.name,
         "up": kit.up,
@@ -26,6 +36,7 @@ def kit_json(kit: Kit) -> dict[str, Any]:
         "contact_kinds": list(kit.contact_kinds),
         **({"one_surface": True} if kit.one_surface else {}),
         "unit": kit.unit,
+        **({"materials": materials} if materials else {}),
         "types": [
             {
                 "name": kind.name,
@@ -72,6 +83,14 @@ def kit_json(kit: Kit) -> dict[str, Any]:
     }
 
 
+def _looks(kit: Kit) -> tuple[tuple[Material, ...], list[IntArray | None]]:
+    """Return the materials of all types, and for each type those of its faces, int32 (f,), or None."""
+    looks = [kind.appearance for kind in kit.types]
+    materials, places = shared_materials([look for look in looks if look is not None])
+    place_of = iter(places)
+    return materials, [None if look is None else next(place_of)[look.face_material] for look in looks]
+
+
 def _contacts(kit: Kit, table: DockingTable, assembly: Assembly) -> list[list[int | str]]:
     """Return contacts as `[part, part, kind]`."""
     labels = table.label_edges(assembly.types, assembly.poses, assembly.edges)[:, 0] // 2
@@ -82,8 +101,11 @@ def _contacts(kit: Kit, table: DockingTable, assembly: Assembly) -> list[list[in
 def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
     """Write `kit` to two binary streams: the JSON of `kit_json` to `text`, the tar to `arrays`."""
     text.write(json.dumps(kit_json(kit), indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n")
+    materials, face_materials = _looks(kit)
     with ShardWriter(arrays) as writer:
-        for index, kind in enumerate(kit.types):
+        for index, image in enumerate(describe_materials(materials)[1]):
+            writer.write(f"image-{index:04d}", {"pixels.npy": array_bytes(image.pixels)})
+        for index, (kind, face_material) in enumerate(zip(kit.types, face_materials, strict=True)):
             members = {
                 "vertices.npy": array_bytes(kind.vertices),
                 "faces.npy": array_bytes(kind.faces),
@@ -91,6 +113,12 @@ def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
                 "frame.npy": array_bytes(kind.frame),
                 "symmetries.npy": array_bytes(kind.symmetries),
             }
+            if kind.appearance is not None and face_material is not None:
+                members["materials.npy"] = array_bytes(face_material)
+                if kind.appearance.uv is not None:
+                    members["uv.npy"] = array_bytes(kind.appearance.uv)
+                if kind.appearance.normals is not None:
+                    members["normals.npy"] = array_bytes(kind.appearance.normals)
             writer.write(f"type-{index:04d}", members)
         for index, exemplar in enumerate(kit.exemplars):
             members = {
@@ -110,9 +138,15 @@ def load_kit(text: Path, arrays: Path) -> Kit:
     heads = iter([(kind["name"], kind.get("meaning", "")) for kind in described["types"]])
     types: list[PartType] = []
     exemplars: list[Exemplar] = []
+    images: list[TextureImage] = []
+    materials: tuple[Material, ...] | None = None
     for key, members in read_shard(arrays):
-        if key.startswith("type-"):
-            types.append(_part_type(*next(heads), members))
+        if key.startswith("image-"):
+            images.append(TextureImage.of(bytes_array(members["pixels.npy"])))
+        elif key.startswith("type-"):
+            if materials is None:
+                materials = restore_materials(described.get("materials", []), images)
+            types.append(_part_type(*next(heads), members, materials))
         else:
             exemplars.append(_exemplar(members))
     return Kit(
@@ -129,7 +163,13 @@ def load_kit(text: Path, arrays: Path) -> Kit:
     )
 
 
-def _part_type(name: str, meaning: str, members: Mapping[str, bytes]) -> PartType:
+def _part_type(name: str, meaning: str, members: Mapping[str, bytes], materials: tuple[Material, ...]) -> PartType:
+    look = None
+    if "materials.npy" in members:
+        uv, normals = (
+            bytes_array(members[member]) if member in members else None for member in ("uv.npy", "normals.npy")
+        )
+        look = Appearance(materials, bytes_array(members["materials.npy"]), uv, normals)
     return PartType(
         name=name,
         vertices=bytes_array(members["vertices.npy"]),
@@ -138,6 +178,7 @@ def _part_type(name: str, meaning: str, members: Mapping[str, bytes]) -> PartTyp
         frame=bytes_array(members["frame.npy"]),
         symmetries=bytes_array(members["symmetries.npy"]),
         meaning=meaning,
+        appearance=look,
     )
 
 

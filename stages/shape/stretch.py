@@ -90,4 +90,6 @@ def placements(meshes: Sequence[PartMesh], assembly: Assembly) -> FloatArray:
 
 
 def _stretched(mesh: PartMesh, stretch: FloatArray) -> StretchedMesh:
-    return StretchedMesh(mesh.name, mesh.vertices @ stretch, mesh.faces, mesh.face_colors, mesh, stretch)
+    look = None if mesh.appearance is None else mesh.appearance.turned(stretch)
+    vertices = mesh.vertices @ stretch
+    return StretchedMesh(mesh.name, vertices, mesh.faces, mesh.face_colors, mesh, stretch, appearance=look)

@@ -189,7 +189,7 @@ class Slab:
         heights = points @ self.normal
         mates, previous = layout.vertex_mates(part, self.shift), layout.vertex_mates(part, -self.shift)
         slab = self.start, self.at, self.shift, layout.tolerance
-        return Span(layout.meshes[part], points, mates, previous, heights, *slab)
+        return Span(layout.meshes[part], layout.poses[part], points, mates, previous, heights, *slab)
 
 
 def slab_of(layout: Layout, change: RowChange) -> Slab:

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from stages.shape.appearance import barycentric
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.kit import PartMesh
 from stages.variations.rows.layout import VERTEX_REACH, LengthenedMesh
@@ -25,6 +26,7 @@ MAX_SECTION_DIFFERENCE = 0.01
 class Span:
     """A part that spans a slab.
 
+    pose: of the part, float64 (4, 4)
     points: its vertices in the world, float64 (v, 3)
     mates, previous: the vertex one step after and one step before each vertex, or -1, int64 (v,)
     heights: their positions along the slab's normal, float64 (v,)
@@ -34,6 +36,7 @@ class Span:
     """
 
     mesh: PartMesh
+    pose: FloatArray
     points: FloatArray
     mates: np.ndarray
     previous: np.ndarray
@@ -116,7 +119,7 @@ class Span:
 
 def _longer(span: Span, times: int) -> tuple[LengthenedMesh, FloatArray]:
     """Return a regular part with `times` more periods: a face across the end of the slab joins each two periods."""
-    points, faces, colors, sides = span.points, span.mesh.faces, span.mesh.face_colors, span.sides
+    points, faces, sides = span.points, span.mesh.faces, span.sides
     inside = np.flatnonzero(sides == 1)
     copy_of = np.full(len(points), -1, dtype=np.int64)
     copy_of[inside] = np.arange(len(inside))
@@ -141,7 +144,7 @@ def _longer(span: Span, times: int) -> tuple[LengthenedMesh, FloatArray]:
         owners.append(end)
     moved = points + (times * (sides == 2))[:, None] * span.shift
     copies = [points[inside] + number * span.shift for number in range(1, times + 1)]
-    return _posed(span.mesh, np.concatenate([moved, *copies]), np.concatenate(pieces), colors[np.concatenate(owners)])
+    return _posed(span, np.concatenate([moved, *copies]), np.concatenate(pieces), np.concatenate(owners))
 
 
 def _shorter(span: Span) -> tuple[LengthenedMesh, FloatArray]:
@@ -153,7 +156,7 @@ def _shorter(span: Span) -> tuple[LengthenedMesh, FloatArray]:
     led = np.where(sides[faces[start]] == 1, span.mates[faces[start]], faces[start])
     moved = span.points - (sides == 2)[:, None] * span.shift
     owners = np.concatenate([stays, start])
-    return _posed(span.mesh, moved, np.concatenate([faces[stays], led]), span.mesh.face_colors[owners])
+    return _posed(span, moved, np.concatenate([faces[stays], led]), owners)
 
 
 def are_parallel(corners: FloatArray, shift: FloatArray, points: FloatArray) -> BoolArray:
@@ -170,38 +173,53 @@ def _clipped_and_repeated(span: Span, times: int) -> tuple[LengthenedMesh, Float
     """Return a part whose faces are cut at both ends of the slab, with the piece between `times` more times."""
     mesh, points, heights, shift = span.mesh, span.points, span.heights, span.shift
     corners, tops = points[mesh.faces], heights[mesh.faces]
-    before, colors_before, _ = _clipped(corners, tops, mesh.face_colors, span.low, -1.0)
-    after, colors_after, _ = _clipped(corners, tops, mesh.face_colors, span.high, 1.0)
-    above, colors_above, tops_above = _clipped(corners, tops, mesh.face_colors, span.low, 1.0)
-    middle, colors_middle, _ = _clipped(above, tops_above, colors_above, span.high, -1.0)
+    before, owners_before, _ = _clipped(corners, tops, span.low, -1.0)
+    after, owners_after, _ = _clipped(corners, tops, span.high, 1.0)
+    above, owners_above, tops_above = _clipped(corners, tops, span.low, 1.0)
+    middle, of_above, _ = _clipped(above, tops_above, span.high, -1.0)
+    owners_middle = owners_above[of_above]
     pieces = [before, *(middle + number * shift for number in range(times + 1)), after + times * shift]
-    colors = [colors_before, *(colors_middle for _ in range(times + 1)), colors_after]
+    owners = np.concatenate([owners_before, *(owners_middle for _ in range(times + 1)), owners_after])
+    weights = None
+    if mesh.appearance is not None:
+        cut = np.concatenate([before, *(middle for _ in range(times + 1)), after])
+        weights = barycentric(corners[owners], cut)
     joined = np.concatenate(pieces).reshape(-1, 3)
     scale = max(float(np.ptp(joined, axis=0).max()), 1e-12) * WELDED_SHARE
     places = np.rint(joined / scale).astype(np.int64)
     _, first, index = np.unique(places, axis=0, return_index=True, return_inverse=True)
     faces = index.reshape(-1, 3).astype(np.int32)
     whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 0] != faces[:, 2])
-    return _posed(mesh, joined[first], faces[whole], np.concatenate(colors)[whole])
+    return _posed(span, joined[first], faces[whole], owners[whole], None if weights is None else weights[whole])
 
 
 def _posed(
-    mesh: PartMesh, points: FloatArray, faces: np.ndarray, colors: np.ndarray
+    span: Span, points: FloatArray, faces: np.ndarray, owners: np.ndarray, weights: FloatArray | None = None
 ) -> tuple[LengthenedMesh, FloatArray]:
-    """Return a surface of the used vertices with the origin in the middle of its box, and its pose."""
+    """Return a surface of the used vertices with the origin in the middle of its box, and its pose.
+
+    owners: the face of the part that each face is, or is a piece of, int64 (f,)
+    weights: barycentric coordinates of the corners of such pieces, float64 (f, 3, 3)
+    """
+    mesh = span.mesh
     used, index = np.unique(faces, return_inverse=True)
     points, faces = points[used], index.reshape(-1, 3).astype(np.int32)
     centre = np.round((points.min(axis=0) + points.max(axis=0)) / 2, 12)
     pose = np.eye(4)
     pose[:3, 3] = centre
+    look = mesh.appearance
+    if look is not None:
+        look = look.select(owners) if weights is None else look.interpolated(owners, weights)
+        look = look.turned(span.pose[:3, :3])
     of = mesh.of if isinstance(mesh, LengthenedMesh) else mesh
-    return LengthenedMesh(mesh.name, points - centre, faces, colors, of), pose
+    colors = mesh.face_colors[owners]
+    return LengthenedMesh(mesh.name, points - centre, faces, colors, of, appearance=look), pose
 
 
 def _clipped(
-    corners: FloatArray, heights: FloatArray, colors: np.ndarray, bound: float, sign: float
+    corners: FloatArray, heights: FloatArray, bound: float, sign: float
 ) -> tuple[FloatArray, np.ndarray, FloatArray]:
-    """Return the pieces of triangles (f, 3, 3) above a height (below it if `sign` is -1), their colours, and the
+    """Return the pieces of triangles (f, 3, 3) above a height (below it if `sign` is -1), the triangle of each, and the
     heights of their corners, float64 (k, 3).
     """
     signed = sign * (heights - bound)
@@ -230,7 +248,7 @@ def _clipped(
                 owners.append(faces)
     owner = np.concatenate(owners)
     order = np.argsort(owner, kind="stable")
-    return np.concatenate(pieces)[order], colors[owner[order]], np.concatenate(piece_heights)[order]
+    return np.concatenate(pieces)[order], owner[order], np.concatenate(piece_heights)[order]
 
 
 def _crossing(signed: FloatArray, faces: np.ndarray, one: int, other: int) -> FloatArray:

@@ -28,20 +28,20 @@ BOTH = np.concatenate([CORNERS, CORNERS])
     ids=["reversed", "repeated", "reversed shell", "repeated shell", "by turns", "same triangles"],
 )
 def test_second_side_with_other_diagonals_is_removed(vertices: np.ndarray, faces: np.ndarray) -> None:
-    points, kept, colors, repair = repair_mesh(vertices, faces, np.zeros((len(faces), 3), np.uint8))
-    assert (len(kept), len(colors), repair.changes) == (12, 12, {"duplicate_faces": 12})
+    points, kept, sources, repair = repair_mesh(vertices, faces)
+    assert (len(kept), len(sources), repair.changes) == (12, 12, {"duplicate_faces": 12})
     assert signed_volume(points, kept) == pytest.approx(1)
 
 
 def test_wall_that_two_boxes_share_stays_on_both() -> None:
     vertices = np.concatenate([CORNERS, CORNERS + np.array([1, 0, 0])])
     faces = np.concatenate([FRONT, OTHER + 8])
-    points, kept, _, repair = repair_mesh(vertices, faces, np.zeros((24, 3), np.uint8))
+    points, kept, _, repair = repair_mesh(vertices, faces)
     assert (len(kept), repair.changes) == (24, {})
     assert signed_volume(points, kept) == pytest.approx(2)
 
 
 def test_plate_of_two_sides_becomes_a_sheet() -> None:
     faces = np.array([[0, 1, 3], [0, 3, 2], [1, 0, 2], [1, 2, 3]], dtype=np.int32)
-    _, kept, _, repair = repair_mesh(CORNERS[:4], faces, np.zeros((4, 3), np.uint8))
+    _, kept, _, repair = repair_mesh(CORNERS[:4], faces)
     assert (len(kept), repair.changes) == (2, {"duplicate_faces": 2})

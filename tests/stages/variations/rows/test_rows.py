@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from stages.proportions.warp_check import warp_fault
+from stages.shape.appearance import Appearance
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.kit import Kit
+from stages.shape.kit import Kit, PartMesh
 from stages.variations.rows.changes import change_json, read_change
 from stages.variations.rows.changes import changed as changed_by
 from stages.variations.rows.draws import LayoutDraws
 from stages.variations.rows.kit_rows import rows_of_kit
-from stages.variations.rows.layout import Layout
+from stages.variations.rows.layout import Layout, LengthenedMesh
 from stages.variations.rows.rows import Row, find_rows
 from stages.variations.rows.slabs import RowChange, SlabError, repeat
 from stages.variations.rows.steps import steps_of
@@ -224,3 +226,27 @@ def test_rows_are_described() -> None:
     kit, layout = models.shelf()
     assert rows_of_kit(kit)[0].sentence == "5 times board, along y"
     assert [step.count for step in steps_of(layout)] == [5]
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("times", [2, -1])
+def test_lengthened_parts_have_the_look_of_their_faces(name: str, times: int) -> None:
+    """A face that is kept has its texture coordinates; one that is cut has some between them."""
+    _, layout = MODELS[name]()
+    meshes = {mesh: replace(mesh, appearance=planar_look(mesh)) for mesh in layout.meshes}
+    textured = replace(layout, meshes=tuple(meshes[mesh] for mesh in layout.meshes))
+    for change in list(changes(find_rows(layout), times))[:3]:
+        for mesh in repeat(textured, change).meshes:
+            look = mesh.appearance
+            assert look is not None
+            assert look.uv is not None
+            assert len(look) == len(mesh.faces)
+            if isinstance(mesh, LengthenedMesh):
+                source = meshes[next(own for own in meshes if own.name == mesh.name)].appearance
+                assert source.uv.min() <= look.uv.min()
+                assert look.uv.max() <= source.uv.max()
+
+
+def planar_look(mesh: PartMesh) -> Appearance:
+    uv = mesh.vertices[mesh.faces][:, :, :2].astype(np.float32)
+    return Appearance((), np.full(len(mesh.faces), -1, np.int32), uv)

@@ -1,0 +1,184 @@
+"""The same textured square in GLB, OBJ and DAE has the same look."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from stages.model_files.kept_appearance import shrunk
+from stages.model_files.read import read_model
+from stages.model_files.scene import ModelScene
+
+PIXELS = np.array([[[250, 10, 20], [0, 200, 0]], [[0, 0, 255], [90, 90, 90]]], np.uint8)
+CORNERS = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], float)
+UV = np.array([[0, 1], [3, 1], [3, 0], [0, 0]], float)
+"""With the origin at the upper left."""
+NORMALS = np.array([[0, 0, 1], [0, 0, 1], [0, 0.6, 0.8], [0, 0.6, 0.8]], float)
+FACES = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def png(pixels: np.ndarray = PIXELS) -> bytes:
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "PNG")
+    return stream.getvalue()
+
+
+def glb(folder: Path) -> Path:
+    """Write the square with trimesh."""
+    import trimesh
+
+    material = trimesh.visual.material.PBRMaterial(
+        name="tiles",
+        baseColorTexture=Image.fromarray(PIXELS),
+        metallicFactor=0.0,
+        roughnessFactor=0.5,
+        alphaMode="MASK",
+        alphaCutoff=0.25,
+        doubleSided=True,
+    )
+    visual = trimesh.visual.TextureVisuals(uv=UV * (1, -1) + (0, 1), material=material)
+    mesh = trimesh.Trimesh(CORNERS, FACES, vertex_normals=NORMALS, visual=visual, process=False)
+    path = folder / "square.glb"
+    path.write_bytes(trimesh.Scene({"square": mesh}).export(file_type="glb"))
+    return path
+
+
+def obj(folder: Path) -> Path:
+    (folder / "tiles.png").write_bytes(png())
+    (folder / "square.mtl").write_text(
+        "newmtl tiles\nKd 0.1 0.1 0.1\nNs 6\nmap_Kd tiles.png\nmap_Bump bumps.png\n", encoding="utf-8"
+    )
+    rows = [f"v {x} {y} {z}" for x, y, z in CORNERS]
+    rows += [f"vt {u} {1 - v}" for u, v in UV] + [f"vn {x} {y} {z}" for x, y, z in NORMALS]
+    (folder / "square.obj").write_text(
+        "\n".join(["mtllib square.mtl", *rows, "usemtl tiles", "f 1/1/1 2/2/2 3/3/3", "f 1/1/1 3/3/3 4/4/4"]),
+        encoding="utf-8",
+    )
+    return folder / "square.obj"
+
+
+def dae(folder: Path) -> Path:
+    (folder / "tiles.png").write_bytes(png())
+
+    def source(name: str, rows: np.ndarray, axes: str) -> str:
+        params = "".join(f'<param name="{axis}" type="float"/>' for axis in axes)
+        return (
+            f'<source id="{name}"><float_array id="{name}-a" count="{rows.size}">{" ".join(map(str, rows.ravel()))}'
+            f'</float_array><technique_common><accessor source="#{name}-a" count="{len(rows)}" stride="{len(axes)}">'
+            f"{params}</accessor></technique_common></source>"
+        )
+
+    index = " ".join(f"{corner} {corner} {corner}" for corner in FACES.ravel())
+    (folder / "square.dae").write_text(
+        f"""<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset><up_axis>Y_UP</up_axis></asset>
+<library_images><image id="img"><init_from>tiles.png</init_from></image></library_images>
+<library_effects><effect id="fx"><profile_COMMON>
+<newparam sid="surf"><surface type="2D"><init_from>img</init_from></surface></newparam>
+<newparam sid="samp"><sampler2D><source>surf</source></sampler2D></newparam>
+<technique sid="t"><lambert><diffuse><texture texture="samp" texcoord="UV"/></diffuse></lambert></technique>
+</profile_COMMON></effect></library_effects>
+<library_materials><material id="mat" name="tiles"><instance_effect url="#fx"/></material></library_materials>
+<library_geometries><geometry id="g" name="square"><mesh>{source("p", CORNERS, "XYZ")}{source("n", NORMALS, "XYZ")}
+{source("t", UV * (1, -1) + (0, 1), "ST")}<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="2" material="m"><input semantic="VERTEX" source="#v" offset="0"/>
+<input semantic="NORMAL" source="#n" offset="1"/><input semantic="TEXCOORD" source="#t" offset="2" set="0"/>
+<p>{index}</p></triangles></mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="square"><instance_geometry url="#g"><bind_material>
+<technique_common><instance_material symbol="m" target="#mat"/></technique_common></bind_material></instance_geometry>
+</node></visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>""",
+        encoding="utf-8",
+    )
+    return folder / "square.dae"
+
+
+FORMATS = {"glb": glb, "obj": obj, "dae": dae}
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_textured_square_has_its_material_pixels_coordinates_and_normals(name: str, tmp_path: Path) -> None:
+    (surface,) = read_model(FORMATS[name](tmp_path), texture_size=512).surfaces
+    look = surface.appearance
+    assert look is not None
+    assert look.uv is not None
+    assert look.normals is not None
+    (material,) = (look.materials[number] for number in np.unique(look.face_material))
+    assert material.name == "tiles"
+    assert material.base_color == (1.0, 1.0, 1.0, 1.0)
+    assert material.texture is not None
+    np.testing.assert_array_equal(material.texture.image.pixels, PIXELS)
+    assert material.double_sided
+    at = [[CORNERS.tolist().index(corner) for corner in face] for face in surface.vertices[surface.faces].tolist()]
+    np.testing.assert_allclose(look.uv, UV[at], atol=1e-6)
+    np.testing.assert_allclose(look.normals, NORMALS[at], atol=1e-6)
+
+
+def test_numbers_of_a_gltf_material_are_kept(tmp_path: Path) -> None:
+    (surface,) = read_model(glb(tmp_path), texture_size=512).surfaces
+    assert surface.appearance is not None
+    material = surface.appearance.materials[0]
+    assert (material.metallic, material.roughness) == (0.0, 0.5)
+    assert (material.alpha_mode, material.alpha_cutoff) == ("mask", 0.25)
+
+
+def test_an_obj_says_what_it_does_not_keep(tmp_path: Path) -> None:
+    scene = read_model(obj(tmp_path), texture_size=512)
+    assert scene.warnings == ("material 'tiles': map_bump is not kept",)
+    assert scene.surfaces[0].appearance is not None
+    assert scene.surfaces[0].appearance.materials[0].roughness == 0.5
+
+
+def test_colors_alone_say_that_textures_are_lost(tmp_path: Path) -> None:
+    scene = read_model(obj(tmp_path))
+    assert scene.surfaces[0].appearance is None
+    (warning,) = scene.warnings
+    assert warning.startswith("1 textures are read as opaque colours of faces; a kit with `appearance: textures`")
+
+
+def painted(folder: Path, stated: str) -> ModelScene:
+    """Read a triangle with vertex colours and a material."""
+    (folder / "m.mtl").write_text(f"newmtl glass\n{stated}\n", encoding="utf-8")
+    (folder / "m.obj").write_text(
+        "mtllib m.mtl\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nusemtl glass\nf 1 2 3\n", encoding="utf-8"
+    )
+    return read_model(folder / "m.obj", texture_size=64)
+
+
+def test_vertex_colors_stay_without_the_material_beside_them(tmp_path: Path) -> None:
+    scene = painted(tmp_path, "Kd 0 0 1")
+    assert scene.surfaces[0].appearance is None
+    assert scene.surfaces[0].face_colors.tolist() == [[255, 0, 0]]
+    assert scene.warnings == ("material 'glass': faces with vertex colours have these alone",)
+
+
+@pytest.mark.parametrize(
+    ("stated", "alpha"), [("d 0.25", 0.25), ("Tr 0.25", 0.75), ("d 0.5\nTr 0.25", 0.5), ("d 0", 1)]
+)
+def test_opacity_of_an_obj(stated: str, alpha: float, tmp_path: Path) -> None:
+    (tmp_path / "m.mtl").write_text(f"newmtl glass\nKd 0 0 1\n{stated}\n", encoding="utf-8")
+    (tmp_path / "m.obj").write_text(
+        "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl glass\nf 1 2 3\n", encoding="utf-8"
+    )
+    look = read_model(tmp_path / "m.obj", texture_size=64).surfaces[0].appearance
+    assert look is not None
+    assert look.materials[0].base_color == (0.0, 0.0, 1.0, alpha)
+    assert look.materials[0].alpha_mode == ("opaque" if alpha == 1 else "blend")
+
+
+def test_large_textures_are_reduced_in_linear_light() -> None:
+    stripes = np.zeros((4, 64, 3), np.uint8)
+    stripes[:, ::2] = 255
+    small = shrunk(stripes, 32)
+    assert small.shape == (2, 32, 3)
+    assert (small == 188).all(), "half of white is 188 in sRGB"
+    assert shrunk(stripes, 64) is stripes
+
+
+def test_what_is_transparent_does_not_darken_a_reduced_texture() -> None:
+    leaf = np.zeros((2, 2, 4), np.uint8)
+    leaf[0] = [40, 200, 30, 255]
+    assert shrunk(leaf, 1).tolist() == [[[40, 200, 30, 128]]]
