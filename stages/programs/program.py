@@ -113,7 +113,8 @@ def shape_from_parts(program: Program, parts: Sequence[Part]) -> Shape:
     centred = zip(placed, poses[:, :3, 3], strict=True)
     meshes = tuple(replace(mesh, vertices=mesh.vertices - centre) for mesh, centre in centred)
     assembly = Assembly(np.arange(len(meshes), dtype=np.int16), poses, np.empty((0, 2), np.int32))
-    return Shape(meshes=meshes, assembly=assembly, up="y", labels=program.labels)
+    joints = tuple(part.joint for part in parts) if any(part.joint for part in parts) else ()
+    return Shape(meshes=meshes, assembly=assembly, up="y", labels=program.labels, part_joints=joints)
 
 
 def shape_from_text(program: str, text: str) -> Shape:

@@ -11,6 +11,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, TypeArray
 from stages.shape.kit import Assembly, Kit, LengthUnit, PartMesh
+from stages.shape.part_joint import PartJoint
 from stages.shape.stretch import StretchedMesh, bake, placements
 
 Z_TO_Y = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
@@ -28,6 +29,7 @@ class Shape:
     first_class: id of the class of `labels[0]` in a dataset; the others follow
     one_surface: whether the parts were cut from one surface, so that no line is drawn where they meet
     unit: unit of all coordinates
+    part_joints: joint of each part, None for a part that stays; if empty, no part moves
     """
 
     meshes: tuple[PartMesh, ...]
@@ -38,6 +40,7 @@ class Shape:
     first_class: int = 0
     one_surface: bool = False
     unit: LengthUnit = "unknown"
+    part_joints: tuple[PartJoint | None, ...] = ()
 
     @cached_property
     def label_of(self) -> TypeArray:
@@ -104,4 +107,6 @@ def upright(shape: Shape) -> Shape:
     if shape.up == "y":
         return shape
     # adding zero turns the minus zeros of the product into zeros, which read better in text
-    return replace(shape, assembly=replace(shape.assembly, poses=Z_TO_Y @ shape.assembly.poses + 0.0), up="y")
+    poses = Z_TO_Y @ shape.assembly.poses + 0.0
+    joints = tuple(joint and joint.transformed(Z_TO_Y) for joint in shape.part_joints)
+    return replace(shape, assembly=replace(shape.assembly, poses=poses), up="y", part_joints=joints)

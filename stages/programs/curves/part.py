@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stages.programs.curves.mesh import QuadMesh
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartMesh
+from stages.shape.part_joint import PartJoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,19 +19,25 @@ class Part:
 
     label: such as "leg"
     color: sRGB, 0 to 255
+    joint: how it moves against the rest of the shape; None if it stays. Give it to parts in their final place
     """
 
     label: str
     mesh: QuadMesh
     color: tuple[int, int, int]
+    joint: PartJoint | None = None
 
     def transformed(self, matrix: FloatArray) -> Part:
-        """The part moved by an affine matrix (4, 4)."""
-        return Part(self.label, self.mesh.transformed(matrix), self.color)
+        """The part moved by an affine matrix (4, 4), without a joint."""
+        return replace(self, mesh=self.mesh.transformed(matrix), joint=None)
 
     def deformed(self, function: Callable[[FloatArray], FloatArray]) -> Part:
-        """The part deformed by `function`, as `QuadMesh.deformed`."""
-        return Part(self.label, self.mesh.deformed(function), self.color)
+        """The part deformed by `function`, as `QuadMesh.deformed`, without a joint."""
+        return replace(self, mesh=self.mesh.deformed(function), joint=None)
+
+    def on(self, joint: PartJoint) -> Part:
+        """The part as one that moves by `joint`."""
+        return replace(self, joint=joint)
 
     def part_mesh(self) -> PartMesh:
         """The part as triangles of one colour, named by its label."""

@@ -21,11 +21,18 @@ from stages.programs.curves import (
 )
 from stages.programs.library.cabinet_dimensions import FRONT_THICKNESS, CabinetDimensions, Opening, block
 from stages.shape.arrays import FloatArray
+from stages.shape.part_joint import PartJoint
 
 PAINT, GLASS, STEEL, OAK = (226, 221, 208), (186, 206, 214), (78, 80, 84), (184, 150, 106)
 
 FRONT_GAP = 0.002
 """Between fronts, and around those within the case, in metres."""
+
+MAX_DOOR_RADIANS = np.pi / 2.0
+"""By which a door opens."""
+
+DRAWER_TRAVEL_SHARE = 0.8
+"""By how much of the depth of the case a drawer comes out."""
 
 MAX_DOOR_WIDTH = 0.55
 """A wider column has two doors; in metres."""
@@ -79,9 +86,10 @@ def _column(cabinet: CabinetDimensions, column: Opening) -> list[Part]:
         leaf = _leaf(cabinet, column, piece)
         style = STYLE_SLAB if values["door_style"] == STYLE_SLAB else STYLE_FRAMED
         middle = (leaf.low[0] + leaf.high[0]) / 2.0, (leaf.low[1] + leaf.high[1]) / 2.0
-        parts += _panel(cabinet, leaf, style, "drawer")
-        handle = _handle(cabinet, min(width, 0.6))
-        parts.append(Part("handle", handle.transformed(translation(*middle, cabinet.face)), STEEL))
+        handle = _handle(cabinet, min(width, 0.6)).transformed(translation(*middle, cabinet.face))
+        slide = PartJoint("prismatic", (0.0, 0.0, 1.0), (*middle, cabinet.face), DRAWER_TRAVEL_SHARE * values["depth"])
+        drawer = [*_panel(cabinet, leaf, style, "drawer"), Part("handle", handle, STEEL)]
+        parts += [part.on(slide) for part in drawer]
     return [*parts, *_doors(cabinet, column, doors)]
 
 
@@ -113,12 +121,21 @@ def _doors(cabinet: CabinetDimensions, column: Opening, piece: Opening) -> list[
     reach = max(length, 0.3 * height) / 2.0 + 0.04 * height
     level = leaf.low[1] + reach + (height - 2.0 * reach) * values["handle_height"]
     for index, door in enumerate(leaves):
-        parts += _panel(cabinet, door, values["door_style"], "door")
+        panel = _panel(cabinet, door, values["door_style"], "door")
         side = max(_stile(door) / 2.0, min(0.03, 0.2 * door.size[0]))
         # Doors of a pair have their handles in the middle, single ones on the right.
         x = door.low[0] + side if pair and index == 1 else door.high[0] - side
-        parts.append(Part("handle", handle.transformed(translation(x, level, cabinet.face)), STEEL))
+        placed = Part("handle", handle.transformed(translation(x, level, cabinet.face)), STEEL)
+        hinge = _hinge(cabinet, door, on_right=pair and index == 1)
+        parts += [part.on(hinge) for part in (*panel, placed)]
     return parts
+
+
+def _hinge(cabinet: CabinetDimensions, door: Opening, on_right: bool) -> PartJoint:
+    """The hinge of a door that opens to the front: on an outer edge, so that the door clears the case."""
+    x = door.high[0] if on_right else door.low[0]
+    axis = (0.0, 1.0 if on_right else -1.0, 0.0)
+    return PartJoint("revolute", axis, (x, door.low[1], cabinet.face), MAX_DOOR_RADIANS)
 
 
 def _stile(leaf: Opening) -> float:
