@@ -44,6 +44,10 @@ MODEL   ?=
 TABLE   ?=
 ## SAMPLES  samples that `make verify` checks by independent means: a number, or all
 SAMPLES ?= 100
+## FORMAT   format of `make export`: urdf, mjcf, usd or obj
+FORMAT  ?=
+## KEY      keys of the samples that `make export` writes, with commas between; all if empty
+KEY     ?=
 ## ROUNDS   rounds of `make chaos`
 ROUNDS  ?= 20
 ## VERSION  version that `make release` makes, such as 0.2.0
@@ -51,7 +55,8 @@ VERSION ?=
 
 # Their values are text: make expands none of it, and recipes read it from the environment, as "$$CONFIG", so that no
 # shell expands it either. A recipe never says $(CONFIG).
-VARIABLES := CONFIG OUT WORKERS SEED STALL_TIMEOUT CLUSTER MESH PROGRAM INPUT UP MODEL TABLE SAMPLES ROUNDS VERSION
+VARIABLES := CONFIG OUT WORKERS SEED STALL_TIMEOUT CLUSTER MESH PROGRAM INPUT UP MODEL TABLE SAMPLES FORMAT KEY ROUNDS \
+             VERSION
 $(foreach name,$(VARIABLES),$(eval override $(name) := $$(value $(name))))
 ifeq ($(value WORKERS),)
 override WORKERS := $(shell nproc 2>/dev/null || echo 1)
@@ -114,12 +119,16 @@ views: $(PRODUCERS)  ## Render images of each shape, if the config has cameras
 package: validity abstraction strings points sketches views  ## Write the dataset's folder: shards, index, card, checksums
 	$(RUN)
 
-.PHONY: train recover
+.PHONY: train recover export
 train: setup-models  ## Train the models of CONFIG, after making the samples that they learn from
 	@$(SHAPEMILL) train $(OPTIONS) $(RUNNING) $${MODEL:+--only "$$MODEL"}
 recover: setup-models  ## Find the parameters of PROGRAM, or of the likeliest program, that give the shape of INPUT
 	@[ -n "$$INPUT" ] || { echo 'make recover needs INPUT=scan.ply or INPUT=drawing.png' >&2; exit 2; }
 	@OMP_WAIT_POLICY=PASSIVE $(SHAPEMILL) recover --out "$$OUT" --program "$$PROGRAM" --up "$$UP" $(SEEDED) -- "$$INPUT"
+
+export: setup  ## Write samples of the finished dataset as FORMAT, for simulators and modelling programs
+	@[ -n "$$FORMAT" ] || { echo 'make export needs FORMAT=urdf, mjcf, usd or obj' >&2; exit 2; }
+	@$(SHAPEMILL) export $(DATASET) --key "$$KEY" -- "$$FORMAT"
 
 # Looking at them ----------------------------------------------------------------------------------------------------
 

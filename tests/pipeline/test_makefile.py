@@ -28,6 +28,8 @@ VARIABLES = (
     "MODEL",
     "TABLE",
     "SAMPLES",
+    "FORMAT",
+    "KEY",
     "ROUNDS",
     "VERSION",
 )
@@ -100,6 +102,14 @@ def test_recover_reads_the_given_input() -> None:
     assert make("recover").returncode != 0
 
 
+def test_export_gets_format_and_keys() -> None:
+    (run,) = calls("export", "FORMAT=urdf", "KEY=a-000001,a-000002", "CONFIG=c.yaml", "OUT=/data")
+    assert run[2:] == [
+        "export", "--config", "c.yaml", "--out", "/data", "--key", "a-000001,a-000002", "--", "urdf",
+    ]  # fmt: skip
+    assert "make export needs FORMAT=urdf" in make("export").stderr
+
+
 def test_without_a_seed_the_config_has_its_own() -> None:
     assert "--seed" not in calls("points")[0]
 
@@ -117,7 +127,7 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     assert values == {
         "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "STALL_TIMEOUT": "-",
         "CLUSTER": "-", "MESH": "-", "PROGRAM": "-", "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-",
-        "SAMPLES": "100", "ROUNDS": "20", "VERSION": "-",
+        "SAMPLES": "100", "FORMAT": "-", "KEY": "-", "ROUNDS": "20", "VERSION": "-",
     }  # fmt: skip
 
 
