@@ -81,7 +81,7 @@ RUN        = @$(SHAPEMILL) run $@ $(OPTIONS) $(RUNNING)
 # Making datasets ----------------------------------------------------------------------------------------------------
 
 .PHONY: dataset autoconfig exemplars variations proportions programs grammars program_sampling shapeassembly
-.PHONY: string_sampling validity abstraction strings points sketches views package
+.PHONY: string_sampling mixture validity abstraction strings points sketches views package
 dataset: setup  ## Make the dataset of CONFIG in OUT: whatever is missing or outdated
 	@$(SHAPEMILL) run $(OPTIONS) $(RUNNING)
 
@@ -104,17 +104,19 @@ shapeassembly: program_sampling  ## Make shapes from ShapeAssembly programs, or 
 string_sampling: exemplars  ## Sample strings from trained models, and make shapes of them
 	$(RUN)
 PRODUCERS := variations proportions programs grammars shapeassembly string_sampling
-validity: $(PRODUCERS)  ## Check each shape: is it rooted, is it stable?
+mixture: $(PRODUCERS)  ## Join the samples of several producers, if the config asks for it
 	$(RUN)
-abstraction: $(PRODUCERS)  ## Find a ShapeAssembly program of each shape, if the config asks for it
+validity: mixture  ## Check each shape: is it rooted, is it stable?
 	$(RUN)
-strings: $(PRODUCERS)  ## Write each shape as strings, and the text corpus
+abstraction: mixture  ## Find a ShapeAssembly program of each shape, if the config asks for it
 	$(RUN)
-points: $(PRODUCERS)  ## Sample a labelled point cloud of each shape
+strings: mixture  ## Write each shape as strings, and the text corpus
 	$(RUN)
-sketches: $(PRODUCERS)  ## Draw each shape as lines
+points: mixture  ## Sample a labelled point cloud of each shape
 	$(RUN)
-views: $(PRODUCERS)  ## Render images of each shape, if the config has cameras
+sketches: mixture  ## Draw each shape as lines
+	$(RUN)
+views: mixture  ## Render images of each shape, if the config has cameras
 	$(RUN)
 package: validity abstraction strings points sketches views  ## Write the dataset's folder: shards, index, card, checksums
 	$(RUN)

@@ -53,8 +53,8 @@ def plan_lines(config: Config, stages: Mapping[str, Stage], paths: DatasetPaths,
 
     Raises ConfigError where the trial fails, and where no stage has requested samples.
     """
-    producer = next((name for name, stage in stages.items() if stage.requested_samples(config)), None)
-    if producer is None:
+    asked = [name for name, stage in stages.items() if stage.requested_samples(config)]
+    if not asked:
         raise ConfigError(f"{config.path}: no stage of this config says how many samples it will make")
     inventory = Inventory(config, stages, paths)
     costs = {name: known for name in stages if (known := _own_costs(inventory, stages, name)) is not None}
@@ -67,7 +67,11 @@ def plan_lines(config: Config, stages: Mapping[str, Stage], paths: DatasetPaths,
             costs = run_trial(short, stages, DatasetPaths(below, config.name, paths.out)) | costs
         finally:
             shutil.rmtree(below, ignore_errors=True)
-    estimates = [_estimate(inventory, stages, name, costs[name], producer, short) for name in stages]
+    estimates = []
+    for name in stages:
+        read = upstream(stages, name)
+        producer = next((maker for maker in reversed(asked) if maker in read), asked[-1])
+        estimates.append(_estimate(inventory, stages, name, costs[name], producer, short))
     used = [estimate for estimate in estimates if estimate.shards]
     yield from _table(used, workers)
     if tried:

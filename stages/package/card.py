@@ -42,6 +42,7 @@ image = Image.open(io.BytesIO(sample["{}"]))
 class CardText:
     """Text of a card from the dataset's producer and language.
 
+    kits: names of kits and programs with samples
     made: how the samples are made
     splits: paragraphs on the separation of the splits
     coordinates: their unit and origin
@@ -52,6 +53,7 @@ class CardText:
     missing_licenses: a sentence for each origin without a licence
     """
 
+    kits: Sequence[str]
     made: str
     splits: Sequence[str]
     coordinates: str
@@ -104,7 +106,7 @@ def card(
         "pretty_name": facts["title"],
         "task_categories": list(facts["task_categories"]),
         "size_categories": [size_category(sum(tally.samples for tally in tallies.values()))],
-        "tags": list(dict.fromkeys([*facts["tags"], *sources])),
+        "tags": list(dict.fromkeys([*facts["tags"], *text.kits])),
         "configs": [
             {
                 "config_name": "default",

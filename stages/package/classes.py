@@ -43,11 +43,12 @@ class ClassTally:
 
 
 def count_classes(
-    classes: Classes, tallies: Iterable[tuple[str, Mapping[str, Mapping[str, Any]]]]
+    classes: Classes, tallies: Iterable[tuple[str, Mapping[str, Mapping[str, Any]]]], owned: bool = False
 ) -> list[dict[str, Any]]:
     """Return the rows of `classes.json` in the order of ids, with classes that have no parts.
 
     tallies: split and `ClassTally.counts` of each shard, the shards of a split next to each other
+    owned: whether a row holds `own`, the number of its label in each kit that has it
 
     A class whose source has no colour gets that of its first part.
     """
@@ -70,6 +71,7 @@ def count_classes(
                 "id": label.id,
                 "name": label.name,
                 "kit": label.kit,
+                **({"own": dict(label.own)} if owned else {}),
                 "color": f"#{red:02x}{green:02x}{blue:02x}",
                 "shapes": {split: shapes[number, split] for split in splits},
                 "parts": {split: parts[number, split] for split in splits},

@@ -38,11 +38,12 @@ def compose_dataset(task: Task) -> Outcome:
     Params of the shard:
 
     facts, producer: name and other facts of the dataset, and its producer
+    joined: the producers whose samples it joins, if it does
     sections: the whole config
     shards: summaries of the package's shards
     members: name, sentence, dtype and shape of each
     schema: JSON schema of the records
-    graphs_share_split: whether samples of equal graphs are in one split
+    graphs_share_split: whether samples of one kit with equal graphs are in one split, or for which producers
     origins: the files that the dataset was made from
     card_text: the other fields of `CardText`
     measures: figures for the manifest
@@ -54,11 +55,11 @@ def compose_dataset(task: Task) -> Outcome:
     params = task.shard.params
     shards, facts, members = params["shards"], params["facts"], params["members"]
     rows = read_rows(task.input("package", f"{shard['name']}.jsonl") for shard in shards)
-    tallies: dict[str, SourceTally] = {}
+    tallied: dict[tuple[str, str], SourceTally] = {}
     kinds = column_kinds(params["schema"]["properties"])
     with task.output(f"{task.shard.name}.parquet") as stream:
         index = HashingStream(stream)
-        write_index(SourceTally.tallied(rows, tallies), kinds, cast(BinaryIO, index))
+        write_index(SourceTally.tallied(rows, tallied), kinds, cast(BinaryIO, index))
     indexed: dict[str, Any] = {
         "path": f"../{index_path(task.config)}",
         "bytes": index.written,
@@ -67,11 +68,15 @@ def compose_dataset(task: Task) -> Outcome:
     }
     sources_by_name = language_of(params["producer"]).decoder(task).sources
     of_shards = ((shard["split"], _read(task, f"{shard['name']}.classes.json")) for shard in shards)
-    classes = count_classes(Classes.of(sources_by_name), of_shards)
+    classes = count_classes(Classes.of(sources_by_name), of_shards, owned="joined" in params)
     class_table = table_bytes(classes)
     class_file = {"path": CLASSES, "count": len(classes), "sha256": hashlib.sha256(class_table).hexdigest()}
-    sources = {name: source.sentence for name, source in sources_by_name.items() if name in tallies}
-    text = CardText(**params["card_text"], origins=params["origins"])
+    kits = [kit for kit in sources_by_name if kit in {kit for _, kit in tallied}]
+    tallies, sources = dict[str, SourceTally](), dict[str, str]()
+    for producer, kit in sorted(tallied, key=lambda pair: (kits.index(pair[1]), pair)):
+        name = f"{kit}, {producer}" if "joined" in params else kit
+        tallies[name], sources[name] = tallied[producer, kit], sources_by_name[kit].sentence
+    text = CardText(kits=kits, **params["card_text"], origins=params["origins"])
     files = {
         CARD: card(facts, shards, members, tallies, sources, classes, text).encode(),
         CROISSANT: _text(croissant(facts, shards, members, indexed, class_file, params["origins"], citation(facts))),

@@ -34,14 +34,16 @@ def manifest(
     files: digests of the other files about the whole dataset
     index: path relative to the dataset's folder, bytes, sha256
     classes: path, count, sha256
-    measures: measures of each kit's variants
+    measures: figures of the producers
     software: versions of code and libraries
     origins: the files that the samples were made from, with author and licence
     """
     kits: Counter[str] = Counter()
+    producers: Counter[str] = Counter()
     splits: Counter[str] = Counter()
     for shard in shards:
         kits.update(shard["kits"])
+        producers.update(shard["producers"])
         splits[shard["split"]] += shard["samples"]
     return {
         "name": facts["name"],
@@ -51,6 +53,7 @@ def manifest(
         "samples": sum(splits.values()),
         "splits": dict(splits),
         "kits": dict(kits),
+        "producers": dict(producers),
         "members": [dict(member) for member in members],
         "files": dict(files),
         "shards": [

@@ -24,15 +24,17 @@ OWN_MEMBERS = (
 )
 
 
-def describe_members(config: Config, names: Sequence[str], language: Language) -> list[dict[str, Any]]:
-    """Name, sentence, dtype and shape of each member that samples in `language` have, as JSON.
+def describe_members(config: Config, names: Sequence[str], languages: Sequence[Language]) -> list[dict[str, Any]]:
+    """Name, sentence, dtype and shape of each member that samples in `languages` have, as JSON.
 
     Raises ValueError for a member that nobody declares.
     """
     declared = {item.name: item for stage in members().values() for item in stage.of(config)}
     declared |= {item.name: item for item in OWN_MEMBERS}
-    if not language.graphs:
-        declared[TEXT] = Member(TEXT, language.text)
+    if any(not language.graphs for language in languages):
+        strings = [declared[TEXT].sentence] if TEXT in declared else ["A line that says that strings are turned off."]
+        texts = [text for language in languages for text in (strings if language.graphs else [language.text])]
+        declared[TEXT] = Member(TEXT, " Or: ".join(dict.fromkeys(texts)))
     unknown = [name for name in names if name not in declared]
     if unknown:
         raise ValueError(f"samples have {', '.join(unknown)}, which no stage declares in its members.py")

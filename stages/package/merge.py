@@ -18,9 +18,13 @@ from stages.package.index import index_row, tar_bytes
 from stages.package.layout import shard_path
 from stages.package.record import describe_sample
 from stages.shape.collection.collection import Collection
+from stages.shape.collection.discovery import language_of
 from stages.shape.collection.members import TEXT
 from stages.shape.geometry.pose import rounded
 from stages.shape.sample import Sample
+
+NO_STRINGS = b"no text: strings are turned off\n"
+"""The text of a sample with a shape graph, where other samples have a text and strings are turned off."""
 
 
 def merge_shard(task: Task) -> Outcome:
@@ -35,8 +39,9 @@ def merge_shard(task: Task) -> Outcome:
     collection = Collection(task)
     total, rows = int(task.shard.params["samples"]), []
     member_names: list[str] = []
-    counts: Counter[str] = Counter()
-    tally = ClassTally()
+    kits: Counter[str] = Counter()
+    makers: Counter[str] = Counter()
+    tally, joined = ClassTally(), "joined" in task.shard.params
     with task.output(f"{task.shard.name}.tar") as file:
         stream = HashingStream(file)
         with ShardWriter(cast(BinaryIO, stream)) as writer:
@@ -44,16 +49,18 @@ def merge_shard(task: Task) -> Outcome:
                 shape = collection.shape(sample)
                 shape = replace(shape, assembly=replace(shape.assembly, poses=rounded(shape.assembly.poses)))
                 members = {"glb": glb_bytes(shape)}
-                if sample.text or TEXT in added:
-                    members[TEXT] = sample.text.encode()
+                if sample.text or TEXT in added or joined:
+                    members[TEXT] = sample.text.encode() or NO_STRINGS
                 members |= added
-                record = describe_sample(sample, collection.language.name, shape, members, fields)
+                language = language_of(sample.producer).name
+                record = describe_sample(sample, language, shape, members, fields, joined)
                 members["json"] = json_bytes(record)
                 if member_names and list(members) != member_names:
                     raise ShardFailed(f"{sample.key} has members {list(members)}, others have {member_names}")
                 member_names = list(members)
                 writer.write(sample.key, members)
-                counts[sample.kit] += 1
+                kits[sample.kit] += 1
+                makers[sample.producer] += 1
                 tally.add(shape)
                 rows.append(index_row(record, path, writer.offsets[sample.key], tar_bytes(members)))
                 task.progress(writer.samples, total)
@@ -68,7 +75,8 @@ def merge_shard(task: Task) -> Outcome:
         "bytes": stream.written,
         "sha256": stream.digest(),
         "members": member_names,
-        "kits": dict(counts),
+        "kits": dict(kits),
+        "producers": dict(makers),
     }
     return Outcome(samples=writer.samples, summary=summary)
 

@@ -92,10 +92,10 @@ class _Cameras:
 def varied(samples: Sequence[tuple[Sample, Shape]], count: int) -> list[tuple[Sample, Shape]]:
     """Choose at most `count` samples, farthest first by the numbers of parts of each label.
 
-    The kits take turns; each begins with its largest sample.
+    The kits of each producer take turns; each begins with its largest sample.
     """
-    kits = dict.fromkeys(sorted(sample.kit for sample, _ in samples))
-    queues = [_farthest([pair for pair in samples if pair[0].kit == kit], count) for kit in kits]
+    kits = dict.fromkeys(sorted((sample.kit, sample.producer) for sample, _ in samples))
+    queues = [_farthest([pair for pair in samples if (pair[0].kit, pair[0].producer) == kit], count) for kit in kits]
     turns = [queue[turn] for turn in range(count) for queue in queues if turn < len(queue)]
     return turns[:count]
 

@@ -16,10 +16,16 @@ from stages.shape.shape import Shape
 
 
 def describe_sample(
-    sample: Sample, language: str, shape: Shape, members: Mapping[str, bytes], added: Mapping[str, Any]
+    sample: Sample,
+    language: str,
+    shape: Shape,
+    members: Mapping[str, bytes],
+    added: Mapping[str, Any],
+    owned: bool = False,
 ) -> dict[str, Any]:
     """What the JSON says; `stages.package.schema` says what each field means. `members` are the sample's others, of
-    which contacts and text are looked at; `added` are the fields of the stages that add some.
+    which contacts and text are looked at; `added` are the fields of the stages that add some. `owned`: whether each
+    part has its `own_class`, the number of its label in its kit.
 
     Nothing is null or empty, and no field differs in type from sample to sample: loaders guess a field's type from
     the first samples they see. So pairs of parts stand in arrays of their own: a shape of one part has none.
@@ -37,7 +43,14 @@ def describe_sample(
         "graph": sample.graph,
         "lineage": {"method": sample.producer, "parents": [sample.kit], **sample.lineage},
         "parts": [
-            {"name": name, "label": shape.labels[label], "class": number, "instance": instance, "pose": pose}
+            {
+                "name": name,
+                "label": shape.labels[label],
+                "class": number,
+                **({"own_class": label} if owned else {}),
+                "instance": instance,
+                "pose": pose,
+            }
             for instance, (name, label, number, pose) in enumerate(
                 zip(
                     shape.part_names,

@@ -7,7 +7,7 @@ in `producer.py`. Every field is required, no other is allowed, and none may be 
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -22,16 +22,26 @@ SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 MAX_FAULTS_LISTED = 5
 
 
-def record_schema(config: Config, producer: str, stages: Collection[str]) -> dict[str, Any]:
-    """Return the schema of the records of a dataset, by its producer and the stages that add fields."""
+def record_schema(config: Config, producer: str, joined: Sequence[str], stages: Collection[str]) -> dict[str, Any]:
+    """Return the schema of the records of a dataset, by its producer and the stages that add fields.
+
+    joined: the producers whose samples it joins, if it does
+    """
     declared, language = members(), language_of(producer)
+    names = [language_of(name).name for name in joined] or [language.name]
     added = {name: dict(field.schema) for stage in stages for name, field in declared[stage].fields(config).items()}
     own = {
         **_own_fields(),
-        "producer": {"const": producer, "description": "the stage that made the sample"},
-        "language": {"const": language.name, "description": "format of the sample's text or assembly"},
+        "producer": {**_one_of(joined or [producer]), "description": "the stage that made the sample"},
+        "language": {**_one_of(names), "description": "format of the sample's text or assembly"},
         "lineage": _lineage({name: field.schema for name, field in producers()[producer].lineage(config).items()}),
     }
+    if joined:
+        part = own["parts"]["items"]["properties"]
+        part["own_class"] = _whole(
+            "number of the label among those of its kit: its class in a dataset of this kit alone"
+        )
+        own["parts"]["items"] = _object(part)
     if language.graphs and not any(item.name == TEXT for stage in stages for item in declared[stage].of(config)):
         del own["text"]
     return {
@@ -138,6 +148,11 @@ def _object(properties: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
         "required": list(properties),
         "additionalProperties": False,
     }
+
+
+def _one_of(values: Sequence[str]) -> dict[str, Any]:
+    """Return the schema of a text that is one of some values."""
+    return {"const": values[0]} if len(values) == 1 else {"enum": list(dict.fromkeys(values))}
 
 
 def _text(description: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Statistics of the samples of each kit or program, gathered row by row in little memory."""
+"""Statistics of the samples of each producer and kit or program, gathered row by row in little memory."""
 
 from __future__ import annotations
 
@@ -56,10 +56,12 @@ class SourceTally:
         return f"{counts[0][0]} / {median:g} / {counts[-1][0]}"
 
     @staticmethod
-    def tallied(rows: Iterable[Mapping[str, Any]], tallies: dict[str, SourceTally]) -> Iterator[Mapping[str, Any]]:
-        """Yield the rows, and count each in the tally of its kit."""
+    def tallied(
+        rows: Iterable[Mapping[str, Any]], tallies: dict[tuple[str, str], SourceTally]
+    ) -> Iterator[Mapping[str, Any]]:
+        """Yield the rows, and count each in the tally of its producer and kit."""
         for row in rows:
-            tallies.setdefault(row["kit"], SourceTally()).add(row)
+            tallies.setdefault((row["producer"], row["kit"]), SourceTally()).add(row)
             yield row
 
 

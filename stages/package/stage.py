@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -23,11 +22,11 @@ from stages.package.layout import (
 from stages.package.manifest import config_sections
 from stages.package.member_descriptions import describe_members
 from stages.package.merge import merge_shard
+from stages.package.producer_text import producer_text
 from stages.package.schema import record_schema
 from stages.package.settings import PackageConfig
 from stages.package.versions import code_version, library_versions
 from stages.shape.collection.discovery import language_of, member_modules, members, producers
-from stages.shape.collection.origin import missing_licenses
 from stages.shape.collection.shards import (
     MEMBERS,
     PRODUCERS,
@@ -35,6 +34,7 @@ from stages.shape.collection.shards import (
     collection_shards,
     planned_producer,
     sample_count,
+    sample_producers,
 )
 from stages.shape.views.renderer_check import check_renderer
 from stages.sketches.settings import SketchesConfig
@@ -58,12 +58,14 @@ def plan(plan: Plan) -> list[Shard]:
     filled = [shard for shard in named if shard["samples"]]
     if not filled:
         return merged
-    read = language_of(producer).reads(plan)
-    preview_shards = [shard["name"] for shard in filled[:MAX_PREVIEW_SHARDS]]
+    makers, read = sample_producers(plan), language_of(producer).reads(plan)
+    joined = {"joined": list(makers)} if producers()[producer].joins else {}
+    preview_shards = [shard["name"] for shard in _previewed(filled)]
     added = [stage for stage in members() if preview_shards[0] in plan.shards(stage)]
     rows = [stage for stage in added if members()[stage].rows(plan.config)]
     preview = {
         "producer": producer,
+        **joined,
         "title": plan.config.title or plan.config.name,
         "of": sum(shard["samples"] for shard in filled),
         "shards": preview_shards,
@@ -71,27 +73,21 @@ def plan(plan: Plan) -> list[Shard]:
     }
     preview_inputs = (*read, *(f"{stage}/{name}" for name in preview_shards for stage in (producer, *rows)))
     picture = Shard(PREVIEW_SHARD, preview, preview_inputs, member_modules())
-    declared, language = producers()[producer], language_of(producer)
-    origins = declared.origins(plan)
+    declared = [producers()[name] for name in dict.fromkeys((*makers, producer))]
+    languages = list({language_of(name).name: language_of(name) for name in makers}.values())
+    origins = list(dict.fromkeys(origin for maker in declared for origin in maker.origins(plan)))
+    sharing = [name for name in makers if producers()[name].graphs_share_split]
     params = {
         "facts": _facts(plan),
         "producer": producer,
+        **joined,
         "sections": config_sections(plan.config),
         "shards": filled,
-        "members": describe_members(plan.config, filled[0]["members"], language),
-        "schema": record_schema(plan.config, producer, merged[0].params["stages"]),
-        "graphs_share_split": declared.graphs_share_split,
-        "card_text": {
-            "made": declared.sentence,
-            "splits": [declared.splits, *declared.nearness(plan)],
-            "coordinates": language.coordinates,
-            "limits": list(declared.limits),
-            "paragraphs": [*declared.card(plan), *(text for added in members().values() for text in added.card(plan))],
-            "variety": list(declared.variety(plan)),
-            "rejects": _rejects(plan, producer),
-            "missing_licenses": missing_licenses(origins),
-        },
-        "measures": dict(declared.measures(plan)),
+        "members": describe_members(plan.config, filled[0]["members"], languages),
+        "schema": record_schema(plan.config, producer, joined.get("joined", ()), merged[0].params["stages"]),
+        "graphs_share_split": sharing if joined else bool(sharing),
+        "card_text": producer_text(plan, makers, producer, origins),
+        "measures": {name: value for maker in declared for name, value in maker.measures(plan).items()},
         "preview": PREVIEW_SHARD,
         "software": {"shapemill": code_version(), "libraries": library_versions()},
         "origins": [asdict(origin) for origin in origins],
@@ -167,12 +163,16 @@ def estimate_bytes(plan: Plan) -> int:
     return sample_count(plan) * BYTES_PER_SAMPLE
 
 
-def _rejects(plan: Plan, producer: str) -> dict[str, int]:
-    """Return the number of items that the producer refused, by reason."""
-    counts: Counter[str] = Counter()
-    for shard in plan.shards(producer):
-        counts.update(plan.rejects(producer, shard))
-    return dict(sorted(counts.items()))
+def _previewed(shards: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Return the first shards, at most MAX_PREVIEW_SHARDS; those with kits that no earlier one has come first."""
+    known: set[str] = set()
+    fresh: list[Mapping[str, Any]] = []
+    others: list[Mapping[str, Any]] = []
+    for shard in shards:
+        (others if known.issuperset(shard["kits"]) else fresh).append(shard)
+        known.update(shard["kits"])
+    chosen = [*fresh, *others][: max(MAX_PREVIEW_SHARDS, len(fresh))]
+    return [shard for shard in shards if shard in chosen]
 
 
 def _facts(plan: Plan) -> dict[str, Any]:

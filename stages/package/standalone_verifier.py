@@ -102,7 +102,9 @@ def verify(folder: Path, samples: int | None = 100, seed: int = 0, workers: int 
         counts = [(str(shard["path"]), str(shard["split"]), int(shard["samples"])) for shard in manifest["shards"]]
         total, splits = int(manifest["samples"]), dict(manifest["splits"])
         members = [(str(member["name"]), str(member["dtype"]), list(member["shape"])) for member in manifest["members"]]
-        share_split = bool(manifest.get("graphs_share_split"))
+        sharing = manifest.get("graphs_share_split")
+        producers = sorted(sharing if isinstance(sharing, list) else manifest["producers"] if sharing else ())
+        owned = {(kit, number): row["id"] for row in class_rows for kit, number in row.get("own", {}).items()}
     except (OSError, ValueError, KeyError, TypeError) as error:
         findings.faults.append(f"manifest.json or classes.json cannot be read: {error!r}")
         return findings
@@ -114,7 +116,7 @@ def verify(folder: Path, samples: int | None = 100, seed: int = 0, workers: int 
         if path in listed:
             inside = chosen[slice(*np.searchsorted(chosen, (first, first + size)))]
             places = set((inside - first).tolist())
-            jobs.append(ShardJob(folder, path, split, members, labels, share_split, places, (seed, number)))
+            jobs.append(ShardJob(folder, path, split, members, labels, owned, producers, places, (seed, number)))
         else:
             findings.faults.append(f"{path}: is in manifest.json and not in checksums.txt")
         first += size
@@ -168,6 +170,8 @@ class ShardJob:
 
     members: name, dtype and shape of each member
     labels: name of each class
+    owned: class of each label of each kit, by the kit and the label's number there, where a dataset joins producers
+    sharing: producers whose samples of one kit and graph share a split
     places: samples whose geometry is checked, by their place in the shard
     """
 
@@ -176,7 +180,8 @@ class ShardJob:
     split: str
     members: list[tuple[str, str, list[Any]]]
     labels: dict[int, str]
-    graphs_share_split: bool
+    owned: dict[tuple[str, int], int]
+    sharing: list[str]
     places: set[int]
     seed: tuple[int, int]
 
@@ -269,6 +274,8 @@ def record_faults(
     for part in parts:
         if job.labels.get(part["class"]) != part["label"]:
             yield f"{part['name']}: class {part['class']} is not {part['label']} in classes.json"
+        if job.owned and job.owned.get((record["kit"], part["own_class"])) != part["class"]:
+            yield f"{part['name']}: class {part['own_class']} of {record['kit']} is not {part['class']} in classes.json"
     findings.classes.update(("parts", part["class"], job.split) for part in parts)
     findings.classes.update({("shapes", part["class"], job.split) for part in parts})
     if (counts["parts"], counts["types"]) != (len(parts), len({part["label"] for part in parts})):
@@ -289,8 +296,8 @@ def record_faults(
     if "txt" in members and not members["txt"].decode().startswith(record["text"]):
         yield "its text is not that of the record"
     findings.note("key", record["key"].encode(), sample)
-    if job.graphs_share_split:
-        findings.note("shape graph", record["graph"].encode(), sample)
+    if record["producer"] in job.sharing:
+        findings.note("shape graph", f"{record['kit']} {record['graph']}".encode(), sample)
     if "glb" in members:
         findings.note("mesh", members["glb"], sample)
 

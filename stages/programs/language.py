@@ -14,10 +14,10 @@ from stages.shape.shape import Shape, upright
 
 
 class ParameterDecoder:
-    """Builds the shapes of samples of a program."""
+    """Builds the shapes of samples of programs."""
 
-    def __init__(self, name: str) -> None:
-        self.sources = {name: Source(find_program(name).labels)}
+    def __init__(self, names: Sequence[str]) -> None:
+        self.sources = {name: Source(find_program(name).labels) for name in names}
 
     def shape(self, sample: Sample) -> Shape:
         """Build the shape of the program `sample.kit` from the parameters in `sample.text`. Raises ParameterError."""
@@ -33,7 +33,7 @@ def _reads(_: Plan) -> tuple[str, ...]:
 
 
 def _decoder(task: Task) -> ParameterDecoder:
-    return ParameterDecoder(task.config.section(ProgramsConfig).program)
+    return ParameterDecoder([entry.program for entry in task.config.section(ProgramsConfig).sampled])
 
 
 def _rebuild(_: DatasetPaths) -> RebuildShape:

@@ -14,11 +14,12 @@ from stages.shape.collection.producer import Producer
 
 
 def _card(plan: Plan) -> Sequence[str]:
-    return [program_markdown(find_program(plan.config.section(ProgramsConfig).program)).rstrip()]
+    programs = plan.config.section(ProgramsConfig).sampled
+    return [program_markdown(find_program(entry.program)).rstrip() for entry in programs]
 
 
 def _lineage(config: Config) -> Mapping[str, RecordField]:
-    if config.section(ProgramsConfig).mode == "random":
+    if config.section(ProgramsConfig).sampled[0].mode == "random":
         difference = "how splits differ: in `structure`, the discrete parameters, or in `values` of any parameters"
         return {"split_by": RecordField({"enum": ["structure", "values"], "description": difference})}
     return {
@@ -34,7 +35,7 @@ def _lineage(config: Config) -> Mapping[str, RecordField]:
 PRODUCER = Producer(
     language="program",
     keys="programs.program",
-    is_requested=lambda config: bool(config.section(ProgramsConfig).program),
+    is_requested=lambda config: bool(config.section(ProgramsConfig).sampled),
     sentence="a program builds shapes from random parameters; the parameters of a shape are its `txt`.",
     splits="There are no duplicates, within a split or across splits. In mode random, samples that differ in "
     "continuous parameters alone are in one split if their `lineage` has `split_by: structure`. With `split_by: "

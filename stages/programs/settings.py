@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pipeline.config import StrictModel
 from stages.shape.collection.assignment import ShardConfig
@@ -27,8 +27,8 @@ class RandomSamplingConfig(StrictModel):
     test: float = Field(0.1, gt=0, lt=0.5, description="Share of shapes, and of structures, in the test split.")
 
 
-class ProgramsConfig(StrictModel):
-    """Shapes from a program: a function from parameters to parts."""
+class ProgramConfig(StrictModel):
+    """Shapes from one program: a function from parameters to parts."""
 
     program: str = Field(
         "",
@@ -53,4 +53,38 @@ class ProgramsConfig(StrictModel):
     require: Requirements = Field(
         default_factory=Requirements, description="Physical requirements; other shapes are rejected and counted."
     )
-    splits: ShardConfig = Field(default_factory=ShardConfig, description="How the samples are divided into shards.")
+
+
+class ProgramsConfig(ProgramConfig):
+    """Shapes from one program, or from several."""
+
+    splits: ShardConfig = Field(
+        default_factory=ShardConfig, description="How the samples of each program are divided into shards."
+    )
+    entries: tuple[ProgramConfig, ...] = Field(
+        (),
+        strict=False,  # a list that a validator has seen is no longer taken for a tuple
+        description="Several programs in place of `program`, each with its keys above, all of one mode. A list in "
+        "place of the section is short for this key.",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _list_is_entries(cls, given: Any) -> Any:
+        return {"entries": given} if isinstance(given, list) else given
+
+    @model_validator(mode="after")
+    def _programs_differ(self) -> Self:
+        names = [entry.program for entry in self.entries]
+        if self.entries and (self.program or not all(names)):
+            raise ValueError("each of several programs is named in its entry, and none by programs.program")
+        if len(set(names)) < len(names):
+            raise ValueError(f"two entries have one program: {', '.join(names)}")
+        if len({entry.mode for entry in self.entries}) > 1:
+            raise ValueError("all programs of a dataset are sampled in one mode, all_values or random")
+        return self
+
+    @property
+    def sampled(self) -> tuple[ProgramConfig, ...]:
+        """The programs that the dataset is made of; empty for a dataset of another producer."""
+        return self.entries or ((self,) if self.program else ())

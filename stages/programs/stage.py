@@ -1,4 +1,4 @@
-"""Stage `programs`: the parameters of a program in; sampled shapes out, as the shards `<dataset>-<split>-<index>.tar`.
+"""Stage `programs`: the parameters of programs in; sampled shapes out, as the shards `<dataset>-<split>-<index>.tar`.
 
 A sample has no meshes: its text is its parameters, from which `stages.programs.program.shape_from_text` builds the
 shape.
@@ -20,7 +20,7 @@ from stages.programs.draws import Interval, Share
 from stages.programs.parameters import Value
 from stages.programs.program import Program, find_program, program_module
 from stages.programs.sampling import NoMoreShapes, Sampler, all_value_indices, structure_digest
-from stages.programs.settings import ProgramsConfig
+from stages.programs.settings import ProgramConfig, ProgramsConfig
 from stages.programs.split_plan import listed_shapes, plan_splits
 from stages.shape.collection.assignment import SPLITS
 from stages.shape.sample import Sample, write_sample
@@ -40,22 +40,26 @@ def planned_shards(plan: Plan) -> list[Shard]:
 
 
 def _shards(dataset: Config) -> list[Shard]:
-    config = dataset.section(ProgramsConfig)
-    if not config.program:
-        return []
-    code = (program_module(config.program),)
-    split_plan = plan_splits(config.program, config.random) if config.mode == "random" else None
-    sizes = split_plan.sizes if split_plan else _all_values_sizes(config)
+    section = dataset.section(ProgramsConfig)
+    numbers: Counter[str] = Counter()
     shards: list[Shard] = []
-    first = 0
-    for split, size in sizes.items():
-        count = min(max(config.splits.shards, -(-size // config.splits.samples_per_shard)), size)
-        for number in range(count):
-            start, end = number * size // count, (number + 1) * size // count
-            owned = split_plan.owned(split, start, end) if split_plan else _all_values_share(sizes, first, start, end)
-            params = {"split": split, "start": start, "samples": end - start, "first_key": first + start, **owned}
-            shards.append(Shard(f"{dataset.name}-{split}-{number:06d}", params, code=code))
-        first += size
+    for entry, config in enumerate(section.sampled):
+        code = (program_module(config.program),)
+        split_plan = plan_splits(config.program, config.random) if config.mode == "random" else None
+        sizes = split_plan.sizes if split_plan else _all_values_sizes(config)
+        first = 0
+        for split, size in sizes.items():
+            count = min(max(section.splits.shards, -(-size // section.splits.samples_per_shard)), size)
+            for number in range(count):
+                start, end = number * size // count, (number + 1) * size // count
+                owned = (
+                    split_plan.owned(split, start, end) if split_plan else _all_values_share(sizes, first, start, end)
+                )
+                part = {"entry": entry, "split": split, "start": start, "samples": end - start}
+                name = f"{dataset.name}-{split}-{numbers[split] + number:06d}"
+                shards.append(Shard(name, {**part, "first_key": first + start, **owned}, code=code))
+            first += size
+            numbers[split] += count
     return shards
 
 
@@ -65,7 +69,7 @@ def run_shard(task: Task) -> Outcome:
     In mode random, a shard has fewer samples than planned where its share has no more. Raises ShardFailed where a value
     has no shape, and where the whole program has none.
     """
-    config, params = task.config.section(ProgramsConfig), task.shard.params
+    config, params = _entry(task), task.shard.params
     program = find_program(config.program)
     structures, shapes = params.get("share", ((0.0, 1.0), (0.0, 1.0)))
     share = Share((structures[0], structures[1]), (shapes[0], shapes[1]), params.get("weight", 1.0))
@@ -82,6 +86,12 @@ def run_shard(task: Task) -> Outcome:
     return Outcome(writer.samples, {**summary, "failure": sampler.failure} if sampler.failure else summary)
 
 
+def _entry(task: Task) -> ProgramConfig:
+    """The program that a shard samples."""
+    entry: int = task.shard.params["entry"]
+    return task.config.section(ProgramsConfig).sampled[entry]
+
+
 def _all_values(task: Task, sampler: Sampler) -> Iterator[SampledValues]:
     """Yield shapes with every value of every parameter in turn, in random order."""
     params, indices = task.shard.params, all_value_indices(sampler.program)
@@ -94,7 +104,7 @@ def _all_values(task: Task, sampler: Sampler) -> Iterator[SampledValues]:
 def _random(task: Task, sampler: Sampler) -> Iterator[SampledValues]:
     """Yield random shapes of the shard's share: the planned number, or all that exist."""
     params = task.shard.params
-    name = task.config.section(ProgramsConfig).program
+    name = _entry(task).program
     listed = listed_shapes(name, task.config.seed) if "listed" in params else None
     shapes = sampler.listed(listed[:, slice(*params["listed"])]) if listed is not None else _drawn(task, sampler)
     count = 0
@@ -132,7 +142,7 @@ def _sample(
     )
 
 
-def _all_values_sizes(config: ProgramsConfig) -> dict[str, int]:
+def _all_values_sizes(config: ProgramConfig) -> dict[str, int]:
     """The number of samples of each split. Raises ConfigError for a program without parameters."""
     count = len(all_value_indices(find_program(config.program)))
     if not count:
@@ -144,6 +154,15 @@ def _all_values_share(sizes: dict[str, int], first: int, start: int, end: int) -
     """The same share of all shapes as of all samples; structures recur."""
     total = sum(sizes.values())
     return {"share": [(0.0, 1.0), ((first + start) / total, (first + end) / total)]}
+
+
+def check(config: Config) -> None:
+    """Raise ConfigError for two programs of one name, whose samples would have the same keys."""
+    entries = config.section(ProgramsConfig).entries
+    names = [find_program(entry.program).name for entry in entries]
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise ConfigError(f"{config.path}: programs.entries: two programs are named {twice[0]}; change PROGRAM.name")
 
 
 def report(plan: Plan) -> Sequence[str]:
@@ -164,9 +183,16 @@ def report(plan: Plan) -> Sequence[str]:
         return []
     reasons = ", ".join(f"{100 * count / tried:.1f} % {reason}" for reason, count in refused.most_common())
     lines = [f"{sum(made.values()):,} shapes of {tried:,} tries; refused: {reasons or 'none'}", *failures[:1]]
-    config = plan.config.section(ProgramsConfig)
-    if config.mode == "random" and all(plan.summary("programs", shard.name) for shard in shards):
-        lines += plan_splits(config.program, config.random).notes(config.random, made)
+    sampled = plan.config.section(ProgramsConfig).sampled
+    if sampled[0].mode == "random" and all(plan.summary("programs", shard.name) for shard in shards):
+        for entry, config in enumerate(sampled):
+            of_program: Counter[str] = Counter()
+            for shard in shards:
+                if shard.params["entry"] == entry:
+                    summary = plan.summary("programs", shard.name) or {}
+                    of_program[summary["split"]] += summary["samples"]
+            notes = plan_splits(config.program, config.random).notes(config.random, of_program)
+            lines += notes if len(sampled) == 1 else [f"{config.program}: {note}" for note in notes]
     return lines
 
 
@@ -183,16 +209,21 @@ def trial_config(config: Config) -> ProgramsConfig:
     """
     section = config.section(ProgramsConfig)
     scale = min(TRIAL_SHARD_SAMPLES / section.splits.samples_per_shard, 1.0)
-    requested, all_values = section.random.samples, section.all_values
-    samples = max(round(scale * requested), min(requested, MIN_TRIAL_SAMPLES))
+    least = MIN_TRIAL_SAMPLES // max(len(section.sampled), 1)
+    shards = section.splits.model_copy(update={"samples_per_shard": TRIAL_SHARD_SAMPLES})
+    entries = tuple(entry.model_copy(update=_fewer(entry, scale, least)) for entry in section.entries)
+    return section.model_copy(update={"splits": shards, "entries": entries, **_fewer(section, scale, least)})
+
+
+def _fewer(config: ProgramConfig, scale: float, least: int) -> dict[str, Any]:
+    """The numbers of shapes of a program, multiplied by `scale`, as an update of its config."""
+    requested, all_values = config.random.samples, config.all_values
+    samples = max(round(scale * requested), min(requested, least))
     fewer = {split: max(round(scale * getattr(all_values, split)), 1) for split in SPLITS}
-    return section.model_copy(
-        update={
-            "splits": section.splits.model_copy(update={"samples_per_shard": TRIAL_SHARD_SAMPLES}),
-            "random": section.random.model_copy(update={"samples": samples}),
-            "all_values": all_values.model_copy(update=fewer),
-        }
-    )
+    return {
+        "random": config.random.model_copy(update={"samples": samples}),
+        "all_values": all_values.model_copy(update=fewer),
+    }
 
 
 STAGE = Stage(
@@ -204,6 +235,7 @@ STAGE = Stage(
     run_shard=run_shard,
     estimate_bytes=lambda plan: BYTES_PER_SAMPLE * sum(requested_samples(plan.config)),
     report=report,
+    check=check,
     requested_samples=requested_samples,
     trial_config=trial_config,
 )

@@ -26,7 +26,7 @@ class Shape:
     up: axis that points up
     labels: vocabulary of part labels in a fixed order, the same for every shape of one kit or program
     own_names: unique name of each part; if empty, its mesh's name and a number
-    first_class: id of the class of `labels[0]` in a dataset; the others follow
+    class_ids: class of each label in a dataset; empty outside of one, where a label's index is its class
     one_surface: whether the parts were cut from one surface, so that no line is drawn where they meet
     unit: unit of all coordinates
     part_joints: joint of each part, None for a part that stays; if empty, no part moves
@@ -37,7 +37,7 @@ class Shape:
     up: Literal["y", "z"]
     labels: tuple[str, ...]
     own_names: tuple[str, ...] = ()
-    first_class: int = 0
+    class_ids: tuple[int, ...] = ()
     one_surface: bool = False
     unit: LengthUnit = "unknown"
     part_joints: tuple[PartJoint | None, ...] = ()
@@ -57,7 +57,10 @@ class Shape:
     @cached_property
     def part_classes(self) -> TypeArray:
         """Class id of each part in the dataset, int16 (n,)."""
-        return (self.part_labels + np.int16(self.first_class)).astype(np.int16)
+        if not self.class_ids:
+            return self.part_labels
+        classes: TypeArray = np.array(self.class_ids, dtype=np.int16)[self.part_labels]
+        return classes
 
     @cached_property
     def part_names(self) -> tuple[str, ...]:

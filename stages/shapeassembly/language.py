@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan, Task
+from stages.shape.collection.classes import read_labels
 from stages.shape.collection.language import Language, RebuildShape, Source
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
@@ -49,11 +50,8 @@ def _decoder(task: Task) -> ProgramDecoder:
 
 def _rebuild(places: DatasetPaths) -> RebuildShape:
     """Return the function that executes a record's program, with the labels that the dataset lists."""
-    labels: dict[str, list[str]] = {}
-    path = places.out / places.dataset / "classes.json"
-    for entry in json.loads(path.read_bytes()) if path.is_file() else ():
-        labels.setdefault(entry["kit"], []).append(entry["name"])
-    return lambda record, _: upright(shape_of_text(record["text"], labels.get(record["kit"], ())))
+    labels = read_labels(places.out / places.dataset / "classes.json")
+    return lambda record, _: upright(shape_of_text(record["text"], tuple(labels.get(record["kit"], ()))))
 
 
 LANGUAGE = Language(

@@ -23,7 +23,6 @@ from stages.shape.sample import read_samples, write_sample
 from stages.string_sampling.rounds import ModelRounds, model_rounds, read_pool, run_pool
 from stages.string_sampling.settings import StringSamplingConfig
 from stages.string_sampling.source import run_source
-from stages.variations.settings import VariationsConfig
 
 BYTES_PER_SAMPLE = 40_000
 BYTES_PER_MODEL = 8_000_000
@@ -76,7 +75,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 
 def check(config: Config) -> None:
-    """Raise ConfigError for models of unknown kits, and for variations in the same dataset."""
+    """Raise ConfigError for models of unknown kits."""
     sources = config.section(StringSamplingConfig).sources
     kits = [kit.name for kit in config.section(ExemplarsConfig).kits]
     for number, source in enumerate(sources):
@@ -85,12 +84,6 @@ def check(config: Config) -> None:
                 f"{config.path}: string_sampling.sources.{number}: there is no kit"
                 f" {source.kit}; kits are {', '.join(kits)}"
             )
-    if sources and config.section(VariationsConfig).samples_per_kit:
-        raise ConfigError(
-            f"{config.path}: string_sampling.sources asks for"
-            f" generated shapes, and variations.samples_per_kit for variations of the "
-            "same kits: a dataset is made in one way; set variations.samples_per_kit: 0"
-        )
 
 
 def requested_samples(config: Config) -> Sequence[int]:

@@ -11,6 +11,7 @@ from pipeline.errors import ShardFailed
 from pipeline.shards import read_shard
 from pipeline.stage import Outcome, Task
 from stages.shape.collection.assignment import SPLITS
+from stages.shape.collection.members import TEXT
 from stages.shape.kit_input import input_kits
 from stages.strings.members import CORPUS
 from stages.strings.settings import EDGE_DESCRIPTIONS, Edges, StringsConfig
@@ -124,11 +125,13 @@ def _rows(task: Task, shard: str) -> Iterator[dict[str, Any]]:
 
 
 def _rows_and_strings(task: Task, shard: str) -> Iterator[tuple[dict[str, Any], list[str]]]:
+    """Yield the rows of a shard, with their strings; its tar holds texts of samples without shape graphs, too."""
     samples = read_shard(task.input("strings", f"{shard}.tar"))
-    for row, (key, members) in zip(_rows(task, shard), samples, strict=True):
-        if row["key"] != key:
-            raise ShardFailed(f"shard {shard} lists {row['key']} where its tar has {key}")
-        yield row, members["txt"].decode().splitlines()
+    for row in _rows(task, shard):
+        strings = next((members[TEXT] for key, members in samples if key == row["key"]), None)
+        if strings is None:
+            raise ShardFailed(f"shard {shard} lists {row['key']}, which is not in its tar at that place")
+        yield row, strings.decode().splitlines()
 
 
 def _vocabulary(task: Task, statistics: dict[str, dict[str, StringStatistics]], edges: Edges) -> dict[str, Any]:

@@ -20,7 +20,10 @@ COLUMNS = (
 
 
 def _text(config: Config) -> tuple[Member, ...]:
-    edges = config.section(StringsConfig).edges
+    section = config.section(StringsConfig)
+    if not section.enabled:
+        return ()
+    edges = section.edges
     kind = {"all": "", "faces": " by its face contacts", "tree": " without the contacts that close cycles"}[edges]
     return (Member(TEXT, f"Its shape graph{kind} as strings, SMILES-like, one a line, the first canonical."),)
 

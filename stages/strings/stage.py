@@ -11,7 +11,8 @@ from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.discovery import language_of
-from stages.shape.collection.shards import PRODUCERS, collection_shards
+from stages.shape.collection.members import TEXT
+from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_producers
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_input import input_kits
 from stages.shape.sample import Sample
@@ -28,7 +29,8 @@ BYTES_PER_STRING = 3000
 def plan(plan: Plan) -> list[Shard]:
     """Plan one shard for each shard of the collection and, when all are done, the corpus.
 
-    Samples without shape graphs have a text of their own, and no shard here. Nor where strings are turned off.
+    Samples without shape graphs have a text of their own. A dataset of these alone has no shard here, and one whose
+    strings are turned off has none either.
     """
     shards = _graph_shards(plan)
     if not shards or any(plan.summary("strings", shard.name) is None for shard in shards):
@@ -47,9 +49,10 @@ def run_shard(task: Task) -> Outcome:
 def write_strings(task: Task) -> Outcome:
     """Write the strings of a shard.
 
-    `.tar`: the member `txt` of each sample, one string a line, the canonical one first; `.jsonl`: key, kit, graph and
-    cycle rank of each sample, for the corpus. Every string is decoded before it is written. A sample whose graph is not
-    connected is rejected. Raises ShardFailed for a string that does not encode its graph, and for a wrong graph.
+    `.tar`: the member `txt` of each sample, one string a line, the canonical one first, or the text of a sample without
+    a shape graph; `.jsonl`: key, kit, graph and cycle rank of each shape graph, for the corpus. Every string is decoded
+    before it is written. A sample whose graph is not connected is rejected. Raises ShardFailed for a string that does
+    not encode its graph, and for a wrong graph.
     """
     config = task.config.section(StringsConfig)
     kits = {name: KitStrings(kit, config.edges) for name, kit in input_kits(task).items()}
@@ -57,6 +60,8 @@ def write_strings(task: Task) -> Outcome:
 
     def strings_of(_: Collection, sample: Sample) -> Mapping[str, bytes]:
         nonlocal written
+        if not language_of(sample.producer).graphs:
+            return {TEXT: sample.text.encode()}
         try:
             strings = _strings(sample, kits[sample.kit], config.strings_per_shape, task.rng(sample.key))
         except NotConnectedError as error:
@@ -64,7 +69,7 @@ def write_strings(task: Task) -> Outcome:
         written += len(strings)
         cycle_rank = len(sample.assembly.edges) - len(sample.assembly) + 1
         rows.append({"key": sample.key, "kit": sample.kit, "graph": sample.graph, "cycle_rank": cycle_rank})
-        return {"txt": ("\n".join(strings) + "\n").encode()}
+        return {TEXT: ("\n".join(strings) + "\n").encode()}
 
     samples = add_members(task, strings_of)
     with task.output(f"{task.shard.name}.jsonl") as listing:
@@ -105,7 +110,8 @@ def estimate_bytes(plan: Plan) -> int:
 def _graph_shards(plan: Plan) -> list[Shard]:
     if not plan.config.section(StringsConfig).enabled:
         return []
-    return [shard for shard in collection_shards(plan) if language_of(shard.params["producer"]).graphs]
+    graphs = any(language_of(producer).graphs for producer in sample_producers(plan))
+    return collection_shards(plan) if graphs else []
 
 
 def _strings(sample: Sample, kit: KitStrings, count: int, rng: np.random.Generator) -> list[str]:

@@ -150,9 +150,8 @@ def _categories(config: Config, model: KitModelConfig) -> tuple[str, ...]:
 
 
 def _programs(config: Config, model: RecoveryModelConfig) -> tuple[str, ...]:
-    """Return the programs that a model learns from, by default that of the dataset."""
-    own = config.section(ProgramsConfig).program if not model.programs else ""
-    return model.programs or ((own,) if own else ())
+    """Return the programs that a model learns from, by default those of the dataset."""
+    return model.programs or tuple(entry.program for entry in config.section(ProgramsConfig).sampled)
 
 
 def _kit_shard(plan: Plan, model: KitModelConfig, kind: str, kit: str) -> Shard:

@@ -10,6 +10,7 @@ from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Stage, Task
 from stages.shape.collection.collection import Collection, add_members
+from stages.shape.collection.discovery import language_of
 from stages.shape.collection.pairs import CONTACTS, JOINTS, pair_bytes
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.geometry.pose import rounded
@@ -36,7 +37,7 @@ def run_shard(task: Task) -> Outcome:
         assembly = replace(shape.assembly, poses=rounded(shape.assembly.poses))
         judge = judge_of(shape.meshes, shape.up, config)
         # a shape graph defines its contacts; those of a shape made from a text are computed here
-        graphs = collection.language.graphs
+        graphs = language_of(sample.producer).graphs
         known = shape.assembly.edges if graphs else judge.contacts(assembly)
         try:
             validity = judge.validity(assembly)

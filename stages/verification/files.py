@@ -15,8 +15,8 @@ from pipeline.paths import file_digest
 from stages.package.layout import CHECKSUMS, CLASSES, CROISSANT, INDEX, MANIFEST, SCHEMA
 from stages.verification.findings import Findings
 
-SampleRow = tuple[str, str, str, str, str]
-"""Key, shard, split, kit and graph of a sample."""
+SampleRow = tuple[str, str, str, str, str, str]
+"""Key, shard, split, kit, graph and producer of a sample."""
 
 ClassCounts = Counter[tuple[str, str, str]]
 """Numbers of `shapes` and `parts` by (`shapes` or `parts`, split, class)."""
@@ -99,14 +99,16 @@ def check_splits(manifest: Mapping[str, Any], rows: Sequence[SampleRow], finding
     """
     seen: dict[str, str] = {}
     graphs: dict[tuple[str, str], tuple[str, str]] = {}
-    for key, shard, split, kit, graph in rows:
+    sharing = manifest.get("graphs_share_split")
+    for key, shard, split, kit, graph, producer in rows:
         where = f"{shard}: {key}"
         if key in seen:
             findings.fault("samples", where, f"is also in {seen[key]}, or its members do not follow each other")
         seen[key] = shard
-        first_split, first = graphs.setdefault((kit, graph), (split, key))
-        if manifest.get("graphs_share_split") and first_split != split:
-            findings.fault("splits", where, f"has the graph of {first}, which is in {first_split}")
+        if sharing is True or (isinstance(sharing, list) and producer in sharing):
+            first_split, first = graphs.setdefault((kit, graph), (split, key))
+            if first_split != split:
+                findings.fault("splits", where, f"has the graph of {first}, which is in {first_split}")
     findings.look("splits", len(rows))
     for split, samples in manifest["splits"].items():
         count = sum(row[2] == split for row in rows)

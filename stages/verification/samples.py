@@ -46,10 +46,12 @@ def read_packaged(
     members: Mapping[str, bytes],
     rebuild: Mapping[str, RebuildShape],
     sections: Mapping[str, Any],
+    labels: Mapping[str, Mapping[str, int]],
 ) -> PackagedSample:
     """Return the sample with the shape of its record.
 
     rebuild: function that rebuilds the shape of a record, by language
+    labels: class of each label of each kit
 
     Raises SampleError for unreadable arrays or records, and LookupError where the source of the shape is missing.
     """
@@ -57,10 +59,11 @@ def read_packaged(
     packaged = PackagedSample(key, record, members, arrays, _NOTHING, sections)
     try:
         shape = rebuild[record["language"]](record, packaged.contacts)
-        parts = record["parts"]
-        first = parts[0]["class"] - int(shape.part_labels[0])
         assembly = replace(shape.assembly, poses=rounded(shape.assembly.poses))
-        shape = replace(shape, assembly=assembly, first_class=first)
+        stated = {part["label"]: part["class"] for part in record["parts"]}
+        known = labels.get(record["kit"], stated)
+        ids = tuple(known.get(label, -1) for label in shape.labels)
+        shape = replace(shape, assembly=assembly, class_ids=ids)
         return PackagedSample(key, record, members, arrays, shape, sections)
     except LookupError as error:
         if isinstance(error, KeyError | IndexError):
@@ -151,6 +154,8 @@ def _part_faults(record: Mapping[str, Any], shape: Shape) -> Iterator[str]:
     for index, (part, name, label, number) in enumerate(
         zip(parts, shape.part_names, shape.part_labels.tolist(), shape.part_classes.tolist(), strict=True)
     ):
+        if part.get("own_class", label) != label:
+            yield f"its json says that part {index} has the class {part['own_class']} in its kit, which is {label}"
         actual = part["name"], part["label"], part["class"], part["instance"]
         if actual != (name, shape.labels[label], number, index):
             yield f"its json calls part {index} {actual}, and its source {(name, shape.labels[label], number, index)}"

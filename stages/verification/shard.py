@@ -15,7 +15,9 @@ from typing import Any
 from pipeline.paths import DatasetPaths
 from pipeline.shards import read_shard
 from stages.package.index import index_row, tar_bytes
+from stages.package.layout import CLASSES
 from stages.package.schema import schema_faults, validator_of
+from stages.shape.collection.classes import read_labels
 from stages.shape.collection.discovery import audits, languages
 from stages.shape.collection.discovery import members as declared_members
 from stages.shape.collection.packaged import PackagedSample
@@ -50,6 +52,7 @@ def check_shard(
     paths = DatasetPaths(folder.resolve().parent, folder.resolve().name)
     rebuild = {name: language.rebuild(paths) for name, language in languages().items()}
     validator = validator_of(schema)
+    labels = read_labels(folder / CLASSES)
     wanted = [member["name"] for member in manifest["members"]]
     stage_samples, indexed = _stage_samples(paths, path), _indexed(index, path)
     try:
@@ -74,9 +77,10 @@ def check_shard(
                     findings.look("index")
                     for what in _misplaced(row, record, path, offset, tar_bytes(members)):
                         findings.fault("index", where, what)
-                rows.append((key, path, str(record.get("split")), str(record.get("kit")), str(record.get("graph"))))
+                split, kit, graph, producer = (str(record.get(name)) for name in ("split", "kit", "graph", "producer"))
+                rows.append((key, path, split, kit, graph, producer))
                 tally.update(_classes_of(record, str(shard["split"])))
-                sample = read_packaged(key, record, members, rebuild, manifest["config"])
+                sample = read_packaged(key, record, members, rebuild, manifest["config"], labels)
                 if number in rechecked:
                     findings.look("geometry")
                 for check, what in _faults(sample, manifest, paths if number in rechecked else None):

@@ -71,13 +71,14 @@ def assign_splits(
 
 
 def assign_shards(
-    split_of: npt.NDArray[np.int64], config: ShardConfig, rng: np.random.Generator
+    split_of: npt.NDArray[np.int64], config: ShardConfig, rng: np.random.Generator | None
 ) -> dict[str, list[npt.NDArray[np.int64]]]:
-    """Return the rows of each shard of each split in random order, each int64 (k,).
+    """Return the rows of each shard of each split, each int64 (k,).
 
     split_of: index into SPLITS of each row, int64 (n,).
+    rng: puts the rows in random order; None keeps their order.
     """
-    order = rng.permutation(len(split_of))
+    order = np.arange(len(split_of)) if rng is None else rng.permutation(len(split_of))
     shards: dict[str, list[npt.NDArray[np.int64]]] = {}
     for split, name in enumerate(SPLITS):
         rows = order[split_of[order] == split]
@@ -93,15 +94,20 @@ def _shard_of(samples: int, config: ShardConfig) -> npt.NDArray[np.int64]:
 
 
 def write_listings(
-    task: Task, rows: Sequence[Mapping[str, Any]], split_of: npt.NDArray[np.int64], config: ShardConfig
+    task: Task,
+    rows: Sequence[Mapping[str, Any]],
+    split_of: npt.NDArray[np.int64],
+    config: ShardConfig,
+    shuffle: bool = True,
 ) -> dict[str, int]:
     """Write one file for each shard of the collection, `<shard>.<split>-<number>.jsonl`, with one sample a line.
 
     rows: `key`, `kit`, `graph`, `method`, `parents` and `text` of each sample.
     split_of: index into SPLITS of each row, int64 (n,).
+    shuffle: whether the rows are put in random order.
     Returns the number of shards of each split.
     """
-    shards = assign_shards(split_of, config, task.rng("order"))
+    shards = assign_shards(split_of, config, task.rng("order") if shuffle else None)
     for split, rows_of in shards.items():
         for number, members in enumerate(rows_of):
             with task.output(f"{task.shard.name}.{split}-{number:06d}.jsonl") as stream:

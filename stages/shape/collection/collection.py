@@ -20,8 +20,7 @@ class Collection:
     def __init__(self, task: Task) -> None:
         self._task = task
         self.producer = str(task.shard.params["producer"])
-        self.language = language_of(self.producer)
-        self.decoder = self.language.decoder(task)
+        self.decoder = language_of(self.producer).decoder(task)
         self.classes = Classes.of(self.decoder.sources)
 
     def samples(self, shard: str = "") -> Iterator[Sample]:
@@ -31,7 +30,7 @@ class Collection:
     def shape(self, sample: Sample) -> Shape:
         """Return the shape of a sample. The classes of its parts are those of the dataset."""
         shape = upright(self.decoder.shape(sample))
-        return replace(shape, first_class=self.classes.first[sample.kit])
+        return replace(shape, class_ids=self.classes.of_kit[sample.kit])
 
 
 def add_members(task: Task, members_of: Callable[[Collection, Sample], Mapping[str, bytes]]) -> int:

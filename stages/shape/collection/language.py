@@ -24,12 +24,14 @@ class Source:
     colors: sRGB of each label; if empty, a class has the colour of its first part
     sentence: short description for the card
     contact_tolerance: for shape graphs, the largest distance of parts in contact, in the units of the shapes
+    shares_classes: whether a label is one class with the equal labels of all other sources that share classes
     """
 
     labels: tuple[str, ...]
     colors: tuple[tuple[int, int, int], ...] = ()
     sentence: str = ""
     contact_tolerance: float = 0.0
+    shares_classes: bool = False
 
 
 class ShapeDecoder(Protocol):

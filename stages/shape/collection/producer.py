@@ -36,6 +36,7 @@ class Producer:
     and `samples`.
 
     language: name of the language of its samples
+    joins: whether its samples are those of all other producers that a config asks for
     keys: config keys that ask for them, for messages
     is_requested: whether a config asks for them
     sentence: how its samples are made, for the card
@@ -57,6 +58,7 @@ class Producer:
     sentence: str
     splits: str
     graphs_share_split: bool
+    joins: bool = False
     limits: tuple[str, ...] = ()
     lineage: Callable[[Config], Mapping[str, RecordField]] = _no_lineage
     origins: Callable[[Plan], Sequence[Origin]] = _no_origins

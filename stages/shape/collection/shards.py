@@ -16,18 +16,20 @@ MEMBERS = "*/members.py"
 def collection_shards(plan: Plan, *also: str) -> list[Shard]:
     """Return one shard for each shard of the collection, of the same name, `<dataset>-<split>-<index>`.
 
-    Its `params` are `producer`, `split` and `samples`. Its inputs are the collection's shard, what the language of its
-    samples reads, and the shard of the same name of each stage in `also`.
+    Its `params` are `producer`, `split` and `samples`, and `joined` where the producer joins the samples of others. Its
+    inputs are the collection's shard, what the languages of its samples read, and the shard of the same name of each
+    stage in `also`.
     """
     producer = planned_producer(plan)
     if producer is None:
         return []
     read = language_of(producer).reads(plan)
+    joined = {"joined": list(sample_producers(plan))} if producers()[producer].joins else {}
     shards = []
     for name in plan.shards(producer):
         summary = plan.summary(producer, name)
         if summary is not None and "split" in summary:
-            params = {"producer": producer, "split": summary["split"], "samples": summary["samples"]}
+            params = {"producer": producer, "split": summary["split"], "samples": summary["samples"], **joined}
             inputs = (f"{producer}/{name}", *read, *(f"{stage}/{name}" for stage in also))
             shards.append(Shard(name, params, inputs))
     return shards
@@ -39,15 +41,32 @@ def sample_count(plan: Plan) -> int:
 
 
 def planned_producer(plan: Plan) -> str | None:
-    """Return the stage that makes the samples of a dataset, or None while no producer has a plan."""
-    return next((producer for producer in producers() if plan.shards(producer)), None)
+    """Return the stage whose shards hold the samples of a dataset, or None while no producer has a plan.
+
+    It is the one that joins the samples of others, if there is one.
+    """
+    planned = [name for name in producers() if plan.shards(name)]
+    return max(planned, key=lambda name: producers()[name].joins, default=None)
+
+
+def sample_producers(plan: Plan) -> tuple[str, ...]:
+    """Return the stages that made the samples: one, or all whose samples are joined."""
+    producer = planned_producer(plan)
+    if producer is None or not producers()[producer].joins:
+        return () if producer is None else (producer,)
+    return tuple(name for name, declared in producers().items() if not declared.joins and plan.shards(name))
 
 
 def check_producers(config: Config) -> None:
-    """Raise ConfigError for a config that asks for no shapes, or for more than one kind of producer."""
-    known = producers().values()
-    used = [producer.keys for producer in known if producer.is_requested(config)]
-    if len(used) != 1:
-        named = f"has {' and '.join(used)}" if used else "has none"
-        keys = ", ".join(producer.keys for producer in known)
-        raise ConfigError(f"{config.path}: a dataset needs exactly one of {keys}; this config {named}")
+    """Raise ConfigError for a config that asks for no shapes, or for several producers and does not mix them."""
+    used = [producer for producer in producers().values() if producer.is_requested(config)]
+    makers = [producer.keys for producer in used if not producer.joins]
+    if len(makers) == 1 or (makers and len(used) > len(makers)):
+        return
+    known = ", ".join(producer.keys for producer in producers().values() if not producer.joins)
+    if not makers:
+        raise ConfigError(f"{config.path}: a dataset needs one of {known}; this config has none")
+    remedy = (
+        "mix their samples with `mixture: true`, or ask for one; `variations.samples_per_kit: 0` leaves out variations"
+    )
+    raise ConfigError(f"{config.path}: this config has {' and '.join(makers)}; {remedy}")

@@ -162,7 +162,7 @@ class Layout:
         kinds = [numbers.setdefault(id(mesh), len(numbers)) for mesh in self.meshes]
         meshes = {id(mesh): mesh for mesh in self.meshes}
         assembly = Assembly(np.array(kinds, dtype=np.int16), self.poses, self.edges)
-        return Shape(tuple(meshes.values()), assembly, kit.up, kit.labels, tuple(names), 0, kit.one_surface, kit.unit)
+        return Shape(tuple(meshes.values()), assembly, kit.up, kit.labels, tuple(names), (), kit.one_surface, kit.unit)
 
 
 def layout_of(kit: Kit, exemplar: Exemplar) -> Layout:

@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.package.classes import ClassTally, count_classes, table_bytes
 from stages.package.tables import MAX_CLASSES_LISTED, class_table
-from stages.shape.collection.classes import Classes
+from stages.shape.collection.classes import Classes, labels_of_kits
 from stages.shape.collection.language import Source
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
@@ -63,3 +63,26 @@ def test_a_card_lists_the_first_of_very_many_classes_and_counts_the_others() -> 
     assert f"| {MAX_CLASSES_LISTED - 1} | word{MAX_CLASSES_LISTED - 1} |" in text
     assert f"word{MAX_CLASSES_LISTED} " not in text
     assert "And 1,440 more." in text
+
+
+def test_equal_labels_of_two_sources_are_two_classes_or_share_one() -> None:
+    labels = {"stools": ("leg", "seat"), "tables": ("top", "leg")}
+    apart = Classes.of({kit: Source(own) for kit, own in labels.items()})
+    assert dict(apart.of_kit) == {"stools": (0, 1), "tables": (2, 3)}
+    together = Classes.of({kit: Source(own, shares_classes=True) for kit, own in labels.items()})
+    assert dict(together.of_kit) == {"stools": (0, 1), "tables": (2, 0)}
+    assert [(label.name, dict(label.own)) for label in together.all] == [
+        ("leg", {"stools": 0, "tables": 1}),
+        ("seat", {"stools": 1}),
+        ("top", {"tables": 0}),
+    ]
+    for classes in (apart, together):
+        listed = labels_of_kits(count_classes(classes, [("train", {})], owned=True))
+        assert {kit: tuple(of_kit) for kit, of_kit in listed.items()} == labels
+        assert {kit: tuple(of_kit.values()) for kit, of_kit in listed.items()} == dict(classes.of_kit)
+
+
+def test_labels_of_kits_are_read_without_their_own_numbers() -> None:
+    table = count_classes(CLASSES, [("train", {})])
+    assert "own" not in table[0]
+    assert labels_of_kits(table) == {"stools": {"leg": 0, "seat": 1, "rung": 2}, "lamps": {"shade": 3}}

@@ -47,10 +47,11 @@ def test_the_index_holds_a_group_of_rows_at_a_time() -> None:
             most = max(most, len(alive) if number % 1000 == 0 else 0)
             yield fresh
 
-    written, tallies = io.BytesIO(), dict[str, SourceTally]()
+    written, tallies = io.BytesIO(), dict[tuple[str, str], SourceTally]()
     write_index(SourceTally.tallied(rows(), tallies), KINDS, written)
     assert most <= ROWS_PER_GROUP + 2
     read = pq.ParquetFile(written)
     assert [read.metadata.row_group(group).num_rows for group in range(3)] == [ROWS_PER_GROUP, ROWS_PER_GROUP, 2]
     assert read.read(["key"])["key"].to_pylist() == [f"k{number}" for number in range(2 * ROWS_PER_GROUP + 2)]
-    assert tallies["toy"].samples == 2 * ROWS_PER_GROUP + 2
+    ((_, tally),) = tallies.items()
+    assert tally.samples == 2 * ROWS_PER_GROUP + 2

@@ -36,7 +36,7 @@ def sample(mode: NormalizeMode = "none", surface: SampledSurface = "all") -> Pac
         "instances.npy": cloud.instances,
     }
     record = {"points": made, "parts": parts, "bounds": shape_bounds(shape).tolist()}
-    return PackagedSample("a", record, {}, arrays, replace(shape, first_class=5), {})
+    return PackagedSample("a", record, {}, arrays, replace(shape, class_ids=tuple(range(5, 5 + len(shape.labels)))), {})
 
 
 @pytest.mark.parametrize("surface", get_args(SampledSurface))

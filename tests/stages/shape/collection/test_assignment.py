@@ -32,6 +32,15 @@ def test_every_row_is_in_one_shard_of_its_split() -> None:
     assert sorted(np.concatenate(shards["val"]).tolist()) == [100, 101]
 
 
+def test_without_a_random_order_rows_keep_their_own() -> None:
+    shards = assign_shards(np.array([0, 1, 0, 0, 1]), SplitConfig(shards=2), None)
+    assert {split: [rows.tolist() for rows in of_split] for split, of_split in shards.items()} == {
+        "train": [[0, 2], [3]],
+        "val": [[1], [4]],
+        "test": [],
+    }
+
+
 def test_expected_shard_sizes_are_those_of_the_assignment() -> None:
     config = SplitConfig(val=0.1, test=0.0, shards=3, samples_per_shard=20)
     assert config.shard_sizes(100) == [18, 18, 18, 18, 18, 4, 3, 3]

@@ -1,0 +1,94 @@
+"""Near copies among samples of different producers: shapes whose clouds are as near as two clouds of one shape."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from stages.points.area_sampling import sample_shape
+from stages.shape.arrays import FloatArray
+from stages.shape.geometry.bounds import shape_bounds
+from stages.shape.shape import Shape
+
+POINTS_PER_CLOUD = 512
+MAX_EXTENT_DIFFERENCE = 0.05
+"""Largest difference of a side of the boxes around two near copies, as a share of the diagonal."""
+MAX_MOMENT_DIFFERENCE = 0.03
+"""Largest difference of a mean or a standard deviation of their clouds, as a share of the diagonal."""
+MAX_DISTANCE_RATIO = 1.25
+"""Largest distance of two near copies, as a multiple of the distance of two clouds of one shape."""
+QUARTER_TURNS = tuple(
+    np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1))
+)
+
+
+def unit_clouds(shape: Shape, rng: np.random.Generator) -> npt.NDArray[np.float32]:
+    """Return two independent clouds of a shape, its box around 0 with diagonal 1, float32 (2, n, 3)."""
+    low, high = shape_bounds(shape)
+    clouds = [sample_shape(shape, POINTS_PER_CLOUD, part).points for part in rng.spawn(2)]
+    scaled = (np.stack(clouds) - (low + high) / 2) / max(float(np.linalg.norm(high - low)), 1e-12)
+    result: npt.NDArray[np.float32] = scaled.astype(np.float32)
+    return result
+
+
+def near_pairs(
+    clouds: npt.NDArray[np.float32], extents: FloatArray, groups: npt.NDArray[np.int64], splits: npt.NDArray[np.int64]
+) -> Iterator[tuple[int, int]]:
+    """Yield pairs of near copies in different groups and different splits, the lower index first.
+
+    clouds: two of each shape, float32 (k, 2, n, 3), as `unit_clouds`
+    extents: sides of the box around each shape, as shares of its diagonal, float64 (k, 3)
+    groups, splits: int64 (k,)
+    """
+    from scipy.spatial import cKDTree
+
+    points = clouds.reshape(len(clouds), -1, 3)
+    moments = np.column_stack(
+        [
+            _turned(points.std(axis=1)),
+            points[..., 1].mean(axis=1),
+            np.linalg.norm(points[..., [0, 2]], axis=2).mean(axis=1),
+        ]
+    )
+    features = np.column_stack([_turned(extents) / MAX_EXTENT_DIFFERENCE, moments / MAX_MOMENT_DIFFERENCE])
+    spacings = np.array([_distance(first, second) for first, second in clouds])
+    pairs = cKDTree(features).query_pairs(1.0, p=np.inf, output_type="ndarray")
+    pairs = pairs[(groups[pairs[:, 0]] != groups[pairs[:, 1]]) & (splits[pairs[:, 0]] != splits[pairs[:, 1]])]
+    for first, second in pairs[np.lexsort(pairs.T[::-1])].tolist():
+        limit = MAX_DISTANCE_RATIO * min(spacings[first], spacings[second])
+        if any(_distance(clouds[first, 0] @ turn.T, clouds[second, 0]) <= limit for turn in QUARTER_TURNS):
+            yield first, second
+
+
+def _turned(lengths: FloatArray) -> FloatArray:
+    """Return lengths along x, y and z (k, 3) in an order that quarter turns about y do not change."""
+    return np.column_stack([np.sort(lengths[:, [0, 2]], axis=1), lengths[:, 1]])
+
+
+def _distance(first: npt.NDArray[np.float32], second: npt.NDArray[np.float32]) -> float:
+    """Return the symmetric mean Chamfer distance of two clouds (n, 3)."""
+    squares = (first**2).sum(axis=1)[:, None] + (second**2).sum(axis=1)[None] - 2.0 * first @ second.T
+    gaps = np.sqrt(np.maximum(squares, 0.0))
+    return float(gaps.min(axis=0).mean() + gaps.min(axis=1).mean()) / 2
+
+
+def left_out(pairs: Sequence[tuple[int, int]], splits: npt.NDArray[np.int64]) -> list[int]:
+    """Return which samples to leave out so that none of the pairs remains, ascending: those in most pairs first.
+
+    splits: split of each sample, int64 (k,); of samples in equally many pairs one of the first split is left out.
+    """
+    rivals: dict[int, set[int]] = {}
+    for first, second in pairs:
+        rivals.setdefault(first, set()).add(second)
+        rivals.setdefault(second, set()).add(first)
+    out = []
+    while rivals:
+        worst = max(rivals, key=lambda row: (len(rivals[row]), -splits[row], -row))
+        for other in rivals.pop(worst):
+            rivals[other].discard(worst)
+            if not rivals[other]:
+                del rivals[other]
+        out.append(worst)
+    return sorted(out)

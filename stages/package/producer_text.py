@@ -1,0 +1,54 @@
+"""What the producers of a dataset say of it on its card."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from pipeline.stage import Plan
+from stages.shape.collection.discovery import language_of, members, producers
+from stages.shape.collection.origin import Origin, missing_licenses
+
+
+def producer_text(plan: Plan, makers: Sequence[str], producer: str, origins: Sequence[Origin]) -> dict[str, Any]:
+    """Return the fields of `CardText` besides the origins, as JSON.
+
+    makers: the stages that made the samples
+    producer: the stage whose shards hold them, which joins those of several makers
+    """
+    known = producers()
+    stages = list(dict.fromkeys((*makers, producer)))
+    languages = {language_of(maker).name: language_of(maker) for maker in makers}
+    paragraphs = [text for stage in stages for text in known[stage].card(plan)]
+    paragraphs += [text for added in members().values() for text in added.card(plan)]
+    return {
+        "made": _by_name({maker: known[maker].sentence for maker in makers}),
+        "splits": [
+            _by_name({maker: known[maker].splits for maker in makers}),
+            *(known[stage].splits for stage in stages if stage not in makers),
+            *(text for stage in stages for text in known[stage].nearness(plan)),
+        ],
+        "coordinates": _by_name({name: language.coordinates for name, language in languages.items()}),
+        "limits": list(dict.fromkeys(limit for stage in stages for limit in known[stage].limits)),
+        "paragraphs": list(dict.fromkeys(paragraphs)),
+        "variety": [text for stage in stages for text in known[stage].variety(plan)],
+        "rejects": _rejects(plan, stages),
+        "missing_licenses": missing_licenses(origins),
+    }
+
+
+def _by_name(texts: dict[str, str]) -> str:
+    """Join texts; where there are several, each is a paragraph that begins with the name of what it is about."""
+    if len(texts) == 1:
+        return next(iter(texts.values()))
+    return "\n\n".join(f"**{name}**: {text}" for name, text in texts.items() if text)
+
+
+def _rejects(plan: Plan, stages: Iterable[str]) -> dict[str, int]:
+    """Return the number of items that stages refused, by reason."""
+    counts: Counter[str] = Counter()
+    for stage in stages:
+        for shard in plan.shards(stage):
+            counts.update(plan.rejects(stage, shard))
+    return dict(sorted(counts.items()))

@@ -1,0 +1,129 @@
+"""A dataset of several producers: whole, verified, with one list of classes; a config says that it is a mixture."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from pipeline.shards import bytes_array, read_shard
+from tests.command import shapemill
+from tests.stated import stated
+
+STOOL, RACK = "tests.stages.programs.stool", "tests.stages.programs.rack"
+FORT = stated({"name": "fort", "shapes": ["datasets/exemplars/playground/fort.glb"]})
+SECTIONS: dict[str, Any] = {
+    "mixture": {"enabled": True, "shards": {"shards": 2}, "max_samples": {"furniture": 9}},
+    "exemplars": {"kits": [FORT]},
+    "variations": {"samples_per_kit": 6, "splits": {"by": "graph", "shards": 1, "val": 0.2, "test": 0.2}},
+    "proportions": {"samples_per_kit": 6, "parallel_searches": 1, "splits": {"shards": 1, "val": 0.2, "test": 0.2}},
+    "programs": {
+        "entries": [{"program": name, "mode": "random", "random": {"samples": 8}} for name in (STOOL, RACK)],
+        "splits": {"shards": 1},
+    },
+    "shapeassembly": {
+        "programs": [{"name": "furniture", "path": "datasets/exemplars/programs"}],
+        "splits": {"shards": 1, "val": 0.2, "test": 0.2},
+    },
+    "points": {"uniform": 64},
+    "sketches": {"size": 48, "renderer": "raster", "views": [{"name": "front"}]},
+    "package": {"previewed": 4},
+}
+
+pytestmark = pytest.mark.slow
+
+
+def config_of(folder: Path, sections: dict[str, Any]) -> tuple[str, ...]:
+    path = folder / "mix.yaml"
+    path.write_text(yaml.safe_dump({"name": "mix", "seed": 5, "license": "MIT", **sections}), encoding="utf-8")
+    return "--config", str(path), "--out", str(folder / "out")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[str, ...]]:
+    folder = tmp_path_factory.mktemp("mix")
+    arguments = config_of(folder, SECTIONS)
+    code, printed = shapemill("run", *arguments)
+    assert code == 0, printed
+    return folder / "out", arguments
+
+
+def records_of(out: Path) -> list[tuple[dict[str, Any], dict[str, bytes]]]:
+    paths = sorted((out / "mix" / "data").rglob("*.tar"))
+    return [(json.loads(members["json"]), members) for path in paths for _, members in read_shard(path)]
+
+
+def test_samples_of_all_producers_are_mixed_and_counted(made: tuple[Path, tuple[str, ...]]) -> None:
+    manifest = json.loads((made[0] / "mix" / "manifest.json").read_text(encoding="utf-8"))
+    records = [record for record, _ in records_of(made[0])]
+    counts = Counter(record["producer"] for record in records)
+    assert counts == manifest["producers"]
+    assert counts["programs"] == 16
+    assert 0 < counts["shapeassembly"] <= 9
+    assert set(counts) == {"variations", "proportions", "programs", "shapeassembly"}
+    train = [set(shard["kits"]) for shard in manifest["shards"] if shard["split"] == "train"]
+    assert all(len(kits) > 2 for kits in train)
+    card = (made[0] / "mix" / "README.md").read_text(encoding="utf-8")
+    code, status = shapemill("status", *made[1])
+    assert code == 0
+    for (producer, kit), count in Counter((record["producer"], record["kit"]) for record in records).items():
+        assert re.search(rf"\| {re.escape(kit)}, {producer}[^|]*\| {count} \|", card)
+        assert f"{producer}: {kit}: {count} samples" in status
+
+
+def test_each_part_has_the_class_of_its_dataset_and_of_its_kit(made: tuple[Path, tuple[str, ...]]) -> None:
+    rows = json.loads((made[0] / "mix" / "classes.json").read_text(encoding="utf-8"))
+    own = {(kit, number): row for row in rows for kit, number in row["own"].items()}
+    for record, members in records_of(made[0]):
+        for part in record["parts"]:
+            row = own[record["kit"], part["own_class"]]
+            assert (row["id"], row["name"]) == (part["class"], part["label"])
+        labels = bytes_array(members["labels.npy"])
+        classes = np.array([part["class"] for part in record["parts"]])
+        assert (classes[bytes_array(members["instances.npy"])] == labels).all()
+
+
+def test_all_samples_have_the_same_members_and_fields(made: tuple[Path, tuple[str, ...]]) -> None:
+    records = records_of(made[0])
+    assert len({tuple(members) for _, members in records}) == 1
+    assert len({tuple(sorted(record)) for record, _ in records}) == 1
+    assert len({tuple(sorted(record["lineage"])) for record, _ in records}) == 1
+    keys = {record["key"]: record["split"] for record, _ in records}
+    for record, _ in records:
+        json.loads(record["lineage"]["details"])
+        if record["producer"] == "variations":
+            parents = [parent for parent in record["lineage"]["parents"] if parent in keys]
+            assert all(keys[parent] == record["split"] for parent in parents)
+
+
+def test_both_verifiers_find_no_fault(made: tuple[Path, tuple[str, ...]]) -> None:
+    code, printed = shapemill("verify", *made[1], "--samples", "12")
+    assert code == 0, printed
+    command = [sys.executable, str(made[0] / "mix" / "verify.py"), "--samples", "4"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+def test_several_producers_without_a_mixture_are_refused(tmp_path: Path) -> None:
+    sections = {name: section for name, section in SECTIONS.items() if name != "mixture"}
+    code, printed = shapemill("run", "programs", *config_of(tmp_path, sections))
+    assert code == 2
+    assert "mixture: true" in printed
+
+
+def test_programs_of_two_modes_and_a_program_twice_are_refused(tmp_path: Path) -> None:
+    for entries, reason in (
+        ([{"program": STOOL}, {"program": RACK, "mode": "random"}], "one mode"),
+        ([{"program": STOOL}, {"program": STOOL}], "one program"),
+    ):
+        code, printed = shapemill("run", "programs", *config_of(tmp_path, {"programs": entries}))
+        assert code == 2
+        assert reason in printed

@@ -1,0 +1,51 @@
+"""Which samples of two producers are near copies, and which of them are left out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from stages.mixture.near_copies import left_out, near_pairs, unit_clouds
+from stages.programs.program import shape_from_parts
+from stages.shape.geometry.bounds import shape_bounds
+from stages.shape.shape import Shape
+from tests.stages.programs import stool
+
+
+def stool_of(height: float, width: float) -> Shape:
+    values = {"height": height, "scale x": width, "has_rail": False, "rail_height": 0.2}
+    return shape_from_parts(stool.PROGRAM, stool.build(values))
+
+
+def scaled_and_turned(shape: Shape) -> Shape:
+    turn = np.array([[0.0, 0, 3, 5], [0, 3, 0, 1], [-3, 0, 0, 2], [0, 0, 0, 1]])
+    return replace(shape, assembly=replace(shape.assembly, poses=turn @ shape.assembly.poses))
+
+
+def pairs_of(shapes: list[Shape], groups: list[int], splits: list[int]) -> list[tuple[int, int]]:
+    rngs = np.random.default_rng(0).spawn(len(shapes))
+    clouds = np.array([unit_clouds(shape, rng) for shape, rng in zip(shapes, rngs, strict=True)])
+    sides = np.array([np.diff(shape_bounds(shape), axis=0)[0] for shape in shapes])
+    extents = sides / np.linalg.norm(sides, axis=1, keepdims=True)
+    return list(near_pairs(clouds, extents, np.array(groups), np.array(splits)))
+
+
+def test_copies_in_other_places_sizes_and_quarter_turns_are_found() -> None:
+    low, high = stool_of(0.5, 1.0), stool_of(0.9, 1.0)
+    shapes = [low, high, scaled_and_turned(low), stool_of(0.5, 1.5)]
+    assert pairs_of(shapes, [0, 0, 1, 1], [0, 0, 1, 1]) == [(0, 2)]
+
+
+def test_copies_of_one_producer_or_in_one_split_are_left_to_others() -> None:
+    shape = stool_of(0.5, 1.0)
+    assert pairs_of([shape, shape], [0, 0], [0, 1]) == []
+    assert pairs_of([shape, shape], [0, 1], [1, 1]) == []
+    assert pairs_of([shape, shape], [0, 1], [2, 1]) == [(0, 1)]
+
+
+def test_what_is_in_most_pairs_is_left_out_and_else_what_is_in_train() -> None:
+    splits = np.array([0, 1, 0, 0, 2])
+    assert left_out([(0, 1), (1, 2), (1, 3)], splits) == [1]
+    assert left_out([(0, 1), (3, 4)], splits) == [0, 3]
+    assert left_out([], splits) == []
