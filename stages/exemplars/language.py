@@ -107,5 +107,5 @@ LANGUAGE = Language(
     text="",
     rebuild=_rebuild,
     coordinates="The origin of a mesh is the middle of the box around the part as "
-    "its model file has it. The origin of a shape is that of the exemplar with most of its parts, and may be anywhere.",
+    "its model file has it. The origin of a shape may be anywhere.",
 )

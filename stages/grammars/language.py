@@ -38,10 +38,11 @@ class DerivationDecoder:
 
 def _source(grammar: ShapeGrammar) -> Source:
     colors = [np.median(mesh.face_colors, axis=0).astype(np.uint8).tolist() for mesh in grammar.meshes]
+    made_of = f"{len(grammar.exemplar.faces):,} {grammar.made_of}"
     return Source(
         grammar.labels,
         tuple((red, green, blue) for red, green, blue in colors),
-        f"one mesh, {len(grammar.productions)} productions, {len(grammar.grids)} grids",
+        f"{made_of}, {len(grammar.productions)} productions, {len(grammar.grids)} grids",
     )
 
 

@@ -10,13 +10,17 @@ PRODUCER = Producer(
     language="derivation",
     keys="grammars.models",
     is_requested=lambda config: bool(config.section(GrammarsConfig).models),
-    sentence="the partial symmetries of a mesh in one piece make a shape grammar, whose productions and grids make "
-    "shapes; a shape's derivation is its `txt`.",
+    sentence=lambda _: (
+        "the partial symmetries of a surface in one piece make a shape grammar, whose productions and "
+        "grids make shapes; a shape's derivation is its `txt`."
+    ),
     origins=mesh_origins,
-    limits=(
-        "Every neighbourhood of the radius of similarity is one of the mesh's; seen from nearby, nothing is new.",
+    limits=lambda _: (
+        "Every neighbourhood of the radius of similarity is one of the surface's; seen from nearby, nothing is new.",
         "Parts are terminals of the grammar: pieces between docking sites, without a meaning.",
     ),
-    splits="No two samples look alike, within a split or across splits: the radius of similarity counts as nothing.",
-    graphs_share_split=True,
+    splits=lambda _: (
+        "No two samples look alike, within a split or across splits: the radius of similarity counts as nothing."
+    ),
+    graphs_share_split=lambda _: True,
 )

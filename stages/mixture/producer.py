@@ -19,11 +19,13 @@ PRODUCER = Producer(
     language="mixture",
     keys="mixture",
     is_requested=lambda config: config.section(MixtureConfig).enabled,
-    sentence="",
-    splits="A sample keeps the split that its producer gave it. Samples of two producers share a split if they are of "
-    "one kit and have equal shape graphs, or if their surfaces are as near to each other as two point clouds of one "
-    "surface are, up to size, position and quarter turns; those that would be in two splits are left out.",
-    graphs_share_split=False,
+    sentence=lambda _: "",
+    splits=lambda _: (
+        "A sample keeps the split that its producer gave it. Samples of two producers share a split if they are of "
+        "one kit and have equal shape graphs, or if their surfaces are as near to each other as two point clouds of "
+        "one surface are, up to size, position and quarter turns; those that would be in two splits are left out."
+    ),
+    graphs_share_split=lambda _: False,
     joins=True,
     lineage=_lineage,
 )

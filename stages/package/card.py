@@ -16,16 +16,13 @@ SIZE_CATEGORIES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"
 
 USES = (
     "For training and evaluating models that generate, complete, segment or reconstruct shapes made of parts, and for "
-    "work on shape grammars, shape programs and physical validity. Not for conclusions about the look or construction "
+    "work on the structure and the physical validity of shapes. Not for conclusions about the look or construction "
     "of real objects, and not for judging whether a real object is safe."
 )
 LIMITS = (
-    "The shapes are synthetic. They do not represent real objects, and no person has reviewed them.",
+    "All samples were made automatically, and no person has reviewed them.",
     "Stability is computed by statics with one density everywhere. Nothing was simulated or built.",
     "Meshes have at most one colour per face, and no textures, materials or normals.",
-)
-POINT_LIMIT = (
-    "Points cover the whole surface of every part, even where it is hidden inside another part, unlike a scan."
 )
 LOADED = ("points.npy", "labels.npy", "color0.png", "depth0.png", "txt")
 """Members that the example of loading reads, where samples have them."""
@@ -46,6 +43,8 @@ class CardText:
     made: how the samples are made
     splits: paragraphs on the separation of the splits
     coordinates: their unit and origin
+    members_coordinates: sentences on the coordinates of members
+    checks: what only `make verify` checks of the members
     limits: limitations, a sentence each
     paragraphs, variety: Markdown
     rejects: number of refused items by reason
@@ -57,6 +56,8 @@ class CardText:
     made: str
     splits: Sequence[str]
     coordinates: str
+    members_coordinates: Sequence[str]
+    checks: Sequence[str]
     limits: Sequence[str]
     paragraphs: Sequence[str]
     variety: Sequence[str]
@@ -104,7 +105,7 @@ def card(
     header = {
         "license": str(facts["license"]).lower(),
         "pretty_name": facts["title"],
-        "task_categories": list(facts["task_categories"]),
+        **({"task_categories": list(facts["task_categories"])} if facts["task_categories"] else {}),
         "size_categories": [size_category(sum(tally.samples for tally in tallies.values()))],
         "tags": list(dict.fromkeys([*facts["tags"], *text.kits])),
         "configs": [
@@ -137,14 +138,11 @@ def card(
         f"{text.coordinates} The ground of a "
         "shape is the plane through its lowest point, `bounds[0][1]` in the record. A part's `pose` maps its own "
         "coordinates to those of the shape, and is the matrix of its node in the GLB. "
-        + (
-            "Points have the coordinates of the mesh, or are moved and scaled by `points.centre` and `points.scale`. "
-            * points
-        )
+        + "".join(f"{sentence} " for sentence in text.members_coordinates)
         + "Vertex colours are linear, as in glTF.",
         "## Intended use and limitations",
         USES,
-        "\n".join(f"- {limit}" for limit in (*LIMITS, *([POINT_LIMIT] if points else []), *text.limits)),
+        "\n".join(f"- {limit}" for limit in (*LIMITS, *text.limits)),
         "## Loading",
         _loading(facts, splits, shards, names),
         "## How it was made",
@@ -153,7 +151,8 @@ def card(
         *text.paragraphs,
         "## Verification",
         f"`sha256sum -c {CHECKSUMS}` checks every file. `python {VERIFIER}` needs numpy and trimesh only. It also "
-        "checks every record, and the geometry of 100 samples. `make verify` of Shapemill checks statics and drawings.",
+        "checks every record, and the geometry of 100 samples. `make verify` of Shapemill checks "
+        f"{' and '.join(['statics', *text.checks])}.",
         "## Licence and citation",
         f"{facts['license']}.",
         *(["Made from:", origin_table(text.origins)] if text.origins else []),
@@ -171,7 +170,7 @@ def unit_sentence(tallies: Mapping[str, SourceTally]) -> str:
         return "The unit is the metre."
     if metric:
         return f"The unit is the metre for {', '.join(metric)}, and unknown for the others; each record states it."
-    return "Records state no unit (`unit` is unknown)."
+    return "The unit is unknown (`unit` in each record)."
 
 
 def _pictured(names: Sequence[str]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from pipeline.config import Config
@@ -10,6 +11,8 @@ from stages.shape.collection.discovery import members
 from stages.shape.collection.language import Language
 from stages.shape.collection.members import TEXT, Member
 
+IMAGES = (".png", ".jpg", ".webp", ".exr")
+"""Suffixes of drawings and of images of views."""
 OWN_MEMBERS = (
     Member(
         "glb",
@@ -18,8 +21,8 @@ OWN_MEMBERS = (
     ),
     Member(
         "json",
-        "Everything else: parts with label, class and pose (4x4), counts, bounds, lineage, cameras of the drawings; "
-        "field by field in `schema.json`.",
+        "Everything else: parts with label, class and pose (4x4), counts, bounds, lineage{cameras}; field by field in "
+        "`schema.json`.",
     ),
 )
 
@@ -35,6 +38,10 @@ def describe_members(config: Config, names: Sequence[str], languages: Sequence[L
         strings = [declared[TEXT].sentence] if TEXT in declared else ["A line that says that strings are turned off."]
         texts = [text for language in languages for text in (strings if language.graphs else [language.text])]
         declared[TEXT] = Member(TEXT, " Or: ".join(dict.fromkeys(texts)))
+    cameras = ", cameras of the drawings" * ("sketch0.png" in names) + ", cameras of the views" * any(
+        name.endswith(IMAGES) and not name.startswith("sketch") for name in names
+    )
+    declared["json"] = replace(declared["json"], sentence=declared["json"].sentence.format(cameras=cameras))
     unknown = [name for name in names if name not in declared]
     if unknown:
         raise ValueError(f"samples have {', '.join(unknown)}, which no stage declares in its members.py")

@@ -1,4 +1,4 @@
-"""What the producers of a dataset say of it on its card."""
+"""What producers and stages say of a dataset on its card: each sentence follows from the config or from records."""
 
 from __future__ import annotations
 
@@ -11,26 +11,35 @@ from stages.shape.collection.discovery import language_of, members, producers
 from stages.shape.collection.origin import Origin, missing_licenses
 
 
-def producer_text(plan: Plan, makers: Sequence[str], producer: str, origins: Sequence[Origin]) -> dict[str, Any]:
+def producer_text(
+    plan: Plan, makers: Sequence[str], producer: str, adding: Sequence[str], origins: Sequence[Origin]
+) -> dict[str, Any]:
     """Return the fields of `CardText` besides the origins, as JSON.
 
     makers: the stages that made the samples
     producer: the stage whose shards hold them, which joins those of several makers
+    adding: the stages that add members to them
     """
     known = producers()
     stages = list(dict.fromkeys((*makers, producer)))
     languages = {language_of(maker).name: language_of(maker) for maker in makers}
     paragraphs = [text for stage in stages for text in known[stage].card(plan)]
-    paragraphs += [text for added in members().values() for text in added.card(plan)]
+    added, config = [members()[stage] for stage in adding], plan.config
+    paragraphs += [text for stage in added for text in stage.card(plan)]
     return {
-        "made": _by_name({maker: known[maker].sentence for maker in makers}),
+        "made": _by_name({maker: known[maker].sentence(config) for maker in makers}),
         "splits": [
-            _by_name({maker: known[maker].splits for maker in makers}),
-            *(known[stage].splits for stage in stages if stage not in makers),
+            _by_name({maker: known[maker].splits(config) for maker in makers}),
+            *(known[stage].splits(config) for stage in stages if stage not in makers),
             *(text for stage in stages for text in known[stage].nearness(plan)),
         ],
         "coordinates": _by_name({name: language.coordinates for name, language in languages.items()}),
-        "limits": list(dict.fromkeys(limit for stage in stages for limit in known[stage].limits)),
+        "members_coordinates": [text for stage in added for text in stage.coordinates(config)],
+        "checks": [check for stage in added for check in stage.checks],
+        "limits": [
+            *(limit for stage in added for limit in stage.limits(config)),
+            *dict.fromkeys(limit for stage in stages for limit in known[stage].limits(config)),
+        ],
         "paragraphs": list(dict.fromkeys(paragraphs)),
         "variety": [text for stage in stages for text in known[stage].variety(plan)],
         "rejects": _rejects(plan, stages),

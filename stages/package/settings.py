@@ -20,6 +20,8 @@ class PackageConfig(StrictModel):
         ("3d", "shapes", "shape-graphs", "procedural"), description="tags of the card, besides the names of the kits"
     )
     task_categories: tuple[str, ...] = Field(
-        ("image-to-3d", "text-to-3d"), min_length=1, description="Hugging Face task categories of the card"
+        (),
+        description="Hugging Face task categories of the card; if empty, those that its members serve: image-to-3d "
+        "where samples have drawings or images",
     )
     previewed: int = Field(24, ge=1, le=96, description="variants that the preview picture shows; unit: variants")

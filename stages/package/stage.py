@@ -76,9 +76,9 @@ def plan(plan: Plan) -> list[Shard]:
     declared = [producers()[name] for name in dict.fromkeys((*makers, producer))]
     languages = list({language_of(name).name: language_of(name) for name in makers}.values())
     origins = list(dict.fromkeys(origin for maker in declared for origin in maker.origins(plan)))
-    sharing = [name for name in makers if producers()[name].graphs_share_split]
+    sharing = [name for name in makers if producers()[name].graphs_share_split(plan.config)]
     params = {
-        "facts": _facts(plan),
+        "facts": dataset_facts(plan, added),
         "producer": producer,
         **joined,
         "sections": config_sections(plan.config),
@@ -86,7 +86,7 @@ def plan(plan: Plan) -> list[Shard]:
         "members": describe_members(plan.config, filled[0]["members"], languages),
         "schema": record_schema(plan.config, producer, joined.get("joined", ()), merged[0].params["stages"]),
         "graphs_share_split": sharing if joined else bool(sharing),
-        "card_text": producer_text(plan, makers, producer, origins),
+        "card_text": producer_text(plan, makers, producer, added, origins),
         "measures": {name: value for maker in declared for name, value in maker.measures(plan).items()},
         "preview": PREVIEW_SHARD,
         "software": {"shapemill": code_version(), "libraries": library_versions()},
@@ -175,8 +175,9 @@ def _previewed(shards: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     return [shard for shard in shards if shard in chosen]
 
 
-def _facts(plan: Plan) -> dict[str, Any]:
+def dataset_facts(plan: Plan, added: Sequence[str]) -> dict[str, Any]:
     config, section = plan.config, plan.config.section(PackageConfig)
+    served = dict.fromkeys(task for stage in added for task in members()[stage].tasks(config))
     return {
         "name": config.name,
         "version": config.version,
@@ -187,7 +188,7 @@ def _facts(plan: Plan) -> dict[str, Any]:
         "creator": section.creator,
         "published": section.published,
         "tags": list(section.tags),
-        "task_categories": list(section.task_categories),
+        "task_categories": list(section.task_categories or served),
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -63,4 +63,24 @@ def _draw(members: Mapping[str, bytes], camera: Camera, size: int) -> ByteArray:
     return points_portrait(points.astype(np.float64), labels.astype(np.int32), camera, (size, size), "y")
 
 
-MEMBERS = Members(of=_members, fields=_fields, rows=lambda _: (PreviewRow("Points", _caption, _draw),))
+def _limits(config: Config) -> Sequence[str]:
+    if config.section(PointsConfig).surface == "visible":
+        return ("Points cover only what is seen from outside in 64 directions, without noise, unlike a scan.",)
+    return (
+        "Points cover the whole surface of every part, even where it is hidden inside another part, unlike a scan.",
+    )
+
+
+def _coordinates(config: Config) -> Sequence[str]:
+    if config.section(PointsConfig).normalize == "none":
+        return ("Points have the coordinates of the mesh.",)
+    return ("Points are moved and scaled: (coordinates of the mesh - `points.centre`) * `points.scale`.",)
+
+
+MEMBERS = Members(
+    of=_members,
+    fields=_fields,
+    rows=lambda _: (PreviewRow("Points", _caption, _draw),),
+    limits=_limits,
+    coordinates=_coordinates,
+)

@@ -47,6 +47,6 @@ LANGUAGE = Language(
     graphs=False,
     text="Its parameters as JSON.",
     rebuild=_rebuild,
-    coordinates="The unit is about a metre. Shapes are on the plane y = 0 around the y axis, with their front to +z; "
-    "lamps hang from that plane. The origin of a mesh is the middle of its bounding box, and poses only translate.",
+    coordinates="The origin and the unit of a shape are those of its program. The origin of a mesh is the middle of "
+    "its bounding box, and poses only translate.",
 )

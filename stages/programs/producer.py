@@ -18,6 +18,16 @@ def _card(plan: Plan) -> Sequence[str]:
     return [program_markdown(find_program(entry.program)).rstrip() for entry in programs]
 
 
+def _splits(config: Config) -> str:
+    text = "No two shapes of a program have equal parameters, within a split or across splits. "
+    if config.section(ProgramsConfig).sampled[0].mode == "all_values":
+        return text + "All splits have all values of all parameters, as published."
+    return text + (
+        "Samples that differ in continuous parameters alone are in one split where `split_by` in their lineage is "
+        "`structure`. Where it is `values`, the program has fewer structures than splits, and splits share structures."
+    )
+
+
 def _lineage(config: Config) -> Mapping[str, RecordField]:
     if config.section(ProgramsConfig).sampled[0].mode == "random":
         difference = "how splits differ: in `structure`, the discrete parameters, or in `values` of any parameters"
@@ -36,13 +46,10 @@ PRODUCER = Producer(
     language="program",
     keys="programs.program",
     is_requested=lambda config: bool(config.section(ProgramsConfig).sampled),
-    sentence="a program builds shapes from random parameters; the parameters of a shape are its `txt`.",
-    splits="There are no duplicates, within a split or across splits. In mode random, samples that differ in "
-    "continuous parameters alone are in one split if their `lineage` has `split_by: structure`. With `split_by: "
-    "values`, the program has fewer structures than splits, and shapes of one structure are in all of them. In mode "
-    "all_values, all splits have all values, as published.",
-    graphs_share_split=False,
+    sentence=lambda _: "a program builds shapes from random parameters; the parameters of a shape are its `txt`.",
+    splits=_splits,
+    graphs_share_split=lambda _: False,
     lineage=_lineage,
-    limits=("All shapes have the same parameters; shapes that the program cannot build are missing.",),
+    limits=lambda _: ("All shapes of a program have its parameters; shapes that it cannot build are missing.",),
     card=_card,
 )

@@ -213,7 +213,12 @@ def _split_groups(rows: Sequence[Mapping[str, Any]]) -> list[list[int]]:
     groups: dict[tuple[str, str], list[int]] = {}
     for number, row in enumerate(rows):
         groups.setdefault((row["kit"], row["graph"]), []).append(number)
-    return list(groups.values()) if len(groups) >= MIN_GRAPHS_PER_SPLITS else [[row] for row in range(len(rows))]
+    return list(groups.values()) if splits_by_layout(len(groups)) else [[row] for row in range(len(rows))]
+
+
+def splits_by_layout(layouts: int) -> bool:
+    """Return whether shapes of one layout share a split: where there are enough layouts for all splits."""
+    return layouts >= MIN_GRAPHS_PER_SPLITS
 
 
 def run_collection(task: Task) -> Outcome:

@@ -68,4 +68,10 @@ def _draw(members: Mapping[str, bytes], _: Camera, __: int) -> ByteArray:
     return np.asarray(Image.open(io.BytesIO(members["sketch0.png"])).convert("L"))
 
 
-MEMBERS = Members(of=_members, fields=_fields, rows=lambda _: (PreviewRow("Sketches", _caption, _draw),))
+MEMBERS = Members(
+    of=_members,
+    fields=_fields,
+    rows=lambda _: (PreviewRow("Sketches", _caption, _draw),),
+    checks=("drawings",),
+    tasks=lambda _: ("image-to-3d",),
+)

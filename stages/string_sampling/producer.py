@@ -74,14 +74,16 @@ PRODUCER = Producer(
     language="kit",
     keys="string_sampling.sources",
     is_requested=lambda config: bool(config.section(StringSamplingConfig).sources),
-    sentence="models trained on the strings of other shapes generate new strings. Each is instantiated part by part "
-    "with the dockings of its kit, and kept if its contacts, computed from the meshes, its neighbourhoods and "
-    "its dockings are those of the exemplars.",
-    splits="No two samples have the same shape graph. Similar shapes may be in different splits.",
-    graphs_share_split=True,
+    sentence=lambda _: (
+        "models trained on the strings of other shapes generate new strings. Each is instantiated part by part "
+        "with the dockings of its kit, and kept if its contacts, computed from the meshes, its neighbourhoods and "
+        "its dockings are those of the exemplars."
+    ),
+    splits=lambda _: "No two samples have the same shape graph. Similar shapes may be in different splits.",
+    graphs_share_split=lambda _: True,
     lineage=_lineage,
     origins=lambda plan: exemplar_origins(plan.config),
-    limits=(
+    limits=lambda _: (
         "All parts are those of the exemplars, and they dock as parts do there.",
         "A model generates shapes like its training shapes, which are of another dataset with other splits.",
     ),

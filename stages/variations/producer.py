@@ -141,25 +141,48 @@ def _lineage(_: Config) -> Mapping[str, RecordField]:
     }
 
 
+def _deforms(config: Config) -> bool:
+    """Return whether parts may be resized or moved on their own, so that dockings differ from the exemplars'."""
+    search = config.section(VariationsConfig).search
+    return search.deform or search.stretch.max_factor > 1
+
+
+def _sentence(config: Config) -> str:
+    exact = all(kit.grammar == "multiset" for kit in config.section(ExemplarsConfig).kits)
+    observed = "occurs in an exemplar" if exact else "is one that the grammar admits"
+    dockings = "" if _deforms(config) else ", and every docking of two parts occurs in an exemplar"
+    return (
+        "exemplar meshes are cut into parts, a tiling grammar is read off their contacts, and new shapes are made in "
+        f"which every neighbourhood {observed}{dockings}. A sample's `lineage.parents` are samples of its own split, "
+        "by their keys, and exemplars."
+    )
+
+
+def _limits(config: Config) -> Sequence[str]:
+    parts = (
+        "All parts are those of the exemplars, some of them resized or moved on their own (`deformed` in the lineage)."
+        if _deforms(config)
+        else "All parts are those of the exemplars, and they touch only as parts touch there."
+    )
+    return (
+        f"{parts} What is learnt from these kits may not hold for others.",
+        "A variant consists of pieces of its parents or grew from their neighbourhoods, and resembles them.",
+    )
+
+
 PRODUCER = Producer(
     language="kit",
     keys="exemplars.kits",
     is_requested=lambda config: bool(
         config.section(ExemplarsConfig).kits and config.section(VariationsConfig).samples_per_kit
     ),
-    sentence="exemplar meshes are cut into parts, a tiling grammar is read off their contacts, and new shapes are "
-    "made in which every neighbourhood and every docking of two parts occurs in an exemplar. A sample's "
-    "`lineage.parents` are samples of its own split, by their keys, and exemplars.",
-    splits="Samples with equal shape graphs are in one split.",
+    sentence=_sentence,
+    splits=lambda _: "Samples with equal shape graphs are in one split.",
     nearness=_splits,
-    graphs_share_split=True,
+    graphs_share_split=lambda _: True,
     lineage=_lineage,
     origins=lambda plan: exemplar_origins(plan.config),
-    limits=(
-        "All parts are those of the exemplars, and they touch only as parts touch there. What is learnt from these "
-        "kits may not hold for other castles, temples or tracks.",
-        "A variant consists of pieces of its parents or grew from their neighbourhoods, and resembles them.",
-    ),
+    limits=_limits,
     card=_card,
     variety=_variety,
     measures=_measures,

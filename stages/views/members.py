@@ -186,4 +186,9 @@ def picture(image: np.ndarray, kind: ImageKind) -> ByteArray:
     return np.rint(painted).astype(np.uint8)
 
 
-MEMBERS = Members(of=_members, fields=_fields, rows=_rows)
+def _tasks(config: Config) -> Sequence[str]:
+    shown = {"color", "drawing"} & set(config.section(ViewsConfig).images)
+    return ("image-to-3d",) if shown else ()
+
+
+MEMBERS = Members(of=_members, fields=_fields, rows=_rows, tasks=_tasks)

@@ -73,6 +73,10 @@ def _no_rows(_: Config) -> Sequence[PreviewRow]:
     return ()
 
 
+def _nothing_of(_: Config) -> Sequence[str]:
+    return ()
+
+
 def _nothing_to_say(_: Plan) -> Sequence[str]:
     return ()
 
@@ -89,6 +93,10 @@ class Members:
     columns: columns of the index by name
     rows: function of the config that returns the rows of the preview
     card: paragraphs and tables for the card's section on how the dataset was made, from finished records
+    limits: sentences on what not to expect of the members, for the card of a config
+    coordinates: sentences on the coordinates of the members, for the card of a config
+    checks: what only `make verify` checks of the members, for the card
+    tasks: Hugging Face task categories that the members serve, for the card of a config
     """
 
     of: Callable[[Config], tuple[Member, ...]]
@@ -96,3 +104,7 @@ class Members:
     columns: Mapping[str, IndexColumn] = field(default_factory=dict)
     rows: Callable[[Config], Sequence[PreviewRow]] = _no_rows
     card: Callable[[Plan], Sequence[str]] = _nothing_to_say
+    limits: Callable[[Config], Sequence[str]] = _nothing_of
+    coordinates: Callable[[Config], Sequence[str]] = _nothing_of
+    checks: tuple[str, ...] = ()
+    tasks: Callable[[Config], Sequence[str]] = _nothing_of

@@ -16,6 +16,10 @@ def _nothing_to_add(_: Plan) -> Sequence[str]:
     return ()
 
 
+def _no_limits(_: Config) -> Sequence[str]:
+    return ()
+
+
 def _no_lineage(_: Config) -> Mapping[str, RecordField]:
     return {}
 
@@ -39,10 +43,10 @@ class Producer:
     joins: whether its samples are those of all other producers that a config asks for
     keys: config keys that ask for them, for messages
     is_requested: whether a config asks for them
-    sentence: how its samples are made, for the card
-    splits: what keeps its splits apart, for the card
+    sentence: how its samples are made, for the card of a config
+    splits: what keeps its splits apart, for the card of a config
     graphs_share_split: whether samples of one graph always share a split
-    limits: sentences on what not to expect of the samples, for the card
+    limits: sentences on what not to expect of the samples, for the card of a config
     lineage: fields of `Sample.lineage` in addition to `method` and `parents`, by name; all samples of a dataset have
         the same fields of the same types, and no value is empty
     origins: files that its samples are made from, and who owns them
@@ -55,11 +59,11 @@ class Producer:
     language: str
     keys: str
     is_requested: Callable[[Config], bool]
-    sentence: str
-    splits: str
-    graphs_share_split: bool
+    sentence: Callable[[Config], str]
+    splits: Callable[[Config], str]
+    graphs_share_split: Callable[[Config], bool]
     joins: bool = False
-    limits: tuple[str, ...] = ()
+    limits: Callable[[Config], Sequence[str]] = _no_limits
     lineage: Callable[[Config], Mapping[str, RecordField]] = _no_lineage
     origins: Callable[[Plan], Sequence[Origin]] = _no_origins
     nearness: Callable[[Plan], Sequence[str]] = _nothing_to_add

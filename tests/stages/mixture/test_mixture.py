@@ -79,7 +79,7 @@ def test_samples_of_all_producers_are_mixed_and_counted(made: tuple[Path, tuple[
         assert f"{producer}: {kit}: {count} samples" in status
 
 
-def test_each_part_has_the_class_of_its_dataset_and_of_its_kit(made: tuple[Path, tuple[str, ...]]) -> None:
+def test_a_part_has_the_class_of_its_dataset_and_of_its_kit(made: tuple[Path, tuple[str, ...]]) -> None:
     rows = json.loads((made[0] / "mix" / "classes.json").read_text(encoding="utf-8"))
     own = {(kit, number): row for row in rows for kit, number in row["own"].items()}
     for record, members in records_of(made[0]):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.config import Config, StrictModel
+from pipeline.config import Config
 from pipeline.errors import Rejected
 from pipeline.paths import DatasetPaths
 from pipeline.run import run_stage
@@ -35,6 +35,7 @@ from stages.sketches.stage import drawings
 from stages.sketches.stage import plan as plan_sketches
 from stages.strings.settings import StringsConfig
 from stages.validity.stage import STAGE as VALIDITY
+from stages.variations.settings import VariationsConfig
 from stages.views.settings import RingCameras, ViewsConfig
 from stages.views.stage import STAGE as VIEWS
 from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
@@ -125,7 +126,7 @@ def toy_keys(split: str, shards: int = 4) -> list[str]:
     ]
 
 
-class ToyConfig(StrictModel):
+class ToyConfig(VariationsConfig):
     """Shards a split."""
 
     shards: int = 4

@@ -10,9 +10,9 @@ PRODUCER = Producer(
     language="heap",
     keys="pebbles.heaps",
     is_requested=lambda config: config.section(PebblesConfig).heaps > 0,
-    sentence="pebbles are thrown on a heap.",
-    splits="Every heap is thrown separately.",
-    graphs_share_split=False,
+    sentence=lambda _: "pebbles are thrown on a heap.",
+    splits=lambda _: "Every heap is thrown separately.",
+    graphs_share_split=lambda _: False,
     lineage=lambda _: {"drawn": RecordField({"type": "integer", "minimum": 0, "description": "which throw it was"})},
     card=lambda _: ["No pebble was harmed."],
 )
