@@ -81,7 +81,7 @@ RUN        = @$(SHAPEMILL) run $@ $(OPTIONS) $(RUNNING)
 # Making datasets ----------------------------------------------------------------------------------------------------
 
 .PHONY: dataset autoconfig exemplars variations proportions programs grammars program_sampling shapeassembly
-.PHONY: string_sampling mixture validity abstraction strings points sketches views package
+.PHONY: string_sampling primitives mixture validity abstraction strings points sketches views package
 dataset: setup  ## Make the dataset of CONFIG in OUT: whatever is missing or outdated
 	@$(SHAPEMILL) run $(OPTIONS) $(RUNNING)
 
@@ -103,7 +103,9 @@ shapeassembly: program_sampling  ## Make shapes from ShapeAssembly programs, or 
 	$(RUN)
 string_sampling: exemplars  ## Sample strings from trained models, and make shapes of them
 	$(RUN)
-PRODUCERS := variations proportions programs grammars shapeassembly string_sampling
+primitives: setup  ## Make heaps, stacks and attached compositions of simple solids
+	$(RUN)
+PRODUCERS := primitives variations proportions programs grammars shapeassembly string_sampling
 mixture: $(PRODUCERS)  ## Join the samples of several producers, if the config asks for it
 	$(RUN)
 validity: mixture  ## Check each shape: is it rooted, is it stable?

@@ -1,0 +1,1 @@
+"""Shapes of simple solids without a meaning: heaps, stacks, and solids attached to solids."""
