@@ -23,13 +23,13 @@ from stages.proportions.stage import CANDIDATES_PER_SAMPLE
 from stages.proportions.text import ProportionShapes, proportion_text
 from stages.proportions.warp import Lattice
 from stages.proportions.warp_check import warp_fault
+from stages.rows.kit_rows import KitRow, rows_of_kit
+from stages.rows.settings import RowsConfig
 from stages.shape.kit import Kit
 from stages.shape.physics.judge import unmet_requirement
 from stages.shape.physics.settings import Requirements
 from stages.shape.resolved_settings import FALLBACK_KEY, FALLBACK_STABLE_KEY, PROPORTIONS_FALLBACK, ROWS_FALLBACK
 from stages.shape.shape import Shape, kit_shape
-from stages.variations.rows.kit_rows import KitRow, rows_of_kit
-from stages.variations.settings import RowsConfig
 
 TRIAL_DRAWS = 36
 """Draws of a trial, of all exemplars together."""

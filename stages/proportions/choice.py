@@ -9,9 +9,9 @@ import numpy as np
 
 from stages.proportions.distinct_warps import DistinctWarps
 from stages.proportions.text import Proportions, ProportionShapes, Unwarped, read_proportions
+from stages.rows.changes import change_json
 from stages.shape.arrays import FloatArray
 from stages.shape.graphs.canonical import graph_digest
-from stages.variations.rows.changes import change_json
 
 
 def chosen_texts(

@@ -12,13 +12,12 @@ from stages.proportions.settings import ProportionsConfig
 from stages.proportions.text import Proportions, ProportionShapes, Unwarped
 from stages.proportions.warp import FACTOR_DECIMALS, Lattice, Warp
 from stages.proportions.warp_check import warp_fault
+from stages.rows.changes import Change
+from stages.rows.draws import LayoutDraws
+from stages.rows.settings import RowsConfig
+from stages.rows.turns import Turn
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.judge import unmet_requirement
-from stages.shape.physics.settings import Requirements
-from stages.variations.rows.changes import Change
-from stages.variations.rows.draws import LayoutDraws
-from stages.variations.rows.turns import Turn
-from stages.variations.settings import RowsConfig
 
 TRIES_PER_LAYOUT = 4
 """Draws of layouts for each one that is wanted."""
@@ -85,16 +84,13 @@ def drawn_layouts(
             reject("row: in more pieces than the exemplar")
             continue
         unwarped = shapes.unwarped_layout(layout)
-        fault = warp_fault(shapes.kit, unwarped.assembly, unwarped.shape) or _fault(config.require, unwarped)
+        fault = warp_fault(shapes.kit, unwarped.assembly, unwarped.shape)
+        fault = fault or unmet_requirement(config.require, unwarped.shape)
         if fault is not None:
             reject(f"row: {fault}")
             continue
         found.append(DrawnLayout(changes, unwarped, _distinct(unwarped, config)))
     return found if len(found) >= MIN_OTHER_LAYOUTS else [own, *found]
-
-
-def _fault(require: Requirements, unwarped: Unwarped) -> str | None:
-    return unmet_requirement(require, unwarped.shape)
 
 
 def _distinct(unwarped: Unwarped, config: ProportionsConfig) -> DistinctWarps:

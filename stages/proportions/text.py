@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.proportions.warp import Lattice, Warp, lattice_of, warped
+from stages.rows.changes import Change, change_json, changed, read_change
+from stages.rows.layout import Layout, layout_of
+from stages.rows.slabs import SlabError
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import Assembly, Exemplar, Kit
 from stages.shape.shape import Shape, kit_shape
-from stages.variations.rows.changes import Change, change_json, changed, read_change
-from stages.variations.rows.layout import Layout, layout_of
-from stages.variations.rows.slabs import SlabError
 
 AXES = ("x", "y", "z")
 ROWS_KEY = "rows"

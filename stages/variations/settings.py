@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from pipeline.config import StrictModel
+from stages.rows.settings import RowsConfig
 from stages.shape.collection.assignment import SplitConfig
 from stages.shape.physics.settings import PhysicsConfig, Requirements
 from stages.shape.resolved_settings import KEEP_TYPES_KEY, MAX_COPIED_SHARE_KEY, REQUIRED_LABELS_KEY, STABLE_KEY
@@ -177,36 +178,6 @@ class SelectionConfig(StrictModel):
         10_000,
         ge=1,
         description="Maximum number of variants of a kit selected farthest first; the rest are drawn at random.",
-    )
-
-
-class RowsConfig(StrictModel):
-    """How rows of congruent parts become longer and shorter."""
-
-    use: Literal["auto"] | bool = Field(
-        "auto",
-        description="Whether resized exemplars get longer and shorter rows. `auto`: where a short search finds almost "
-        "no other layouts (see `fallback`) and the exemplars have rows.",
-    )
-    min_count: float = Field(
-        0.5,
-        gt=0,
-        le=1,
-        description="Minimum length of a row, as a multiple of its length in the exemplar, rounded down to at least 1.",
-    )
-    max_count: float = Field(
-        2.0, ge=1, le=20, description="Maximum length of a row, as a multiple of its length in the exemplar."
-    )
-    max_changes: int = Field(3, ge=1, le=20, description="Maximum number of rows that one shape changes.")
-    size: Literal["keep", "grow"] = Field(
-        "keep",
-        description="Overall size of a shape with other rows. `keep`: its sides stay within `size_range`, and its "
-        "parts shrink or grow to fit. `grow`: parts and steps keep their sizes.",
-    )
-    size_range: tuple[Annotated[float, Field(gt=0, le=1)], Annotated[float, Field(ge=1)]] = Field(
-        (0.7, 1.5),
-        description="With `size: keep`: smallest and largest side of the box around a shape, as a multiple of that of "
-        "the exemplar.",
     )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from stages.proportions.warp import warped
+from stages.rows.spanning import _clipped
 from stages.shape.appearance import (
     NO_MATERIAL,
     Appearance,
@@ -22,7 +23,6 @@ from stages.shape.appearance import (
 from stages.shape.kit import Assembly
 from stages.shape.kit_files import load_kit, write_kit
 from stages.shape.shape import kit_shape
-from stages.variations.rows.spanning import _clipped
 from tests.stages.proportions.stools import kit, lattice, whole
 
 CHECKS = TextureImage.of(np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [9, 9, 9]]], np.uint8))

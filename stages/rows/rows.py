@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stages.rows.layout import Layout
+from stages.rows.slabs import RowChange, Slab
+from stages.rows.steps import ROUNDING_DECIMALS, Step, longest_row, steps_of
 from stages.shape.arrays import FloatArray
-from stages.variations.rows.layout import Layout
-from stages.variations.rows.slabs import RowChange, Slab
-from stages.variations.rows.steps import ROUNDING_DECIMALS, Step, longest_row, steps_of
 
 MIN_ROW = 2
 MAX_PLANES = 160

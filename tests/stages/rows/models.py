@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import trimesh
 
+from stages.rows.layout import Layout, layout_of
 from stages.shape.kit import Kit
-from stages.variations.rows.layout import Layout, layout_of
 from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose
 
 SHELF_BOARDS, BOARD_STEP = 5, 0.4

@@ -13,10 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
+from stages.rows.layout import Layout, sorted_edges, with_classes
+from stages.rows.spanning import Span
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.kit import PartMesh
-from stages.variations.rows.layout import Layout, sorted_edges, with_classes
-from stages.variations.rows.spanning import Span
 
 
 class SlabError(ValueError):
@@ -116,17 +116,20 @@ class Slab:
             return "a contact at the start of the slab does not recur at its end"
         into = np.where(self.mates >= 0, recurs[self.mates], False)
         lost = recurs[i] & ((within[j] & ~recurs[j]) | (before[j] & ~into[j]))
-        return "a copy would lack what each part of its row has" if self._is_missed(i[lost]) else None
+        is_missed = self._is_missed(i[lost], behind)
+        return "a copy would lack what each part of its row has" if is_missed else None
 
-    def _is_missed(self, parts: np.ndarray) -> bool:
-        """Return whether a part has fewer contacts than those a step before and after it, once those named are lost.
+    def _is_missed(self, parts: np.ndarray, gaining: np.ndarray) -> bool:
+        """Return whether a copy has fewer contacts than the parts a step before and after it.
 
-        parts: the part of each lost contact, int64 (k,)
+        parts: the part of each contact that its copy loses, int64 (k,)
+        gaining: the part of each contact that its copy gets with the copy before, int64 (k,)
         """
         degrees = np.bincount(self.layout.edges.ravel(), minlength=len(self.layout))
         beside = np.stack([self.mates, self.previous])
         minimum = np.where(beside >= 0, degrees[beside], len(self.layout)).min(axis=0)
-        left = degrees - np.bincount(parts, minlength=len(self.layout))
+        lost, gained = (np.bincount(listed, minlength=len(self.layout)) for listed in (parts, gaining))
+        left = degrees - lost + gained
         return bool((left[parts] < minimum[parts]).any())
 
     def removal_fault(self) -> str | None:

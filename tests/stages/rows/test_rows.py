@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 
 from stages.proportions.warp_check import warp_fault
+from stages.rows.changes import change_json, read_change
+from stages.rows.changes import changed as changed_by
+from stages.rows.draws import LayoutDraws
+from stages.rows.kit_rows import rows_of_kit
+from stages.rows.layout import Layout, LengthenedMesh
+from stages.rows.rows import Row, find_rows
+from stages.rows.settings import RowsConfig
+from stages.rows.slabs import RowChange, SlabError, repeat
+from stages.rows.steps import steps_of
+from stages.rows.turns import find_circles, turned
 from stages.shape.appearance import Appearance
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Kit, PartMesh
-from stages.variations.rows.changes import change_json, read_change
-from stages.variations.rows.changes import changed as changed_by
-from stages.variations.rows.draws import LayoutDraws
-from stages.variations.rows.kit_rows import rows_of_kit
-from stages.variations.rows.layout import Layout, LengthenedMesh
-from stages.variations.rows.rows import Row, find_rows
-from stages.variations.rows.slabs import RowChange, SlabError, repeat
-from stages.variations.rows.steps import steps_of
-from stages.variations.rows.turns import find_circles, turned
-from stages.variations.settings import RowsConfig
-from tests.stages.variations.rows import models
+from tests.stages.rows import models
 
 MODELS: dict[str, Callable[[], tuple[Kit, Layout]]] = {
     "shelf": models.shelf,

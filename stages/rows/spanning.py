@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
+from stages.rows.layout import VERTEX_REACH, LengthenedMesh
 from stages.shape.appearance import barycentric
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.kit import PartMesh
-from stages.variations.rows.layout import VERTEX_REACH, LengthenedMesh
 
 MAX_SLOPE = 2e-3
 """Largest cosine between a step and the normal of a face that is parallel to it."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stages.rows.layout import Layout
 from stages.shape.arrays import FloatArray
-from stages.variations.rows.layout import Layout
 
 MAX_STEP_SHARE = 0.75
 """Longest step, as a share of the box along its direction; a longer one joins the two ends of a shape, such as legs."""

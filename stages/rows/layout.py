@@ -170,16 +170,27 @@ def layout_of(kit: Kit, exemplar: Exemplar) -> Layout:
     from stages.shape.geometry.contact import ContactTest
 
     whole = exemplar.whole
-    edges = whole.edges
-    if len(exemplar.removed_hubs) or len(kit.contact_kinds) < 3:
-        edges = ContactTest(kit.types, kit.contact_tolerance).contacts(whole.types, whole.poses)
+    if not len(exemplar.removed_hubs) and len(kit.contact_kinds) == 3:
+        return _layout(kit, whole)
+    edges = ContactTest(kit.types, kit.contact_tolerance).contacts(whole.types, whole.poses)
+    return _layout(kit, replace(whole, edges=edges))
+
+
+def graph_layout(kit: Kit, exemplar: Exemplar) -> Layout:
+    """Return the layout of an exemplar as a search sees it: without hubs that were removed, and with the contacts that
+    count.
+    """
+    return _layout(kit, exemplar.assembly)
+
+
+def _layout(kit: Kit, assembly: Assembly) -> Layout:
     return Layout(
-        tuple(kit.types[kind] for kind in whole.types.tolist()),
-        whole.poses,
-        whole.types,
-        _classes(kit, whole),
-        np.arange(len(whole)),
-        edges,
+        tuple(kit.types[kind] for kind in assembly.types.tolist()),
+        assembly.poses,
+        assembly.types,
+        _classes(kit, assembly),
+        np.arange(len(assembly)),
+        assembly.edges,
         kit.contact_tolerance,
         MATE_TOLERANCES * max(kit.contact_tolerance, kit.pose_tolerance),
     )

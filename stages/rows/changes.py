@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from stages.variations.rows.layout import Layout
-from stages.variations.rows.slabs import RowChange, repeat
-from stages.variations.rows.turns import Turn, turned
+from stages.rows.layout import Layout
+from stages.rows.slabs import RowChange, repeat
+from stages.rows.turns import Turn, turned
 
 Change = RowChange | Turn
 
@@ -33,6 +34,16 @@ def change_json(change: Change) -> dict[str, Any]:
         "at": change.at,
         "times": change.times,
     }
+
+
+def changes_text(changes: Sequence[Change]) -> str:
+    """Return changes as the text of a JSON array."""
+    return json.dumps([change_json(change) for change in changes])
+
+
+def read_changes(text: str) -> list[Change]:
+    """Return changes from their text. Raises ValueError, TypeError or KeyError."""
+    return [read_change(stated) for stated in json.loads(text)]
 
 
 def read_change(stated: Mapping[str, Any]) -> Change:

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stages.variations.rows.changes import Change
-from stages.variations.rows.layout import Layout
-from stages.variations.rows.rows import Row, find_rows
-from stages.variations.rows.slabs import RowChange, SlabError, repeat
-from stages.variations.rows.steps import longest_row, steps_of
-from stages.variations.rows.turns import MIN_SECTORS, find_circles, turned
-from stages.variations.settings import RowsConfig
+from stages.rows.changes import Change
+from stages.rows.layout import Layout
+from stages.rows.rows import Row, find_rows
+from stages.rows.settings import RowsConfig
+from stages.rows.slabs import RowChange, SlabError, repeat
+from stages.rows.steps import longest_row, steps_of
+from stages.rows.turns import MIN_SECTORS, find_circles, turned
 
 MAX_PARTS_FACTOR = 4.0
 """Maximum number of parts of a layout, as a multiple of that of its exemplar."""
@@ -63,25 +63,31 @@ class LayoutDraws:
         rows = self._rows_of(layout)
         if not rows:
             return None
-        row: Row | None = rows[int(rng.integers(len(rows)))]
-        assert row is not None
+        row = rows[int(rng.integers(len(rows)))]
         least, most = self._limits[row.step]
         wanted = int(rng.integers(least, most + 1))
         if wanted > row.count and len(row.insertions):
             change = row.insertion(int(rng.integers(len(row.insertions))), wanted - row.count)
             longer = self._repeated(layout, change)
             return None if longer is None else ([change], longer)
+        return self._shortened(layout, row, wanted, rng)
+
+    def _shortened(
+        self, layout: Layout, row: Row, wanted: int, rng: np.random.Generator
+    ) -> tuple[list[RowChange], Layout] | None:
+        """Return a row with periods removed one by one until it has `wanted` parts, or as few as possible."""
         changes: list[RowChange] = []
-        while row is not None and wanted < row.count and len(row.removals):
+        while wanted < row.count and len(row.removals):
             change = row.removal(int(rng.integers(len(row.removals))))
             shorter = self._repeated(layout, change)
             if shorter is None:
                 break
             changes.append(change)
-            layout, count = shorter, row.count
-            row = next(
-                (other for other in self._rows_of(layout) if _same_row(other, row) and other.count < count), None
-            )
+            layout = shorter
+            same = [other for other in self._rows_of(layout) if _same_row(other, row) and other.count < row.count]
+            if not same:
+                break
+            row = same[0]
         return (changes, layout) if changes else None
 
     def _repeated(self, layout: Layout, change: RowChange) -> Layout | None:

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stages.rows.layout import MAX_ROTATION_DIFFERENCE, Layout, sorted_edges, with_classes
+from stages.rows.slabs import SlabError
+from stages.rows.steps import ROUNDING_DECIMALS
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartType
-from stages.variations.rows.layout import MAX_ROTATION_DIFFERENCE, Layout, sorted_edges, with_classes
-from stages.variations.rows.slabs import SlabError
-from stages.variations.rows.steps import ROUNDING_DECIMALS
 
 MIN_SECTORS = 3
 MIN_RADIUS_TOLERANCES = 10.0

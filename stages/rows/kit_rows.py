@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stages.rows.layout import Layout, layout_of
+from stages.rows.rows import Row, find_rows
+from stages.rows.turns import Circle, find_circles
 from stages.shape.kit import Kit
-from stages.variations.rows.layout import Layout, layout_of
-from stages.variations.rows.rows import Row, find_rows
-from stages.variations.rows.turns import Circle, find_circles
 
 MAX_LABELS_SHOWN = 3
 MAX_RATIO_DIFFERENCE = 0.02
