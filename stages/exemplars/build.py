@@ -15,6 +15,7 @@ from stages.exemplars.inferred_dockings import infer_dockings
 from stages.exemplars.model import Model
 from stages.exemplars.observed_grammar import observe_contacts, observe_grammar
 from stages.exemplars.read import read_parts
+from stages.exemplars.row_neighbourhoods import with_row_neighbourhoods
 from stages.exemplars.settings import KitConfig
 from stages.model_files.scene import UniqueNames
 from stages.shape.arrays import IntArray
@@ -128,6 +129,8 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
         one_surface=all(model.is_cut for model in models),
         unit="metre" if all(model.unit == 1.0 for model in models) else "unknown",
     )
+    if config.row_neighbourhoods:
+        kit = replace(kit, grammar=with_row_neighbourhoods(kit))
     return Observation(
         kit=kit,
         contacts=tuple(assembly.edges for assembly in touching),

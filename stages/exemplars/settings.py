@@ -167,6 +167,11 @@ class KitConfig(StrictModel):
         "for an observed state in each slot around a part, `slot_fillings` for each two slots also which are filled, "
         "`slot_pairs` for their states. `auto` takes the strictest under which a short search finds enough.",
     )
+    row_neighbourhoods: bool = Field(
+        True,
+        description="Whether the grammar also admits the neighbourhoods that exemplars have once their rows are longer "
+        "or shorter, such as that of the middle of a wall of three pieces where exemplars have two.",
+    )
     hubs: HubConfig = Field(
         default_factory=HubConfig,
         description="Part types with too many contacts for an exchange around them.",
