@@ -69,7 +69,8 @@ def _lineage(_: Config) -> Mapping[str, RecordField]:
                 "items": name,
                 "minItems": 1,
                 "description": "the two shapes whose pieces were exchanged, exemplars or names in the search; of a "
-                "grown shape the exemplars of its patterns, that of its first part first",
+                "grown shape the exemplars of its patterns, that of its first part first; of an exemplar with other "
+                "rows that exemplar",
             }
         ),
         "parts_from": RecordField({**counts, "description": "number of parts from each of made_of"}),
@@ -77,14 +78,14 @@ def _lineage(_: Config) -> Mapping[str, RecordField]:
             {
                 **counts,
                 "description": "boundary parts of the first of made_of, by their index there; of a grown shape the "
-                "part that it grew from",
+                "part that it grew from, and of one with other rows the part that its first one was",
             }
         ),
         "images": RecordField(
             {
                 **counts,
                 "description": "parts of the second of made_of that each boundary part came to lie on or, by "
-                "substitution, docked to; of a grown shape the index of its first part",
+                "substitution, docked to; of a grown shape, or one with other rows, the index of its first part",
             }
         ),
         "transform": RecordField(
@@ -94,7 +95,15 @@ def _lineage(_: Config) -> Mapping[str, RecordField]:
                 "minItems": 4,
                 "maxItems": 4,
                 "description": "rigid transform of the piece from the first of made_of to the second: the rows of a "
-                "rotation, then a translation, in the coordinates of the model files; a grown shape is not moved",
+                "rotation, then a translation, in the coordinates of the model files; a grown shape, or one with "
+                "other rows, is not moved",
+            }
+        ),
+        "rows": RecordField(
+            {
+                **name,
+                "description": "JSON array of the changes of the rows of made_of, one after another: periods inserted "
+                "or removed, or another number of sectors; `[]` for all other methods",
             }
         ),
         "repeats": RecordField(

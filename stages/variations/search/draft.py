@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from stages.shape.arrays import FloatArray
+from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.kit import Assembly
-from stages.variations.kernels.structs import N_BOUNDARY, N_EDGES, N_PARTS, Workspace
+from stages.variations.kernels.structs import N_BOUNDARY, N_EDGES, N_PARTS, TRY_NUMBER, KitTables, Workspace
+from stages.variations.kernels.variant_graph import place_boxes, set_edge
 from stages.variations.search.parents import Parent
 
 
@@ -52,6 +53,22 @@ def load_shape(ws: Workspace, shape: Parent) -> None:
     ws.label[i, j] = shape.labels[:, 0]
     ws.label[j, i] = shape.labels[:, 1]
     ws.counts[N_PARTS], ws.counts[N_EDGES] = len(assembly), len(assembly.edges)
+
+
+def start_draft(ws: Workspace, tables: KitTables, assembly: Assembly, labels: IntArray) -> None:
+    """Make an assembly the draft, with all of its contacts.
+
+    labels: int32 (m, 2), directed docking labels of its edges
+    """
+    parts = len(assembly)
+    ws.counts[TRY_NUMBER] += 1
+    ws.counts[N_PARTS], ws.counts[N_EDGES] = parts, 0
+    ws.types[:parts] = assembly.types
+    ws.rotations[:parts], ws.translations[:parts] = assembly.poses[:, :3, :3], assembly.poses[:, :3, 3]
+    ws.origin[:parts] = 2  # no contact between two shapes is left to be found
+    for (i, j), (there, back) in zip(assembly.edges.tolist(), labels.tolist(), strict=True):
+        set_edge(ws.stamp, ws.label, ws.edges, ws.counts, i, j, there, back)
+    place_boxes(tables.boxes, ws.types, ws.rotations, ws.translations, parts, ws.boxes)
 
 
 def draft_descent(ws: Workspace, method: str, a: Parent, b: Parent) -> tuple[np.ndarray, dict[str, Any]]:

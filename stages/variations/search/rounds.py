@@ -2,7 +2,8 @@
 
 A round of a kit has search shards `<kit>-r<round>-lane<k>` and one pool shard `<kit>-r<round>-pool`. Searches draw
 their parents from the pools of all earlier rounds. What a search does depends on its shard's name, which seeds its
-random streams, and never on who runs it.
+random streams, and never on who runs it. Searches of the first round begin with exemplars whose rows are longer or
+shorter.
 """
 
 from __future__ import annotations
@@ -45,10 +46,11 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
         name = f"{kit}-r{number:03d}"
         wanted = max(MIN_VARIANTS_PER_SHARD, -(-(target - state["novel"]) * 11 // (10 * searches)))
         wanted = min(wanted, max(MAX_VARIANTS_PER_SHARD, target // (TARGET_ROUNDS * searches)))
+        rows = 0 if number else math.ceil(config.rows.pool_share * wanted)
         round_shards = [
             Shard(
                 search_name(name, k),
-                {"job": "search", "kit": kit, "wanted": wanted, **required},
+                {"job": "search", "kit": kit, "wanted": wanted, "rows": rows, **required},
                 (f"exemplars/{kit}", *inputs),
                 code=tuple(module_of(constraint) for constraint in config.require.constraints),
             )

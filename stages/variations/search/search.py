@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
 from stages.variations.requirements.identity import out_of_bounds
 from stages.variations.search.operator_selection import TRIES_PER_PLAN, TRY_WORK, OperatorSelector, PlannedTry
 from stages.variations.search.parents import Parent, Parents
+from stages.variations.search.row_variants import RowVariants
 from stages.variations.search.variant import EARLY_REASONS, NEW_VARIANT, OUT_OF_PROPORTION, Variant
 from stages.variations.search.variant_maker import VariantMaker
 from stages.variations.settings import SearchConfig
@@ -29,6 +30,8 @@ RESERVE_FACTOR = 4
 """A search ends at this many times the variants that it looks for, even if few of them add to the archive."""
 KNOWN_HISTOGRAM_GAIN = 0.2
 """Gain of a new variant with a known histogram; one with a new histogram has gain 1."""
+MAX_ROW_DRAWS_IN_VAIN = 24
+"""Draws of rows without a new variant after which no more are made."""
 MIN_BATCHES_IN_VAIN = 16
 STEPPING_STONE_GAIN = 0.1
 """Gain of a new variant that does not keep the shares."""
@@ -85,8 +88,33 @@ class Search:
         """Add a parent."""
         self.parents.adopt(rng, parent, self.archive)
 
+    def with_rows(self, rng: np.random.Generator, rows: RowVariants, wanted: int, name: str) -> list[Variant]:
+        """Return at most `wanted` new variants that are exemplars with longer or shorter rows.
+
+        They are parents of what `run` finds, and lineages call them `<name>-<number>`.
+        """
+        found: list[Variant] = []
+        in_vain = 0
+        while rows and len(found) < wanted and in_vain < MAX_ROW_DRAWS_IN_VAIN:
+            in_vain += 1
+            changed = rows.draw(rng)
+            result = changed if isinstance(changed, str) else self.maker.with_rows(changed)
+            if isinstance(result, str):
+                self.rejects[result] += 1
+                continue
+            in_vain = 0
+            found.append(replace(result, number=len(found)))
+            self._keep(rng, found[-1], f"{name}-{found[-1].number}", keeps=True)
+        return found
+
     def run(
-        self, rng: np.random.Generator, tries: int, wanted: int, name: str, progress: Callable[[int], None]
+        self,
+        rng: np.random.Generator,
+        tries: int,
+        wanted: int,
+        name: str,
+        progress: Callable[[int], None],
+        known: Sequence[Variant] = (),
     ) -> tuple[list[Variant], int]:
         """Search for `wanted` new variants that add to the archive; return all new variants and the number of tries.
 
@@ -97,8 +125,9 @@ class Search:
         are stepping stones: parents of others that may keep them. They are refused early, except in every second batch
         of tries after MIN_BATCHES_IN_VAIN batches that found nothing but near copies.
         progress: is told how many there are
+        known: what `with_rows` found, which is returned first
         """
-        found: list[Variant] = []
+        found = list(known)
         novel, kept, number = 0, 0, 0
         while number < tries and novel < wanted and kept < RESERVE_FACTOR * wanted:
             batch = self.operators.plan(rng, self.parents, self.archive, min(TRIES_PER_PLAN, tries - number))
@@ -125,7 +154,9 @@ class Search:
                 kept += keeps
                 if keeps and result.lineage["copied"]["share"] <= NEAR_COPY_SHARE:
                     self._batches_in_vain = 0
-                if self._keep(rng, result, planned, work, f"{name}-{result.number}", keeps) and keeps:
+                gain = self._keep(rng, result, f"{name}-{result.number}", keeps)
+                self.operators.learn(planned, gain, work)
+                if gain and keeps:
                     novel += 1
                     progress(novel)
                 if novel >= wanted or kept >= RESERVE_FACTOR * wanted:
@@ -155,21 +186,18 @@ class Search:
             self.crossings[result if isinstance(result, str) else NEW_VARIANT] += 1
         return result, 1.0 if isinstance(result, str) and result in EARLY_REASONS else JOINED_TRY_WORK, planned
 
-    def _keep(
-        self, rng: np.random.Generator, variant: Variant, planned: PlannedTry, work: float, name: str, keeps: bool
-    ) -> bool:
-        """Count a new variant, and make it a parent where it adds to the archive; return whether it does.
+    def _keep(self, rng: np.random.Generator, variant: Variant, name: str, keeps: bool) -> float:
+        """Count a new variant, and make it a parent where it adds to the archive; return its gain, 0 where it does not.
 
         keeps: whether it keeps the shares; otherwise it gains less
         """
         self.maker.remember(variant.assembly.types, variant.graph, variant.docked)
         full = self.archive.is_full(variant.cell, variant.histogram)
         gain = KNOWN_HISTOGRAM_GAIN if self.archive.has_histogram(variant.histogram) else 1.0
-        self.operators.learn(planned, 0.0 if full else gain if keeps else STEPPING_STONE_GAIN, work)
         place = self.archive.add(variant.cell, variant.histogram)
         if full and self.config.novelty.guided:
             self.reserve += keeps
-            return False
+            return 0.0
         if variant.assembly.stretches is None:  # no exemplar shows how stretched parts dock
             self.adopt(rng, self.parent(name, variant.assembly, variant.origins, place, variant.labels))
-        return True
+        return gain if keeps else STEPPING_STONE_GAIN

@@ -22,6 +22,7 @@ from stages.variations.requirements.hub_restoration import HUBS_NOT_RESTORED, au
 from stages.variations.requirements.identity import common_labels, share_bounds
 from stages.variations.requirements.required_labels import LABELS_MISSING, labels_test
 from stages.variations.search.pool import PoolIndex, write_variants
+from stages.variations.search.row_variants import RowVariants
 from stages.variations.search.search import Search
 from stages.variations.search.variant import OUT_OF_PROPORTION, Variant
 from stages.variations.settings import VariationsConfig
@@ -45,9 +46,15 @@ def run_search(task: Task) -> Outcome:
         if assembly.stretches is not None:  # no exemplar shows how stretched parts dock
             continue
         search.adopt(rng, search.parent(found.name_of(index), assembly, origins, (place[0], place[1]), labels))
-    wanted = task.shard.params["wanted"]
+    name, wanted, rows = task.shard.name, task.shard.params["wanted"], RowVariants(kit, section.rows)
+    with_rows = search.with_rows(task.rng("rows"), rows, task.shard.params["rows"], name)
     variants, tries = search.run(
-        rng, config.tries_per_round, wanted, task.shard.name, lambda count: task.progress(count, wanted)
+        rng,
+        config.tries_per_round,
+        wanted - len(with_rows),
+        name,
+        lambda count: task.progress(count, wanted),
+        with_rows,
     )
     in_shares = [variant for variant in variants if search.keeps_shares(variant.assembly)]
     if len(in_shares) < len(variants):

@@ -1,4 +1,4 @@
-"""One try of an operator (exchange, substitution, replacement, growth) and the tests that every variant must pass."""
+"""One try of an operator (exchange, substitution, replacement, growth, rows), and what every variant must pass."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from stages.rows.changes import changes_text
 from stages.shape.arrays import Float32Array, FloatArray
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
@@ -29,9 +30,17 @@ from stages.variations.novelty.archive import Cell, cell_of
 from stages.variations.novelty.copied_pieces import CopyDetector
 from stages.variations.novelty.features import FeatureExtractor, material_shares
 from stages.variations.requirements.stretched_contacts import broken_contact
-from stages.variations.search.draft import draft_assembly, draft_descent, draft_poses, is_connected, load_shape
+from stages.variations.search.draft import (
+    draft_assembly,
+    draft_descent,
+    draft_poses,
+    is_connected,
+    load_shape,
+    start_draft,
+)
 from stages.variations.search.operator_selection import PlannedTry
 from stages.variations.search.parents import Parent
+from stages.variations.search.row_variants import ChangedRows
 from stages.variations.search.variant import (
     DISCONNECTED,
     DUPLICATE,
@@ -51,6 +60,8 @@ from stages.variations.substructures.replacer import Replacer
 
 ANY_SHARE = (0.0, np.inf)
 """Bounds of a label that is free."""
+NOT_MOVED = [*np.eye(3).tolist(), [0.0, 0.0, 0.0]]
+"""The transform of lineages in which no piece moves."""
 
 
 class VariantMaker:
@@ -247,11 +258,38 @@ class VariantMaker:
             "parts_from": counts[used].tolist(),
             "boundary": [part],
             "images": [0],
-            "transform": [*np.eye(3).tolist(), [0.0, 0.0, 0.0]],
+            "transform": NOT_MOVED,
             "repeats": 1,
             "deformed": False,
         }
         return self._finished(int(key), origins, lineage), work
+
+    def with_rows(self, changed: ChangedRows) -> Variant | str:
+        """Return an exemplar with other rows as a new variant, or the reason for a failure."""
+        assembly, number = changed.assembly, changed.exemplar
+        if len(assembly) > self.max_parts:
+            return f"rows: {REASONS[Outcome.TOO_LARGE]}"
+        if len(assembly) < self.min_parts:
+            return f"rows: {REASONS[Outcome.TOO_SMALL]}"
+        labels = self.oracle.dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
+        start_draft(self.ws, self.tables, assembly, labels)
+        outcome, key = complete(self.tables, self.oracle.table, self.ws, self._with_labels)
+        if outcome != Outcome.OK:
+            return f"rows: {REASONS[outcome]}"
+        if not is_connected(self.ws):
+            return DISCONNECTED
+        lineage = {
+            "method": "rows",
+            "parents": [self.kit.exemplars[number].name],
+            "parts_from": [len(assembly)],
+            "boundary": [int(changed.origins[0])],
+            "images": [0],
+            "transform": NOT_MOVED,
+            "repeats": 1,
+            "deformed": False,
+            "rows": changes_text(changed.changes),
+        }
+        return self._finished(int(key), np.full(len(assembly), number, dtype=np.int8), lineage)
 
     def _finished(self, key: int, origins: np.ndarray, lineage: dict[str, Any]) -> Variant | str:
         """Return the draft, with parts from the exemplars `origins`, as a new variant, or why it is refused."""

@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Task
 from stages.exemplars.settings import ExemplarsConfig
+from stages.rows.changes import changes_text
 from stages.shape.collection.assignment import SPLITS
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.sample import Sample, write_sample
@@ -81,6 +82,7 @@ def _sample(
             **described,
             "parents": parents,
             "made_of": described["parents"],
+            "rows": described.get("rows", changes_text(())),
             "restored_hubs": added,
             "turned_degrees": round(-degrees % 360, 6),
         },
