@@ -2,40 +2,42 @@
 
 from __future__ import annotations
 
-import io
-from typing import Any
+import tempfile
+from pathlib import Path
 
 import numpy as np
 
+from stages.model_files.enclosure import Enclosure
+from stages.model_files.gltf import read_gltf
+from stages.model_files.scene import Surface
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
-from stages.shape.views.palette import linear_to_srgb
 
 
 def glb_shape(content: bytes) -> Shape:
-    """Return the parts in a sample's member `glb`: names, meshes, poses, and colours within 2 of 255; y up.
+    """Return the parts in a sample's member `glb`: names, meshes, poses, looks, and colours within 2 of 255; y up.
 
     The shape has no contacts: these are in the sample's `json`.
     """
-    import trimesh
-
-    scene = trimesh.load_scene(io.BytesIO(content), file_type="glb", process=False)
-    names = sorted(scene.graph.nodes_geometry)
-    placed = [scene.graph.get(name) for name in names]
-    label_of = {geometry: name.rpartition(".")[0] or name for name, (_, geometry) in zip(names, placed, strict=True)}
-    geometries = list(label_of)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "sample.glb"
+        path.write_bytes(content)
+        scene = read_gltf(path, Enclosure(path))
+    label_of: dict[int, str] = {}
+    for placement in scene.placements:
+        label_of.setdefault(placement.surface, placement.name.rpartition(".")[0] or placement.name)
     assembly = Assembly(
-        types=np.array([geometries.index(geometry) for _, geometry in placed], dtype=np.int16),
-        poses=np.array([pose for pose, _ in placed], dtype=np.float64),
+        types=np.array([placement.surface for placement in scene.placements], dtype=np.int16),
+        poses=np.array([placement.pose for placement in scene.placements], dtype=np.float64),
         edges=np.empty((0, 2), dtype=np.int32),
     )
-    meshes = tuple(_part_mesh(label_of[geometry], scene.geometry[geometry]) for geometry in geometries)
-    return Shape(meshes, assembly, "y", tuple(dict.fromkeys(label_of.values())), tuple(names))
+    meshes = tuple(_part_mesh(label_of[number], surface) for number, surface in enumerate(scene.surfaces))
+    names = tuple(placement.name for placement in scene.placements)
+    return Shape(meshes, assembly, "y", tuple(dict.fromkeys(label_of.values())), names)
 
 
-def _part_mesh(label: str, mesh: Any) -> PartMesh:
-    # The file has a vertex for each of its colours, so the first corner of a face has the colour of the face.
-    vertices, index = np.unique(np.asarray(mesh.vertices, dtype=np.float64), axis=0, return_inverse=True)
-    faces = np.asarray(mesh.faces)
-    linear = np.asarray(mesh.visual.vertex_colors, dtype=np.float64)[faces[:, 0], :3] / 255.0
-    return PartMesh(label, vertices, index.reshape(-1)[faces].astype(np.int32), linear_to_srgb(linear))
+def _part_mesh(label: str, surface: Surface) -> PartMesh:
+    # The file has a vertex for each of its colours and texture coordinates.
+    vertices, index = np.unique(surface.vertices, axis=0, return_inverse=True)
+    faces = index.reshape(-1)[surface.faces].astype(np.int32)
+    return PartMesh(label, vertices, faces, surface.face_colors, appearance=surface.appearance)

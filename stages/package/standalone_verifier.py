@@ -330,9 +330,12 @@ def geometry_faults(
         if any(extras[name].get(fact) != part[fact] for fact in ("class", "instance")):
             yield f"{name}: the GLB says {extras[name]}, the record class {part['class']}"
         matrix, geometry = scene.graph.get(name)
+        # trimesh makes the primitives of a part with several materials nodes below its node
+        below = scene.graph.transforms.children.get(name, []) if geometry is None else [name]
+        primitives = [scene.geometry[scene.graph.get(node)[1]].triangles for node in below]
         if "pose" in part and np.abs(matrix - np.array(part["pose"])).max() > POSE_TOLERANCE_SHARE * max(diagonal, 1):
             yield f"{name}: its pose in the GLB is not that of the record"
-        triangles.append(np.array(scene.geometry[geometry].triangles) @ matrix[:3, :3].T + matrix[:3, 3])
+        triangles.append(np.concatenate(primitives) @ matrix[:3, :3].T + matrix[:3, 3])
     if len(extras) != len(record["parts"]):
         yield f"the GLB has {len(extras)} parts, the record {len(record['parts'])}"
     corners = np.concatenate(triangles).reshape(-1, 3)

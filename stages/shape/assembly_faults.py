@@ -128,8 +128,17 @@ def _parts_of(content: bytes, names: Sequence[str]) -> tuple[list[Any], FloatArr
     import trimesh
 
     scene = trimesh.load_scene(io.BytesIO(content), file_type="glb", process=False)
-    placed = [scene.graph.get(name) for name in names]
-    return [scene.geometry[geometry] for _, geometry in placed], np.array([pose for pose, _ in placed], dtype=float)
+    meshes: dict[tuple[Any, ...], Any] = {}
+    parts = []
+    for name in names:
+        own = scene.graph.get(name)[1]
+        # trimesh makes the primitives of a part with several materials nodes below its node
+        below = scene.graph.transforms.children.get(name, []) if own is None else []
+        key = tuple(scene.graph.get(node)[1] for node in below) or (own,)
+        if key not in meshes:
+            meshes[key] = trimesh.util.concatenate([scene.geometry[geometry] for geometry in key])
+        parts.append(meshes[key])
+    return parts, np.array([scene.graph.get(name)[0] for name in names], dtype=float)
 
 
 def _world_box(mesh: Any, pose: FloatArray) -> FloatArray:
