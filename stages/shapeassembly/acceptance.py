@@ -9,6 +9,7 @@ from typing import Any
 from pipeline.errors import Rejected
 from pipeline.stage import Task
 from stages.shape.physics.judge import unmet_requirement
+from stages.shape.physics.settings import Requirements
 from stages.shapeassembly.analysis.structure import signature
 from stages.shapeassembly.editing.edits import edit_program
 from stages.shapeassembly.execution.interpreter import execute
@@ -68,13 +69,22 @@ def accepted_rows(task: Task, config: ShapeAssemblyConfig, rejected: Counter[str
 
 
 def _texts(task: Task, config: ShapeAssemblyConfig) -> Iterator[tuple[str, str, str]]:
-    """Yield kit, name and text of each program: those read, those extracted, and those sampled from models."""
+    """Yield kit, name and text of each program: read, extracted, drawn at random, or sampled from a model."""
     for source in config.programs:
         for name, text in program_texts(source.path, source.folder):
             if name not in source.lists.values():
                 yield source.name, name, text
     for program in read_program_texts(task):
         yield program.kit, program.name, program.text
+
+
+def accepted_text(text: str, config: ShapeAssemblyConfig, require: Requirements) -> str:
+    """Return the canonical text of a program. Raises ProgramError or Rejected where it does not pass.
+
+    require: physical requirements in place of the config's
+    """
+    accepted: str = _row(text, config.model_copy(update={"require": require}))["text"]
+    return accepted
 
 
 def _row(text: str, config: ShapeAssemblyConfig) -> dict[str, Any]:

@@ -15,6 +15,7 @@ def _sentence(config: Config) -> str:
         "edited": any(files.edits for files in section.programs),
         "extracted from part hierarchies": section.hierarchies,
         "sampled from trained models": section.sampled,
+        "drawn at random": section.random,
     }
     listed = ", ".join(origin for origin, used in origins.items() if used)
     return f"ShapeAssembly programs ({listed}) are executed; a shape's program is its `txt`."
@@ -31,13 +32,14 @@ def _splits(config: Config) -> str:
         return own
     text = f"The splits of {', '.join(names)} are published lists."
     section = config.section(ShapeAssemblyConfig)
-    others = len(section.programs) + len(section.hierarchies) + len(section.sampled) > len(names)
+    entries = (*section.programs, *section.hierarchies, *section.sampled, *section.random)
+    others = len(entries) > len(names)
     return f"{text} Of the others: {own}" if others else text
 
 
 PRODUCER = Producer(
     language="shapeassembly",
-    keys="shapeassembly.programs, hierarchies or sampled",
+    keys="shapeassembly.programs, hierarchies, sampled or random",
     is_requested=lambda config: config.section(ShapeAssemblyConfig).has_sources,
     sentence=_sentence,
     origins=program_origins,

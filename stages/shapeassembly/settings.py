@@ -80,6 +80,17 @@ class SampledPrograms(NamedFiles):
         return f"{self.dataset}-models/{self.model}-{self.kit}-{self.seed}"
 
 
+class RandomPrograms(NamedFiles):
+    """Programs that are drawn at random, without a model and without examples."""
+
+    samples: int = Field(ge=1, le=10_000_000, description="Programs to draw that pass every check.")
+    max_levels: int = Field(3, ge=1, le=6, description="Maximum depth of assemblies within assemblies.")
+    expanded: float = Field(
+        0.5, ge=0, le=1, description="Probability that a cuboid that is large enough becomes an assembly."
+    )
+    stable: bool = Field(True, description="Whether each shape must stand and bear small pushes.")
+
+
 class ShapeAssemblyConfig(StrictModel):
     """Shapes from ShapeAssembly programs."""
 
@@ -90,6 +101,9 @@ class ShapeAssemblyConfig(StrictModel):
         (), description="Part hierarchies from which programs are extracted."
     )
     sampled: tuple[SampledPrograms, ...] = Field((), description="Trained models to sample programs from.")
+    random: tuple[RandomPrograms, ...] = Field(
+        (), description="Random programs: plates on posts, layers, rows and shelves, within each other."
+    )
     extraction: Gates = Field(default_factory=Gates, description="Quality gates of extracted programs.")
     cleaning: Cleaning = Field(default_factory=Cleaning, description="Cleaning of hierarchies before extraction.")
     accept: Literal["executable", "valid"] = Field(
@@ -113,12 +127,14 @@ class ShapeAssemblyConfig(StrictModel):
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
-        names = [entry.name for entry in (*self.programs, *self.hierarchies, *self.sampled)]
+        names = [entry.name for entry in (*self.programs, *self.hierarchies, *self.sampled, *self.random)]
         if len(set(names)) < len(names):
-            raise ValueError(f"two entries of programs, hierarchies and sampled have one name: {', '.join(names)}")
+            raise ValueError(
+                f"two entries of programs, hierarchies, sampled and random have one name: {', '.join(names)}"
+            )
         return self
 
     @property
     def has_sources(self) -> bool:
         """Whether the dataset is made of programs."""
-        return bool(self.programs or self.hierarchies or self.sampled)
+        return bool(self.programs or self.hierarchies or self.sampled or self.random)

@@ -1,8 +1,8 @@
 """Stage `shapeassembly`: from ShapeAssembly programs to the shards `<dataset>-<split>-<index>.tar`.
 
-The first shards extract programs from part hierarchies, if there are any. The assignment reads all programs, those of
-stage `program_sampling` included, rejects invalid ones, and gives each a split and shard. A sample has no meshes: its
-text is the canonical program, executed by `stages.shapeassembly.shape.shape_of_text`.
+The first shards extract programs from part hierarchies and draw random ones, if the config asks for any. The assignment
+reads all programs, those of stage `program_sampling` included, rejects invalid ones, and gives each a split and shard.
+A sample has no meshes: its text is the canonical program, executed by `stages.shapeassembly.shape.shape_of_text`.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from stages.shape.collection.origin import missing_licenses
 from stages.shapeassembly.extraction.shards import extraction_shards, run_extraction
 from stages.shapeassembly.language import ProgramDecoder, assignment_name
 from stages.shapeassembly.origins import program_origins
+from stages.shapeassembly.random_programs import random_shards, run_random
 from stages.shapeassembly.settings import ShapeAssemblyConfig
 from stages.shapeassembly.sources import program_texts, source_digest
 from stages.shapeassembly.splits import splits_of
@@ -35,7 +36,7 @@ def planned_shards(plan: Plan) -> list[Shard]:
     config = plan.config.section(ShapeAssemblyConfig)
     if not config.has_sources:
         return []
-    extraction = extraction_shards(plan.config.name, config.hierarchies)
+    extraction = _first_shards(plan.config)
     summaries = [plan.summary("shapeassembly", shard.name) for shard in extraction]
     if None in summaries:
         return extraction
@@ -53,8 +54,16 @@ def planned_shards(plan: Plan) -> list[Shard]:
     return [*extraction, assignment, *collection]
 
 
+def _first_shards(config: Config) -> list[Shard]:
+    """Return the shards that make programs: those of the extraction, then those of random programs."""
+    section = config.section(ShapeAssemblyConfig)
+    return [*extraction_shards(config.name, section.hierarchies), *random_shards(config.name, section.random)]
+
+
 def run_shard(task: Task) -> Outcome:
-    """Run a shard of the extraction, the assignment, or a shard of the collection."""
+    """Run a shard of the extraction or of random programs, the assignment, or a shard of the collection."""
+    if task.shard.params["job"] == "random":
+        return run_random(task)
     if task.shard.params["job"] == "extraction":
         config = task.config.section(ShapeAssemblyConfig)
         return run_extraction(task, config.hierarchies, config.extraction, config.cleaning)
@@ -107,7 +116,7 @@ def report(plan: Plan) -> Sequence[str]:
     summary = plan.summary("shapeassembly", name) if config.has_sources else None
     if summary is None:
         return []
-    extraction = [shard.name for shard in extraction_shards(plan.config.name, config.hierarchies)]
+    extraction = [shard.name for shard in _first_shards(plan.config)]
     counts = ", ".join(f"{count:,} {kit}" for kit, count in summary["programs"].items())
     rejected: Counter[str] = Counter()
     for shard in (*extraction, name):
@@ -133,7 +142,7 @@ def requested_samples(config: Config) -> Sequence[int]:
         (1 + files.edits) * sum(1 for _ in program_texts(files.path, files.folder)) for files in section.programs
     )
     total += sum(len(files.source) for files in section.hierarchies)
-    total += sum(model.samples for model in section.sampled)
+    total += sum(model.samples for model in section.sampled) + sum(source.samples for source in section.random)
     return section.splits.shard_sizes(total)
 
 
@@ -142,7 +151,8 @@ def trial_config(config: Config) -> ShapeAssemblyConfig:
     section = config.section(ShapeAssemblyConfig)
     sampled = tuple(model.model_copy(update={"samples": min(model.samples, 16)}) for model in section.sampled)
     programs = tuple(files.model_copy(update={"edits": min(files.edits, 1)}) for files in section.programs)
-    update = {"splits": section.splits.for_trial(), "programs": programs, "sampled": sampled}
+    random = tuple(source.model_copy(update={"samples": min(source.samples, 16)}) for source in section.random)
+    update = {"splits": section.splits.for_trial(), "programs": programs, "sampled": sampled, "random": random}
     return section.model_copy(update=update)
 
 

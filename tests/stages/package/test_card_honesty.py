@@ -45,6 +45,7 @@ PRODUCERS: tuple[Sections, ...] = (
     },
     {"shapeassembly": {"programs": [PROGRAMS]}},
     {"shapeassembly": {"programs": [{**PROGRAMS, "edits": 3}]}},
+    {"shapeassembly": {"random": [{"name": "random", "samples": 3}]}},
     LISTED,
     BOTH,
     {"grammars": {"models": [TOWNHOUSE]}},
@@ -202,7 +203,8 @@ CONDITIONS: tuple[tuple[str, Callable[[Config], bool]], ...] = (
     ("Splits share exemplars", lambda c: uses(c, "proportions")),
     ("lowest point is as high as in the exemplar", lambda c: uses(c, "proportions")),
     ("poses do not rotate", lambda c: uses(c, "proportions")),
-    ("ShapeAssembly programs (given)", lambda c: uses(c, "shapeassembly") and not edited(c)),
+    ("ShapeAssembly programs (given)", lambda c: bool(section(c, "shapeassembly").programs) and not edited(c)),
+    ("ShapeAssembly programs (drawn at random)", lambda c: bool(section(c, "shapeassembly").random)),
     ("ShapeAssembly programs (given, edited)", lambda c: uses(c, "shapeassembly") and edited(c)),
     ("All parts are cuboids", lambda c: uses(c, "shapeassembly")),
     ("The splits of furniture are published lists", has_lists),
@@ -262,7 +264,8 @@ def edited(config: Config) -> bool:
 
 
 def all_listed(config: Config) -> bool:
-    return all(files.lists for files in section(config, "shapeassembly").programs)
+    files = section(config, "shapeassembly")
+    return all(entry.lists for entry in files.programs) and not files.random
 
 
 @pytest.mark.parametrize("of_members", range(len(MEMBERS)))

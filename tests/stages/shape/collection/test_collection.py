@@ -156,7 +156,7 @@ def test_a_config_that_makes_no_shapes_is_refused(tmp_path: Path) -> None:
     assert code == 2
     ways = (
         "programs.program",
-        "shapeassembly.programs, hierarchies or sampled",
+        "shapeassembly.programs, hierarchies, sampled or random",
         "string_sampling.sources",
         "exemplars.kits",
     )
