@@ -81,11 +81,12 @@ def split_assemblies(run: DatasetRun, kit: str, split: str) -> Iterator[Assembly
     """
     if run.config.keep == "dataset":
         raise ConfigError("the shapes were pruned; set keep: all in the config, and make dataset")
-    for producer in producers():
+    joined = [name for name, declared in producers().items() if declared.joins and declared.is_requested(run.config)]
+    for producer in joined or producers():
         folder = run.paths.stage(producer).root
         for shard in sorted(folder.glob(f"{run.config.name}-{split}-*.tar")):
             assemblies = (sample.assembly for sample in read_samples(shard) if sample.kit == kit)
-            yield from (assembly for assembly in assemblies if assembly.stretches is None)
+            yield from (assembly for assembly in assemblies if len(assembly) and assembly.stretches is None)
 
 
 def score_model(

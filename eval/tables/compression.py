@@ -25,6 +25,8 @@ def _compute(run: DatasetRun, _: NoOptions) -> TableResult:
     for shard in sorted((run.folder / "data").glob("*/*.tar")):
         for _key, members in read_shard(shard):
             record = json.loads(members["json"])
+            if record["language"] != LANGUAGE.name:
+                continue
             shape = shape_of(record, pairs_of(members[CONTACTS]))
             if not shape.is_stretched:
                 sample = StoredSample(shape.assembly, members["json"], members["glb"])

@@ -96,14 +96,14 @@ def describe_space(space: CategorySpace) -> dict[str, Any]:
 def _shapes(task: Task, split: str) -> Iterator[tuple[str, Assembly]]:
     """Yield key and assembly of each shape of the kit in a split.
 
-    Stretched shapes are left out: their contacts have no category.
+    Stretched shapes are left out: their contacts have no category. So are samples of other producers, without assembly.
     """
     params = task.shard.params
     shards = [shard for shard, of in params["splits"].items() if of == split]
     for done, shard in enumerate(shards):
         for sample in read_samples(task.input(params["producer"], f"{shard}.tar")):
             stretched = sample.assembly.stretches is not None
-            if sample.kit == params["kit"] and not stretched:
+            if sample.kit == params["kit"] and len(sample.assembly) and not stretched:
                 yield sample.key, sample.assembly
         task.progress(done + 1, len(shards))
 
