@@ -22,7 +22,6 @@ USES = (
 LIMITS = (
     "All samples were made automatically, and no person has reviewed them.",
     "Stability is computed by statics with one density everywhere. Nothing was simulated or built.",
-    "Meshes have at most one colour per face, and no textures, materials or normals.",
 )
 LOADED = ("points.npy", "labels.npy", "color0.png", "depth0.png", "txt")
 """Members that the example of loading reads, where samples have them."""

@@ -6,7 +6,9 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from pipeline.config import Config
 from pipeline.stage import Plan
+from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.discovery import language_of, members, producers
 from stages.shape.collection.origin import Origin, missing_licenses
 
@@ -37,6 +39,7 @@ def producer_text(
         "members_coordinates": [text for stage in added for text in stage.coordinates(config)],
         "checks": [check for stage in added for check in stage.checks],
         "limits": [
+            _surface_limit(config),
             *(limit for stage in added for limit in stage.limits(config)),
             *dict.fromkeys(limit for stage in stages for limit in known[stage].limits(config)),
         ],
@@ -45,6 +48,13 @@ def producer_text(
         "rejects": _rejects(plan, stages),
         "missing_licenses": missing_licenses(origins),
     }
+
+
+def _surface_limit(config: Config) -> str:
+    """Return what meshes have besides vertices and faces."""
+    if any(kit.appearance.keep == "textures" for kit in config.section(ExemplarsConfig).kits):
+        return "Meshes have the materials, textures and normals of their models, or one colour per face without these."
+    return "Meshes have at most one colour per face, and no textures, materials or normals."
 
 
 def _by_name(texts: dict[str, str]) -> str:

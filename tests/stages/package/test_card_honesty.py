@@ -36,6 +36,7 @@ PRODUCERS: tuple[Sections, ...] = (
     RANDOM,
     KITS,
     {"exemplars": {"kits": [{**FORT, "grammar": "slots"}]}},
+    {"exemplars": {"kits": [{**FORT, "appearance": "textures"}]}},
     {**KITS, "variations": {"search": {"stretch": {"max_factor": 1.5}}}},
     {**NO_VARIANTS, "proportions": {"samples_per_kit": 9}},
     {
@@ -239,7 +240,8 @@ CONDITIONS: tuple[tuple[str, Callable[[Config], bool]], ...] = (
     ("All samples were made automatically", always),
     ("Stability is computed by statics", always),
     ("Nothing was simulated or built", always),
-    ("at most one colour per face", always),
+    ("at most one colour per face", lambda c: not textured(c)),
+    ("materials, textures and normals of their models", lambda c: textured(c)),
     ("Right-handed, y up", always),
     ("The unit is unknown", always),
     ("The ground of a shape", always),
@@ -253,6 +255,10 @@ CONDITIONS: tuple[tuple[str, Callable[[Config], bool]], ...] = (
     ("It also checks every record", always),
 )
 """What a sentence says, and when it holds."""
+
+
+def textured(config: Config) -> bool:
+    return any(kit.appearance.keep == "textures" for kit in section(config, "exemplars").kits)
 
 
 def exact(config: Config) -> bool:
