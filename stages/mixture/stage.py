@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.config import Config
+from pipeline.errors import ConfigError
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.mixture.language import LANGUAGE
@@ -104,11 +105,16 @@ def run_assignment(task: Task) -> Outcome:
     """Leave out what is too much or a near copy in another split, and assign the other samples to shards.
 
     Writes `.<split>-<number>.jsonl` for each shard of the collection: producer, shard and key of each sample, its key
-    in the mixture, and its parents. Raises ConfigError for two producers with kits of one name and other labels.
+    in the mixture, and its parents. Raises ConfigError for two producers with kits of one name and other labels,
+    and for a maximum of an unknown kit.
     """
     LANGUAGE.decoder(task)
     config = task.config.section(MixtureConfig)
     rows = [row for listing in task.shard.params["listings"] for row in _listed_rows(task, listing)]
+    unknown = sorted(set(config.max_samples) - {row["kit"] for row in rows})
+    if unknown:
+        kits = ", ".join(dict.fromkeys(row["kit"] for row in rows))
+        raise ConfigError(f"mixture.max_samples names {', '.join(unknown)}; there are samples of {kits}")
     splits = np.array([SPLITS.index(row["split"]) for row in rows], dtype=np.int64)
     out: dict[int, str] = {}
     for number in _copies(task, rows, splits):

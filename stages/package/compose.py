@@ -74,7 +74,7 @@ def compose_dataset(task: Task) -> Outcome:
     kits = [kit for kit in sources_by_name if kit in {kit for _, kit in tallied}]
     tallies, sources = dict[str, SourceTally](), dict[str, str]()
     for producer, kit in sorted(tallied, key=lambda pair: (kits.index(pair[1]), pair)):
-        name = f"{kit}, {producer}" if "joined" in params else kit
+        name = f"{kit} by {producer}" if "joined" in params else kit
         tallies[name], sources[name] = tallied[producer, kit], sources_by_name[kit].sentence
     text = CardText(kits=kits, **params["card_text"], origins=params["origins"])
     files = {

@@ -31,7 +31,7 @@ def producer_text(
     return {
         "made": _by_name({maker: known[maker].sentence(config) for maker in makers}),
         "splits": [
-            _by_name({maker: known[maker].splits(config) for maker in makers}),
+            _by_name({maker: known[maker].splits(config) for maker in makers}).strip(),
             *(known[stage].splits(config) for stage in stages if stage not in makers),
             *(text for stage in stages for text in known[stage].nearness(plan)),
         ],
@@ -41,7 +41,11 @@ def producer_text(
         "limits": [
             _surface_limit(config),
             *(limit for stage in added for limit in stage.limits(config)),
-            *dict.fromkeys(limit for stage in stages for limit in known[stage].limits(config)),
+            *(
+                f"**{maker}**: {limit}" if len(makers) > 1 else limit
+                for maker in makers
+                for limit in known[maker].limits(config)
+            ),
         ],
         "paragraphs": list(dict.fromkeys(paragraphs)),
         "variety": [text for stage in stages for text in known[stage].variety(plan)],
@@ -58,10 +62,10 @@ def _surface_limit(config: Config) -> str:
 
 
 def _by_name(texts: dict[str, str]) -> str:
-    """Join texts; where there are several, each is a paragraph that begins with the name of what it is about."""
+    """Join texts; several become paragraphs of their own, each with the name of what it is about."""
     if len(texts) == 1:
         return next(iter(texts.values()))
-    return "\n\n".join(f"**{name}**: {text}" for name, text in texts.items() if text)
+    return "".join(f"\n\n**{name}**: {text}" for name, text in texts.items()) + "\n\n"
 
 
 def _rejects(plan: Plan, stages: Iterable[str]) -> dict[str, int]:

@@ -75,7 +75,7 @@ def test_samples_of_all_producers_are_mixed_and_counted(made: tuple[Path, tuple[
     code, status = shapemill("status", *made[1])
     assert code == 0
     for (producer, kit), count in Counter((record["producer"], record["kit"]) for record in records).items():
-        assert re.search(rf"\| {re.escape(kit)}, {producer}[^|]*\| {count} \|", card)
+        assert re.search(rf"\| {re.escape(kit)} by {producer}[^|]*\| {count} \|", card)
         assert f"{producer}: {kit}: {count} samples" in status
 
 
@@ -127,3 +127,14 @@ def test_programs_of_two_modes_and_a_program_twice_are_refused(tmp_path: Path) -
         code, printed = shapemill("run", "programs", *config_of(tmp_path, {"programs": entries}))
         assert code == 2
         assert reason in printed
+
+
+def test_a_maximum_of_an_unknown_kit_is_refused_and_one_producer_may_be_mixed_alone(tmp_path: Path) -> None:
+    programs = {"entries": [{"program": RACK, "mode": "random", "random": {"samples": 6}}], "splits": {"shards": 1}}
+    for max_samples, done in (({"rock": 3}, False), ({RACK: 3}, True)):
+        sections = {"programs": programs, "mixture": {"enabled": True, "max_samples": max_samples}}
+        config = config_of(tmp_path, sections)
+        assert shapemill("run", "programs", *config)[0] == 0
+        code, printed = shapemill("run", "mixture", *config)
+        assert (code == 0) == done
+        assert done or "mixture.max_samples names rock; there are samples of tests.stages.programs.rack" in printed

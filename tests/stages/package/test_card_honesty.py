@@ -208,6 +208,10 @@ CONDITIONS: tuple[tuple[str, Callable[[Config], bool]], ...] = (
     ("ShapeAssembly programs (drawn at random)", lambda c: bool(section(c, "shapeassembly").random)),
     ("ShapeAssembly programs (given, edited)", lambda c: uses(c, "shapeassembly") and edited(c)),
     ("All parts are cuboids", lambda c: uses(c, "shapeassembly")),
+    ("- **grammars**: Parts are terminals", lambda c: uses(c, "grammars") and uses(c, "mixture")),
+    ("- Parts are terminals", lambda c: uses(c, "grammars") and not uses(c, "mixture")),
+    ("- **programs**: All shapes of a program", lambda c: uses(c, "programs") and uses(c, "mixture")),
+    ("- **variations**: All parts are those of", lambda c: uses(c, "variations") and uses(c, "mixture")),
     ("The splits of furniture are published lists", has_lists),
     (
         "Of the others: Programs that differ only",
