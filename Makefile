@@ -105,7 +105,7 @@ string_sampling: exemplars  ## Sample strings from trained models, and make shap
 	$(RUN)
 primitives: setup  ## Make heaps, stacks and attached compositions of simple solids
 	$(RUN)
-PRODUCERS := primitives variations proportions programs grammars shapeassembly string_sampling
+PRODUCERS := variations proportions programs grammars shapeassembly string_sampling primitives
 mixture: $(PRODUCERS)  ## Join the samples of several producers, if the config asks for it
 	$(RUN)
 validity: mixture  ## Check each shape: is it rooted, is it stable?
