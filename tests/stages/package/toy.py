@@ -105,6 +105,7 @@ def toy_samples(split: str, index: int, count: int) -> list[Sample]:
             "deformed": False,
             "turned_degrees": 0.0,
             "copied": {"share": 1.0, "pieces": 1, "exemplar_share": 0.5, "exemplar": "row"},
+            "rows": "[]",
             "restored_hubs": 0,
         }
         graph = graph_digest(assembly.types, assembly.edges)

@@ -174,7 +174,7 @@ def test_two_workers_make_the_same_bytes_by_replacement(tmp_path: Path) -> None:
         make(tmp_path, out, workers, samples_per_kit=40, search=search)
     assert digests(tmp_path, "one") == digests(tmp_path, "two")
     methods = {sample.lineage["method"] for shard in collection(tmp_path, "one") for sample in read_samples(shard)}
-    assert methods == {"substructures"}
+    assert methods == {"rows", "substructures"}
 
 
 def digests(folder: Path, out: str) -> dict[str, str]:
