@@ -61,7 +61,7 @@ def _listing_shards(plan: Plan, maker: str) -> list[Shard]:
     for name in plan.shards(maker):
         summary = plan.summary(maker, name)
         if summary is not None and "split" in summary:
-            params = {"job": "listing", "producer": maker, "shard": name, "split": summary["split"]}
+            params = {"job": "listing", "producer": maker, "shard": name}
             shards.append(Shard(f"{maker}-{name}", params, (f"{maker}/{name}", *read)))
     return shards
 
