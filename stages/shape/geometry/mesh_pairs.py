@@ -16,6 +16,8 @@ from stages.shape.geometry.polygons import cut, polygon_area
 from stages.shape.geometry.sorting import sort_order
 
 MAX_LEAF_TRIANGLES = 4
+SLIVER_SHARE = 1e-7
+"""A triangle whose height is less than this share of its length is a line to `distances_to_surface`."""
 
 Tree = tuple[FloatArray, FloatArray, np.ndarray]
 
@@ -390,3 +392,53 @@ def points_on_surface(corners, boxes, links, points, tolerance):
         if not near:
             return False
     return True
+
+
+@numba.njit(cache=True)
+def _box_distance2(p, box):
+    """Return the squared distance of a point and a box."""
+    total = 0.0
+    for k in range(3):
+        gap = max(abs(p[k] - box[k]) - box[3 + k], 0.0)
+        total += gap * gap
+    return total
+
+
+@numba.njit(cache=True)
+def distances_to_surface(corners, boxes, links, points):
+    """Return the distance of each of `points` (q, 3) to the mesh, float64 (q,)."""
+    distances = np.empty(len(points))
+    stack = np.empty(512, dtype=np.int64)
+    n = np.empty(3)
+    for index in range(len(points)):
+        p = points[index]
+        best = np.inf
+        stack[0] = 0
+        size = 1
+        while size > 0:
+            size -= 1
+            node = stack[size]
+            if _box_distance2(p, boxes[node]) >= best:
+                continue
+            if links[node, 0] < 0:
+                first = -links[node, 0] - 1
+                for u in range(first, first + links[node, 1]):
+                    tri = corners[u]
+                    # the normal of a sliver says nothing, and its edges are all of it
+                    longest = 0.0
+                    for k in range(3):
+                        best = min(best, _segment_distance2(p, p, tri[k], tri[(k + 1) % 3]))
+                        for axis in range(3):
+                            longest = max(longest, abs(tri[k, axis] - tri[(k + 1) % 3, axis]))
+                    length = _normal(tri, n)
+                    if length > SLIVER_SHARE * longest * longest and _inside_prism(p, tri, n):
+                        h = n[0] * (p[0] - tri[0, 0]) + n[1] * (p[1] - tri[0, 1]) + n[2] * (p[2] - tri[0, 2])
+                        best = min(best, h * h / (length * length))
+            else:
+                near, far = links[node, 0], links[node, 1]
+                if _box_distance2(p, boxes[near]) > _box_distance2(p, boxes[far]):
+                    near, far = far, near
+                stack[size], stack[size + 1] = far, near
+                size += 2
+        distances[index] = np.sqrt(best)
+    return distances
