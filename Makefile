@@ -81,7 +81,7 @@ RUN        = @$(SHAPEMILL) run $@ $(OPTIONS) $(RUNNING)
 # Making datasets ----------------------------------------------------------------------------------------------------
 
 .PHONY: dataset autoconfig exemplars variations proportions programs grammars program_sampling shapeassembly
-.PHONY: string_sampling primitives mixture validity abstraction strings points sketches views package
+.PHONY: string_sampling primitives mixture validity abstraction strings points sketches views surface captions package
 dataset: setup  ## Make the dataset of CONFIG in OUT: whatever is missing or outdated
 	@$(SHAPEMILL) run $(OPTIONS) $(RUNNING)
 
@@ -120,7 +120,11 @@ sketches: mixture  ## Draw each shape as lines
 	$(RUN)
 views: mixture  ## Render images of each shape, if the config has cameras
 	$(RUN)
-package: validity abstraction strings points sketches views  ## Write the dataset's folder: shards, index, card, checksums
+surface: mixture  ## Find what is true of surfaces, unions, signed distances and occupancy, if the config asks
+	$(RUN)
+captions: validity  ## Describe each shape in words, if the config asks for it
+	$(RUN)
+package: validity abstraction strings points sketches views surface captions  ## Write the dataset's folder: shards, index, card, checksums
 	$(RUN)
 
 .PHONY: train recover export

@@ -81,6 +81,23 @@ class DatasetSample:
         """The part of each point, int (n,): its index in `record["parts"]`."""
         return self.array("instances")
 
+    @cached_property
+    def union(self) -> trimesh.Trimesh:
+        """The watertight union of all parts, where the dataset has it."""
+        import trimesh
+
+        return trimesh.Trimesh(self.array("union_vertices"), self.array("union_faces"), process=False)
+
+    @property
+    def distances(self) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+        """Points, float32 (n, 3), and their signed distances to the union, float32 (n,), negative inside."""
+        return self.array("sdf_points"), self.array("sdf_values")
+
+    @cached_property
+    def occupancy(self) -> npt.NDArray[Any]:
+        """Which cells of the cube of `record["union"]` are inside, bool (r, r, r), by x, y and z."""
+        return np.unpackbits(self.array("occupancy"), axis=2).astype(bool)
+
     @property
     def contacts(self) -> npt.NDArray[Any]:
         """Pairs of parts that touch, int32 (2, m)."""
@@ -116,6 +133,12 @@ class DatasetSample:
         files = {name: content for name, content in self.members.items() if name.endswith(VIEW_SUFFIXES)}
         for name, content in {**files, "transforms.json": transforms_bytes(cameras, colors)}.items():
             write_file(folder / name, content)
+
+    @cached_property
+    def captions(self) -> dict[str, str]:
+        """The captions by length, such as `short`; empty where the dataset has none."""
+        captions: dict[str, str] = json.loads(self.members.get("caption.json", b"{}"))
+        return captions
 
     @property
     def text(self) -> str:

@@ -33,8 +33,9 @@ from tests.stages.package.toy import (
     toy_samples,
 )
 
-MEMBERS = ["glb", "txt", "points.npy", "normals.npy", "labels.npy", "instances.npy", "sketch0.png", "sketch1.png"]
-MEMBERS += ["contacts.npy", "joints.npy"]
+MEMBERS = ["glb", "txt", "caption.json", "points.npy", "normals.npy", "labels.npy", "instances.npy"]
+MEMBERS += ["sketch0.png", "sketch1.png", "union_vertices.npy", "union_faces.npy", "union_instances.npy"]
+MEMBERS += ["sdf_points.npy", "sdf_values.npy", "occupancy.npy", "contacts.npy", "joints.npy"]
 MEMBERS += ["color0.png", "depth0.exr", "instances0.png", "json"]
 
 

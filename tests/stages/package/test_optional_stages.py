@@ -13,10 +13,12 @@ from pipeline.config import Config, load_config
 from pipeline.errors import ConfigError
 from pipeline.registry import find_stages
 from pipeline.shards import read_shard
+from stages.captions.settings import CaptionsConfig
 from stages.package.reader import Dataset
 from stages.points.settings import PointsConfig
 from stages.sketches.settings import SketchesConfig
 from stages.strings.settings import StringsConfig
+from stages.surface.settings import SurfaceConfig
 from stages.verification.verify import verify_dataset
 from stages.views.settings import RingCameras, ViewsConfig
 from tests.stages.package.toy import make_toy, toy_config
@@ -28,6 +30,8 @@ def images_alone() -> Config:
         "points": PointsConfig.model_validate(False),
         "strings": StringsConfig.model_validate(False),
         "sketches": SketchesConfig(views=()),
+        "surface": SurfaceConfig(),
+        "captions": CaptionsConfig(),
         "views": ViewsConfig(cameras=(RingCameras(count=2),), width=24, height=24, images=("color", "instances")),
     }
     return replace(config, sections={**config.sections, **off})

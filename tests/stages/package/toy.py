@@ -17,6 +17,8 @@ from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.abstraction.settings import AbstractionConfig
 from stages.abstraction.stage import STAGE as ABSTRACTION
+from stages.captions.settings import CaptionsConfig
+from stages.captions.stage import STAGE as CAPTIONS
 from stages.exemplars.settings import ExemplarsConfig
 from stages.package.settings import PackageConfig
 from stages.package.stage import STAGE as PACKAGE
@@ -34,6 +36,8 @@ from stages.sketches.settings import SketchesConfig, SketchView
 from stages.sketches.stage import drawings
 from stages.sketches.stage import plan as plan_sketches
 from stages.strings.settings import StringsConfig
+from stages.surface.settings import DistanceConfig, SurfaceConfig
+from stages.surface.stage import STAGE as SURFACE
 from stages.validity.stage import STAGE as VALIDITY
 from stages.variations.settings import VariationsConfig
 from stages.views.settings import RingCameras, ViewsConfig
@@ -195,6 +199,8 @@ TOY_STAGES: Mapping[str, Stage] = named_inputs(
         ABSTRACTION,
         Stage("sketches", __name__, SketchesConfig, (PRODUCERS,), plan_sketches, _make_sketches, _no_bytes),
         VIEWS,
+        SURFACE,
+        CAPTIONS,
         replace(PACKAGE, check=lambda _: None),
     ]
 )
@@ -220,6 +226,8 @@ def toy_config(shards: int = 4) -> Config:
             images=("color", "depth", "instances"),
             depth_format="exr",
         ),
+        "surface": SurfaceConfig(flags=True, union=True, distances=DistanceConfig(near=24, uniform=8), occupancy=8),
+        "captions": CaptionsConfig(lengths=("short", "long")),
         "package": PackageConfig(previewed=1),
     }
     return Config(

@@ -1,0 +1,1 @@
+"""Stage `captions`: each shape in words, short to long, of facts that hold for it."""
