@@ -11,7 +11,7 @@ from stages.shape.arrays import ByteArray, Float32Array, FloatArray
 from stages.shape.geometry.mesh_pairs import build_tree, distances_to_surface
 from stages.shape.geometry.triangles import triangle_areas
 from stages.surface.settings import DistanceConfig
-from stages.surface.union import Solid, UnionMesh
+from stages.surface.union import SolidSurface, UnionMesh
 from stages.surface.winding import inside_any
 
 
@@ -50,7 +50,7 @@ def distance_points(union: UnionMesh, cube: Cube, config: DistanceConfig, rng: n
     return np.concatenate([near, uniform]).astype(np.float32)
 
 
-def signed_distances(solids: Sequence[Solid], union: UnionMesh, points: Float32Array) -> Float32Array:
+def signed_distances(solids: Sequence[SolidSurface], union: UnionMesh, points: Float32Array) -> Float32Array:
     """Return the distance of points to the surface of the union, negative inside, float32 (n,).
 
     The sign is that of the winding numbers of the parts, and the distance that to the union.
@@ -61,7 +61,7 @@ def signed_distances(solids: Sequence[Solid], union: UnionMesh, points: Float32A
     return distances
 
 
-def occupancy_grid(solids: Sequence[Solid], cube: Cube, cells: int) -> ByteArray:
+def occupancy_grid(solids: Sequence[SolidSurface], cube: Cube, cells: int) -> ByteArray:
     """Return which middles of cells are inside, as bits along the last axis, uint8 (cells, cells, cells / 8).
 
     `numpy.unpackbits(grid, axis=2)` gives (x, y, z).

@@ -17,7 +17,7 @@ from stages.shape.shape import Shape
 from stages.surface.members import OCCUPANCY, SDF_POINTS, SDF_VALUES, UNION_FACES, UNION_INSTANCES, UNION_VERTICES
 from stages.surface.settings import SurfaceConfig
 
-UNION_BYTES = 60_000
+UNION_BYTES = 200_000
 """Of a union, on average."""
 
 

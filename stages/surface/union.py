@@ -37,7 +37,7 @@ class UnionMesh:
 
 
 @dataclass(frozen=True)
-class Solid:
+class SolidSurface:
     """A closed surface that bounds a solid, in the coordinates of the shape.
 
     part: index of the part that it belongs to
@@ -50,7 +50,7 @@ class Solid:
     faces: IntArray
 
 
-def solids_of(shape: Shape) -> list[Solid]:
+def solids_of(shape: Shape) -> list[SolidSurface]:
     """Return the solids that the parts of a shape are: one for each part, or for each of its closed surfaces.
 
     Raises Rejected for a part whose inside is not beyond doubt: an open one, one with a surface that intersects itself,
@@ -62,7 +62,7 @@ def solids_of(shape: Shape) -> list[Solid]:
         found = surfaces[kind]
         if isinstance(found, str):
             raise Rejected(found, shape.part_names[part])
-        solids += [Solid(part, transform_points(pose, vertices), faces) for vertices, faces in found]
+        solids += [SolidSurface(part, transform_points(pose, vertices), faces) for vertices, faces in found]
     return solids
 
 
@@ -70,7 +70,7 @@ def solids_of(shape: Shape) -> list[Solid]:
 def _closed_surfaces(mesh: PartMesh) -> tuple[tuple[FloatArray, IntArray], ...] | str:
     """Return the surfaces of a part, each the border of a solid, or in words why it has no clear inside.
 
-    A part that intersects itself may be several solids in one mesh, each of which does not.
+    A part that intersects itself may be several solids in one mesh. Then none of these may intersect itself.
     """
     flags = surface_flags(mesh)
     if not flags.closed:
@@ -98,7 +98,7 @@ def _components(mesh: PartMesh) -> Iterator[tuple[FloatArray, IntArray]]:
         yield vertices[used], renamed.reshape(-1, 3).astype(np.int32)
 
 
-def union_mesh(solids: Sequence[Solid]) -> UnionMesh:
+def union_mesh(solids: Sequence[SolidSurface]) -> UnionMesh:
     """Return the union of solids. Raises Rejected where manifold3d finds none."""
     from manifold3d import Manifold, Mesh64, OpType
 

@@ -8,10 +8,10 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.surface.union import Solid
+from stages.surface.union import SolidSurface
 
 
-def inside_any(solids: Sequence[Solid], points: FloatArray) -> BoolArray:
+def inside_any(solids: Sequence[SolidSurface], points: FloatArray) -> BoolArray:
     """Return which points, float64 (n, 3), lie in the union of solids, bool (n,).
 
     The winding number of a closed surface is a whole number, 0 outside: nothing is asked of points outside the box of
