@@ -171,7 +171,7 @@ def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
     for number, exemplar in enumerate(kit.exemplars):
         streams = partial(decision_rng, 0, RANDOM_STREAM, "rows", number)
         wanted = -(-MAX_LAYOUTS_TRIED // count)
-        layouts = drawn_layouts(shapes_of, exemplar.name, config, rows, wanted, streams, lambda _: None)
+        layouts = drawn_layouts(shapes_of, exemplar.name, config, rows, wanted, streams, lambda *_: None)
         others += sum(bool(layout.changes) for layout in layouts)
         sides = shapes_of.unwarped(exemplar.name, ()).lattice.sides
         texts: list[str] = []

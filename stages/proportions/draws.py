@@ -56,12 +56,12 @@ def drawn_layouts(
     rows: RowsConfig | None,
     wanted: int,
     rng_of: Callable[[int], np.random.Generator],
-    reject: Callable[[str], None],
+    reject: Callable[[str, int], None],
 ) -> list[DrawnLayout]:
     """Return at most `wanted` layouts of an exemplar that hold together; its own alone without `rows`.
 
     rng_of: function that returns the random numbers of each draw
-    reject: is told why a layout is rejected
+    reject: is told why layouts, or places of rows, are rejected, and their number
     """
     own = DrawnLayout((), shapes.unwarped(exemplar, ()), _distinct(shapes.unwarped(exemplar, ()), config))
     if rows is None:
@@ -69,7 +69,10 @@ def drawn_layouts(
     draws = LayoutDraws(shapes.layout(exemplar), rows)
     found: list[DrawnLayout] = []
     known = {draws.exemplar.key}
-    if not draws.rows and not draws.circles:
+    has_rows = bool(draws.rows or draws.circles)
+    for reason, count in sorted(draws.refused.items()):
+        reject(f"row: {reason}", count)
+    if not has_rows:
         return [own]
     wanted = min(wanted, MAX_LAYOUTS)
     for number in range(TRIES_PER_LAYOUT * wanted):
@@ -81,13 +84,13 @@ def drawn_layouts(
         changes, layout = drawn
         known.add(layout.key)
         if layout.pieces().max() > draws.exemplar.pieces().max():
-            reject("row: in more pieces than the exemplar")
+            reject("row: in more pieces than the exemplar", 1)
             continue
         unwarped = shapes.unwarped_layout(layout)
         fault = warp_fault(shapes.kit, unwarped.assembly, unwarped.shape)
         fault = fault or unmet_requirement(config.require, unwarped.shape)
         if fault is not None:
-            reject(f"row: {fault}")
+            reject(f"row: {fault}", 1)
             continue
         found.append(DrawnLayout(changes, unwarped, _distinct(unwarped, config)))
     return found if len(found) >= MIN_OTHER_LAYOUTS else [own, *found]

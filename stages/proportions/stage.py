@@ -134,10 +134,14 @@ def run_search(task: Task) -> Outcome:
     kit = input_kit(task, task.shard.params["kit"])
     shapes = ProportionShapes(kit)
     wanted = -(-CANDIDATES_PER_SAMPLE * config.samples_per_kit // config.parallel_searches)
+
+    def reject(exemplar: str, reason: str, count: int) -> None:
+        task.reject(exemplar, reason, count=count)
+
     layouts = [
         drawn_layouts(
             shapes, exemplar.name, config, rows if task.shard.params["rows"] else None, wanted,
-            partial(task.rng, "rows", number), partial(task.reject, exemplar.name),
+            partial(task.rng, "rows", number), partial(reject, exemplar.name),
         )
         for number, exemplar in enumerate(kit.exemplars)
     ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -28,6 +29,7 @@ class LayoutDraws:
     def __init__(self, layout: Layout, config: RowsConfig) -> None:
         self.exemplar, self.config = layout, config
         self.steps = steps_of(layout)
+        self.refused = Counter[str]()  # places of the exemplar's rows that were left out, by reason
         self._rows: dict[bytes, list[Row]] = {}
         self._limits = [self._limits_of(step.count) for step in self.steps]
         self.circles = find_circles(layout)
@@ -116,7 +118,8 @@ class LayoutDraws:
         if key not in self._rows:
             if len(self._rows) >= MAX_LAYOUTS_REMEMBERED:
                 self._rows.clear()
-            self._rows[key] = find_rows(layout, self.steps)
+            counted = self.refused if layout is self.exemplar else Counter[str]()
+            self._rows[key] = find_rows(layout, self.steps, lambda reason: counted.update([reason]))
         return self._rows[key]
 
 

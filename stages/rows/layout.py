@@ -103,6 +103,12 @@ class Layout:
     def _trees(self) -> dict[int, Any]:
         return {}
 
+    @cached_property
+    def contact_keys(self) -> np.ndarray:
+        """A number of each contact, seen from both parts, int64 (2 m,): `part * len(layout) + other`."""
+        edges = self.edges.astype(np.int64)
+        return np.concatenate([edges[:, 0] * len(self) + edges[:, 1], edges[:, 1] * len(self) + edges[:, 0]])
+
     @property
     def extent(self) -> FloatArray:
         """Sides of the box around all parts, float64 (3,)."""

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stages.rows.layout import Layout
 from stages.rows.slabs import RowChange, Slab
-from stages.rows.steps import ROUNDING_DECIMALS, Step, longest_row, steps_of
+from stages.rows.steps import ROUNDING_DECIMALS, Step, longest_row, steps_of, with_long_rows
 from stages.shape.arrays import FloatArray
 
 MIN_ROW = 2
+MIN_TORN_ROW = 3
+"""Parts of a row from which no change of another row may tear it apart; two legs may stand further apart."""
+TORN_ROW = "a row with another step would be torn apart"
 MAX_PLANES = 160
 """Ends of slabs that are tried for each step and normal."""
 
@@ -47,16 +50,24 @@ class Row:
         return RowChange(self.normal, self.shift, float(self.removals[index]), -1)
 
 
-def find_rows(layout: Layout, steps: Sequence[Step] | None = None) -> list[Row]:
-    """Return the rows of a layout with one of the steps, by default its own."""
+def find_rows(
+    layout: Layout, steps: Sequence[Step] | None = None, refuse: Callable[[str], None] = lambda _: None
+) -> list[Row]:
+    """Return the rows of a layout with one of the steps, by default its own.
+
+    refuse: is told why a place of a row was left out although it fits its neighbours
+    """
     rows: list[Row] = []
-    for number, step in enumerate(steps_of(layout) if steps is None else steps):
-        mates, previous = layout.mates(step.shift), layout.mates(-step.shift)
+    steps = steps_of(layout) if steps is None else steps
+    all_mates = [layout.mates(step.shift) for step in steps]
+    long_rows = [with_long_rows(mates, MIN_TORN_ROW) for mates in all_mates]
+    for number, (step, mates) in enumerate(zip(steps, all_mates, strict=True)):
         count = longest_row(mates)
         if count < 1:
             continue
+        others = [other for index, other in enumerate(long_rows) if index != number and (other >= 0).any()]
         for normal in step.normals():
-            rows += _rows_along(layout, number, step, count, normal, mates, previous)
+            rows += _rows_along(layout, number, step, count, normal, mates, others, refuse)
     return [row for row in rows if not any(_splits_units(layout, row, whole) for whole in rows)]
 
 
@@ -85,15 +96,33 @@ def _units(layout: Layout, shift: FloatArray) -> np.ndarray:
 
 
 def _rows_along(
-    layout: Layout, number: int, step: Step, count: int, normal: FloatArray, mates: np.ndarray, previous: np.ndarray
+    layout: Layout,
+    number: int,
+    step: Step,
+    count: int,
+    normal: FloatArray,
+    mates: np.ndarray,
+    others: Sequence[np.ndarray],
+    refuse: Callable[[str], None],
 ) -> Iterator[Row]:
-    """Yield the rows with one step and one normal, by what a period holds."""
+    """Yield the rows with one step and one normal, by what a period holds.
+
+    mates, others: the part one step after each, of this step and of other long rows
+    """
     low, high = layout.spans(normal)
+    previous = layout.mates(-step.shift)
     found: dict[tuple[int, ...], list[tuple[float, bool, bool, bool]]] = {}
     for at in _planes(layout, low, high, (mates >= 0) | (previous >= 0)).tolist():
         slab = Slab(layout, normal, step.shift, at, mates, previous, low, high)
         may_insert, may_remove = slab.insertion_fault() is None, slab.removal_fault() is None
-        if (may_insert or may_remove) and (slab.is_regular or slab.spanning_fault() is None):
+        if not (may_insert or may_remove) or not (slab.is_regular or slab.spanning_fault() is None):
+            continue
+        fits = may_insert, may_remove
+        may_insert = may_insert and not any(slab.tears(other, 1) for other in others)
+        may_remove = may_remove and not any(slab.tears(other, -1) for other in others)
+        if fits != (may_insert, may_remove):
+            refuse(TORN_ROW)
+        if may_insert or may_remove:
             copied = tuple(sorted(layout.types[slab.recurs].tolist()))
             found.setdefault(copied, []).append((at, may_insert, may_remove, slab.is_regular))
     for copied, places in found.items():

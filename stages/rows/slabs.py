@@ -18,6 +18,8 @@ from stages.rows.spanning import Span
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.kit import PartMesh
 
+HELD_ONCE = "a part that spans the slab holds a single part of the row"
+
 
 class SlabError(ValueError):
     """A slab that cannot be inserted or removed; the message says why."""
@@ -107,6 +109,8 @@ class Slab:
         i, j = self._both_ways
         if (before[i] & beyond[j]).any():
             return "parts before and after the slab touch"
+        if self._is_held_once:
+            return HELD_ONCE
         across = within[i] & beyond[j]
         behind = self.previous[j[across]]
         if (~recurs[i[across]]).any() or (behind < 0).any() or not recurs[behind].all():
@@ -147,6 +151,8 @@ class Slab:
         i, j = self._both_ways
         if (before[i] & beyond[j]).any():
             return "parts before and after the slab touch"
+        if self._is_held_once:
+            return HELD_ONCE
         across = within[i] & beyond[j]
         behind = self.previous[j[across]]
         if (behind < 0).any() or not within[behind].all():
@@ -162,6 +168,46 @@ class Slab:
         if (left[ends] + gained[self.previous[ends]] < degrees[self.previous[ends]]).any():
             return "a part beyond the slab would lack what the part before it has"
         return None
+
+    @cached_property
+    def _is_held_once(self) -> bool:
+        """Whether a part that spans the slab touches a recurring part, and neither the one a step before nor after it.
+
+        It holds no row: a long drawer front has one handle, and a longer one has no two.
+        """
+        is_spanning = np.zeros(len(self.layout), dtype=bool)
+        is_spanning[self.spanning] = True
+        i, j = self._both_ways
+        held = self.recurs[i] & is_spanning[j]
+        parts, holders, count = i[held], j[held].astype(np.int64), len(self.layout)
+        holds_row = np.zeros(len(parts), dtype=bool)
+        for beside in (self.mates[parts], self.previous[parts]):
+            holds_row |= (beside >= 0) & np.isin(beside * count + holders, self.layout.contact_keys)
+        return not holds_row.all()
+
+    def tears(self, mates: np.ndarray, times: int) -> bool:
+        """Return whether a row with another step would get a gap, or a part too near, at the slab.
+
+        mates: the part one step of that row after each, or -1, int64 (n,)
+        times: 1 for insertions, -1 for a removal
+        """
+        first = np.flatnonzero((mates >= 0) & ~self.beyond)
+        first = first[~np.isin(first, self.spanning)]
+        second = mates[first]
+        if times > 0:
+            first, second = first[self.beyond[second]], second[self.beyond[second]]
+            replaced = self._recurs_at(self.previous[second])
+            return not (replaced & (self.recurs[first] | self._recurs_at(self.mates[first]))).all()
+        first, second = first[self.before[first]], second[self.before[first]]
+        if self.beyond[second].any():
+            return True
+        removed = second[self.within[second]]
+        return not self._leads_into(removed, self.beyond)
+
+    def _recurs_at(self, parts: np.ndarray) -> BoolArray:
+        """Return which parts exist (not -1) and recur in the slab."""
+        recurring: BoolArray = (parts >= 0) & self.recurs[parts]
+        return recurring
 
     @cached_property
     def is_regular(self) -> bool:

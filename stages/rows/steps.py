@@ -68,6 +68,23 @@ def longest_row(mates: np.ndarray) -> int:
     return longest
 
 
+def with_long_rows(mates: np.ndarray, min_count: int) -> np.ndarray:
+    """Return the mates of parts in rows of at least `min_count` parts, -1 for all others, int64 (n,).
+
+    mates: int64 (n,), as of `Layout.mates`
+    """
+    previous = np.full(len(mates), -1, dtype=np.int64)
+    previous[mates[mates >= 0]] = np.flatnonzero(mates >= 0)
+    kept = np.full(len(mates), -1, dtype=np.int64)
+    for start in np.flatnonzero((previous < 0) & (mates >= 0)).tolist():
+        row = [start]
+        while mates[row[-1]] >= 0 and len(row) <= len(mates):
+            row.append(int(mates[row[-1]]))
+        if len(row) >= min_count:
+            kept[row[:-1]] = row[1:]
+    return kept
+
+
 def steps_of(layout: Layout) -> list[Step]:
     """Return the steps of a layout, those that most parts take first; of two opposite ones the one whose largest
     component is positive.

@@ -147,3 +147,25 @@ def framed_windows(count: int = 3) -> tuple[Kit, Layout]:
     wall = ("wall", pose(0.9 * count - 0.4, 1.0, -0.1))
     meshes = {"wall": box(1.8 * count + 0.4, 2.4, 0.1), "side": box(0.1, 1.0, 0.1), "pane": box(0.9, 1.0, 0.1)}
     return layout(meshes, [wall, *sides, *panes])
+
+
+def two_pitches(ratio: float, pegs: int) -> tuple[Kit, Layout]:
+    """Two sides that hold boards, and one of them pegs at another step, `ratio` times as far apart."""
+    sides = [("side", pose(x, 1.0, 0.0)) for x in (-0.475, 0.475)]
+    held = [("board", pose(0.0, 0.2 + BOARD_STEP * number, 0.0)) for number in range(SHELF_BOARDS)]
+    hung = [("peg", pose(0.55, 0.2 + ratio * BOARD_STEP * number, 0.0)) for number in range(pegs)]
+    return layout(MESHES | {"peg": box(0.1, 0.04, 0.04)}, [*sides, *held, *hung])
+
+
+def fronts(tall: float = 0.7) -> tuple[Kit, Layout]:
+    """A back with a tall front and two lower ones above it; each has a handle, and the handles are at equal steps."""
+    heights = [tall, 0.38, 0.38]
+    lows = [0.0, tall + 0.02, tall + 0.42]
+    names = ["tall", "front", "front"]
+    meshes = {"back": box(1.0, 2.0, 0.1), "tall": box(0.9, tall, 0.05), "front": box(0.9, 0.38, 0.05)}
+    closed = [(name, pose(0.0, low + height / 2 + 0.2, 0.075))
+              for name, low, height in zip(names, lows, heights, strict=True)]  # fmt: skip
+    tops = [low + height + 0.1 for low, height in zip(lows, heights, strict=True)]
+    handles = [("handle", pose(0.0, top, 0.12)) for top in tops]
+    meshes |= {"handle": box(0.3, 0.04, 0.04)}
+    return layout(meshes, [("back", pose(0.0, 1.0, 0.0)), *closed, *handles])

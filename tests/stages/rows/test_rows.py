@@ -250,3 +250,31 @@ def test_lengthened_parts_have_the_look_of_their_faces(name: str, times: int) ->
 def planar_look(mesh: PartMesh) -> Appearance:
     uv = mesh.vertices[mesh.faces][:, :, :2].astype(np.float32)
     return Appearance((), np.full(len(mesh.faces), -1, np.int32), uv)
+
+
+@pytest.mark.parametrize(("ratio", "pegs"), [(0.9, 6), (2.0, 3)])
+def test_no_change_tears_another_row_apart(ratio: float, pegs: int) -> None:
+    """Boards and pegs on the same sides change together, or one of them at its end alone."""
+    kit, layout = models.two_pitches(ratio, pegs)
+    draws = LayoutDraws(layout, RowsConfig())
+    assert draws.rows
+    assert draws.refused["a row with another step would be torn apart"] > 0
+    for change in [*changes(find_rows(layout), 1), *changes(find_rows(layout), -1)]:
+        changed = repeat(layout, change)
+        check(kit, changed)
+        for label in ("board", "peg"):
+            places = [changed.anchors[part, 1] for part in range(len(changed))
+                      if kit.types[changed.types[part]].label == label]  # fmt: skip
+            steps = np.diff(np.sort(places))
+            np.testing.assert_allclose(steps, steps[:1].repeat(len(steps)), atol=1e-6)
+
+
+def test_no_front_gets_a_second_handle() -> None:
+    kit, layout = models.fronts()
+    tried = [*changes(find_rows(layout), 2), *changes(find_rows(layout), -1)]
+    assert tried
+    for change in tried:
+        changed = repeat(layout, change)
+        held = counts(kit, changed)
+        assert held["handle"] == held["tall"] + held["front"]
+        check(kit, changed)
