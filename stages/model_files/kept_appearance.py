@@ -23,10 +23,10 @@ def keep_appearance(scene: ModelScene, texture_size: int | None) -> ModelScene:
     if texture_size is None:
         colored = tuple(replace(surface, appearance=None) for surface in scene.surfaces)
         clear = sum(material.alpha_mode != "opaque" for material in materials)
-        lost = [f"{len(images)} textures"] * bool(images) + [f"{clear} see-through materials"] * bool(clear)
-        warning = (
-            f"{' and '.join(lost)} are read as opaque colours of faces; a kit with `appearance: textures` keeps them"
-        )
+        counts = {"texture": len(images), "see-through material": clear}
+        lost = [f"{count} {what}{'s' * (count > 1)}" for what, count in counts.items() if count]
+        verb = "is" if sum(counts.values()) == 1 else "are"
+        warning = f"{' and '.join(lost)} {verb} read as opaque colours of faces; `appearance: textures` keeps them"
         warnings = (*scene.warnings, warning) if lost else scene.warnings
         return replace(scene, surfaces=colored, warnings=warnings, not_kept=())
     small = {image: TextureImage.of(shrunk(image.pixels, texture_size)) for image in images}

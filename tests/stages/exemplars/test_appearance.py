@@ -70,7 +70,7 @@ def test_congruent_parts_of_other_materials_take_the_first_look_and_the_kit_says
 def test_colors_alone_are_what_a_kit_keeps_by_default(tmp_path: Path) -> None:
     kit, warnings = kit_of(textured_file(tmp_path / "m.glb"))
     assert kit.types[0].appearance is None
-    assert any("1 textures are read as opaque colours of faces" in warning for warning in warnings)
+    assert any("1 texture is read as opaque colours of faces" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("mirrored", [False, True])

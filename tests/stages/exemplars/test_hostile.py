@@ -228,7 +228,7 @@ def test_faces_beyond_the_vertices_are_refused(tmp_path: Path) -> None:
 
 def test_good_files_are_read_without_warnings(tmp_path: Path) -> None:
     for path in write_good(tmp_path):
-        model = read_parts(path, "auto", LIMITS)
+        model = read_parts(path, "auto", LIMITS, texture_size=512)
         assert len(model.parts) >= 2, path
         assert model.warnings == (), path
 

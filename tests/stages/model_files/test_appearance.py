@@ -136,7 +136,7 @@ def test_colors_alone_say_that_textures_are_lost(tmp_path: Path) -> None:
     scene = read_model(obj(tmp_path))
     assert scene.surfaces[0].appearance is None
     (warning,) = scene.warnings
-    assert warning.startswith("1 textures are read as opaque colours of faces; a kit with `appearance: textures`")
+    assert warning.startswith("1 texture is read as opaque colours of faces; `appearance: textures` keeps")
 
 
 def painted(folder: Path, stated: str) -> ModelScene:
