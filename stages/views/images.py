@@ -24,7 +24,7 @@ from stages.sketches.settings import StrokeOptions
 from stages.views.numbers import depth_levels, depth_scale, normal_bytes, rounded_depth
 from stages.views.render import SeenSurface, ViewRenderer
 from stages.views.settings import ColorOptions, ViewsConfig
-from stages.views.shading import Lamp, shade, to_srgb
+from stages.views.shading import Lamp, to_srgb, view_light
 
 COLOR_SUFFIX = {"png": "png", "jpeg": "jpg", "webp": "webp"}
 DRAWING_SUPERSAMPLE = 2
@@ -45,8 +45,7 @@ def view_files(
     fields = camera_fields(renderer.view, config.width, config.height)
     files: dict[str, bytes] = {}
     if "color" in config.images:
-        seen = renderer.visible(config.color.supersample)
-        light = shade(seen, renderer.moves, config.color.supersample, lamp)
+        light = view_light(renderer, config.color.supersample, lamp)
         pixels = to_srgb(light, config.color.background == "transparent")
         files[f"color{index}.{COLOR_SUFFIX[config.color.format]}"] = color_bytes(pixels, config.color)
     if SURFACE_IMAGES & set(config.images):

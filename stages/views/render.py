@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+
+import numpy as np
 
 from pipeline.errors import Rejected
 from stages.shape.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from stages.shape.views.buffers import Visible
 from stages.shape.views.camera import View
 from stages.shape.views.scene import Scene
+
+
+@dataclass(frozen=True)
+class _Projected:
+    """All triangles on the screen, before it is known which are seen.
+
+    layered: their corners with parts set back by layer, float64 (t, 3, 3)
+    """
+
+    layered: FloatArray
+    visible: Visible
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,17 +43,48 @@ class ViewRenderer:
         Raises Rejected where the camera sees nothing of the shape.
         """
         from stages.shape.views.raster import raster
+
+        seen = self._everything(supersample)
+        triangles = raster(seen.layered, self.width * supersample, self.height * supersample)
+        if triangles.max() < 0:
+            raise Rejected("nothing seen by a camera", f"{len(self.scene)} parts")
+        return replace(seen.visible, triangles=triangles)
+
+    def solid(self, masked: bool = False) -> Visible:
+        """Return the triangle of each pixel through which nothing is seen; masked: masked ones count as whole."""
+        from stages.shape.views.texels import visible_solid
+
+        seen = self._everything(1)
+        triangles = visible_solid(self.scene, seen.layered, self.width, self.height, masked)
+        return replace(seen.visible, triangles=triangles)
+
+    def layers(self, supersample: int) -> tuple[Visible, list[tuple[Visible, Float32Array]]]:
+        """Return the samples of solid surfaces, and those of what is seen through, nearest first, with base colours.
+
+        Raises Rejected where the camera sees nothing of the shape.
+        """
+        from stages.shape.views.texels import see_through_layers, visible_solid
+
+        seen = self._everything(supersample)
+        size = self.width * supersample, self.height * supersample
+        triangles = visible_solid(self.scene, seen.layered, *size)
+        layers = see_through_layers(self.scene, seen.layered, seen.visible.screen, self.view.projection, triangles)
+        if triangles.max() < 0 and not layers:
+            raise Rejected("nothing seen by a camera", f"{len(self.scene)} parts")
+        return replace(seen.visible, triangles=triangles), [
+            (replace(seen.visible, triangles=own), colors) for own, colors in layers
+        ]
+
+    def _everything(self, supersample: int) -> _Projected:
         from stages.shape.views.screen import facing_normals, project_triangles
         from stages.views.placement import set_back
 
         size = self.width * supersample, self.height * supersample
         layered = project_triangles(self.scene, self.view, set_back(self.scene, self.view, self.moves), *size)
-        triangles = raster(layered, *size)
-        if triangles.max() < 0:
-            raise Rejected("nothing seen by a camera", f"{len(self.scene)} parts")
         screen = project_triangles(self.scene, self.view, self.moves, *size)
         normals = facing_normals(self.scene, self.moves[:, :3, :3], screen)
-        return Visible(self.scene, self.view, triangles, screen, normals)
+        nothing = np.full((0, 0), -1, dtype=np.int32)
+        return _Projected(layered, Visible(self.scene, self.view, nothing, screen, normals))
 
     @cached_property
     def moves(self) -> FloatArray:

@@ -5,8 +5,8 @@
 
 n is the normal, l the direction of the lamp, f that of a weaker lamp without shadows from the other side. n_up is the
 upward part of the normal, and lit the share of the lamp's light that no part of the shape keeps away. The lamps stay
-with the shape: a point has the same colour in all views. Base colours come from `base_colors` alone. Weights inside a
-triangle are perspective-correct.
+with the shape: a point has the same colour in all views. Base colours are those of faces, or of materials and textures
+(`stages.shape.views.texels`). Weights inside a triangle are perspective-correct. Blended surfaces cast no shadow.
 
 Numba compiles this module when it is imported: import it inside functions.
 """
@@ -25,6 +25,7 @@ from stages.shape.views.camera import View
 from stages.shape.views.palette import linear_to_srgb, srgb_to_linear
 from stages.shape.views.scene import Scene
 from stages.shape.views.screen import clip_at, eye_depth
+from stages.shape.views.texels import has_holes, sample_colors
 from stages.views.cameras import Sphere, circle, light_view, orbit_rotation
 from stages.views.render import ViewRenderer
 
@@ -68,7 +69,11 @@ def lamp_of(scene: Scene, sphere: Sphere, azimuth: float, elevation: float, shad
     view = light_view(azimuth, elevation, sphere)
     if not shadows:
         return Lamp(direction, fill, view, np.empty((0, 0), dtype=np.float32))
-    seen = ViewRenderer(scene, view, SHADOW_MAP_PIXELS, SHADOW_MAP_PIXELS).visible()
+    renderer = ViewRenderer(scene, view, SHADOW_MAP_PIXELS, SHADOW_MAP_PIXELS)
+    if has_holes(scene):
+        seen = renderer.solid(masked=True)
+    else:
+        seen = renderer.visible()
     return Lamp(direction, fill, view, _depths(seen.triangles, seen.screen, view.projection))
 
 
@@ -78,18 +83,49 @@ def base_colors(scene: Scene) -> FloatArray:
     return linear
 
 
-def shade(seen: Visible, moves: FloatArray, supersample: int, lamp: Lamp | None) -> Float32Array:
+def view_light(renderer: ViewRenderer, supersample: int, lamp: Lamp | None) -> Float32Array:
+    """Return linear colours times alpha, and alpha, float32 (h, w, 4): means of `supersample` squared samples.
+
+    lamp: None for base colours without light
+
+    Raises Rejected where the camera sees nothing of the shape.
+    """
+    scene = renderer.scene
+    if not has_holes(scene):
+        seen = renderer.visible(supersample)
+        if scene.meshes.look is None:
+            return shade(seen, renderer.moves, supersample, lamp)
+        base = sample_colors(scene, seen.triangles, seen.screen, seen.view.projection)
+        return shade(seen, renderer.moves, supersample, lamp, base)
+    solid, layers = renderer.layers(supersample)
+    base = sample_colors(scene, solid.triangles, solid.screen, solid.view.projection)
+    light = shade(solid, renderer.moves, 1, lamp, base)
+    for seen, colors in reversed(layers):
+        own = shade(seen, renderer.moves, 1, lamp, colors)
+        alpha = colors[:, :, 3:]
+        light[:, :, :3] = own[:, :, :3] * alpha + light[:, :, :3] * (1 - alpha)
+        light[:, :, 3:] = alpha + light[:, :, 3:] * (1 - alpha)
+    height, width = light.shape[0] // supersample, light.shape[1] // supersample
+    mean: Float32Array = light.reshape(height, supersample, width, supersample, 4).mean(axis=(1, 3))
+    return mean
+
+
+def shade(
+    seen: Visible, moves: FloatArray, supersample: int, lamp: Lamp | None, colors: Float32Array | None = None
+) -> Float32Array:
     """Return linear colours times alpha, and alpha, float32 (h, w, 4): means of `supersample` squared samples.
 
     seen: samples of the view
     moves: from the mesh coordinates of each part to eye space, (n, 4, 4)
     lamp: None for base colours without light
+    colors: base colour of each sample, float32 (h, w, 4); by default that of its face
     """
     scene, view = seen.scene, seen.view
     parts, faces = scene.triangle_part, scene.triangle_face
-    base = base_colors(scene)
+    by_sample = colors is not None
+    base = base_colors(scene) if colors is None else colors[:, :, :3].astype(np.float64).reshape(-1, 3)
     if lamp is None:
-        unlit: Float32Array = _unlit(seen.triangles, supersample, faces, base)
+        unlit: Float32Array = _unlit(seen.triangles, supersample, faces, base, by_sample)
         return unlit
     turn = view.eye[:3, :3]
     to_lamp = np.array([_dot(row, lamp.direction) for row in turn])
@@ -97,7 +133,7 @@ def shade(seen: Visible, moves: FloatArray, supersample: int, lamp: Lamp | None)
     up = turn[:, 1].copy()
     taps = _taps(supersample, SHADOW_SOFTNESS_RADII * view.radius)
     lit: Float32Array = _lit(
-        *(seen.triangles, supersample, seen.screen, seen.normals, parts, faces, base),
+        *(seen.triangles, supersample, seen.screen, seen.normals, parts, faces, base, by_sample),
         *(scene.meshes.corner_normals, moves[:, :3, :3], view.projection, to_lamp, to_fill, up),
         *(lamp.depth, _between(view.eye, lamp.view.eye), lamp.view.projection, taps),
         SHADOW_OFFSET_RADII * view.radius,
@@ -153,8 +189,9 @@ def _depths(triangles, screen, projection):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _unlit(triangles, supersample, face_of, base):
-    height, width = len(triangles) // supersample, triangles.shape[1] // supersample
+def _unlit(triangles, supersample, face_of, base, by_sample):
+    columns = triangles.shape[1]
+    height, width = len(triangles) // supersample, columns // supersample
     light = np.zeros((height, width, 4), dtype=np.float32)
     share = 1.0 / (supersample * supersample)
     for row in range(height):
@@ -163,7 +200,7 @@ def _unlit(triangles, supersample, face_of, base):
             for r in range(row * supersample, (row + 1) * supersample):
                 for c in range(column * supersample, (column + 1) * supersample):
                     if triangles[r, c] >= 0:
-                        color = base[face_of[triangles[r, c]]]
+                        color = base[r * columns + c if by_sample else face_of[triangles[r, c]]]
                         red, green, blue, alpha = red + color[0], green + color[1], blue + color[2], alpha + 1.0
             light[row, column, 0], light[row, column, 1] = red * share, green * share
             light[row, column, 2], light[row, column, 3] = blue * share, alpha * share
@@ -198,6 +235,7 @@ def _lit(
     parts,
     face_of,
     base,
+    by_sample,
     corners,
     rotations,
     projection,
@@ -252,7 +290,7 @@ def _lit(
                         plane = flat[t, 0], flat[t, 1], flat[t, 2], offset
                         reached = _reached(shadow, to_shadow, lamp_projection, x, y, -depth, *plane, taps[sample])
                     strength += KEY_LIGHT * facing * reached
-                color = base[face_of[t]]
+                color = base[r * columns + c if by_sample else face_of[t]]
                 red, green, blue = red + strength * color[0], green + strength * color[1], blue + strength * color[2]
                 alpha += 1.0
             light[row, column, 0], light[row, column, 1] = red * share, green * share

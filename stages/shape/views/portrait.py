@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numba
 import numpy as np
 
-from stages.shape.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from pipeline.errors import ShardFailed
+from stages.shape.arrays import BoolArray, ByteArray, Float32Array, FloatArray, IntArray
 from stages.shape.views.buffers import RendererName, Visible, visible_triangles
 from stages.shape.views.camera import Camera, View
 from stages.shape.views.light import KeyLight, eye_positions, ground_seen, key_light, openness, to_world
 from stages.shape.views.palette import label_colors, linear_to_srgb, srgb_to_linear
-from stages.shape.views.scene import Scene
+from stages.shape.views.scene import Scene, without_faces
 
 PAPER = (250, 248, 244)
 """Background, sRGB: a warm near-white."""
@@ -39,18 +41,28 @@ def portrait(
     part_colors: colour of each part instead of its faces' own, uint8 (n, 3)
 
     A soft key light from the upper left with shadows, sky and ground light, darker corners, thin lines where parts
-    meet, and a shadow on the ground. Raises ShardFailed for a blank picture.
+    meet, and a shadow on the ground. Materials have their textures and their alpha, unless `part_colors` are given;
+    what is seen through is rasterised. Raises ShardFailed for a blank picture.
     """
     from stages.shape.views.pixel_normals import smooth_normals
     from stages.shape.views.screen import surface_buffers
+    from stages.shape.views.texels import has_holes, sample_colors
 
     width, height = size[0] * SUBPIXELS_PER_PIXEL, size[1] * SUBPIXELS_PER_PIXEL
-    seen = visible_triangles(scene, camera, (width, height), renderer)
+    look = scene.meshes.look if part_colors is None else None
+    layers: list[tuple[IntArray, Float32Array]] = []
+    if look is not None and has_holes(scene):
+        seen, layers = _solid_and_layers(scene, camera, width, height)
+    else:
+        seen = visible_triangles(scene, camera, (width, height), renderer)
     depth, _, part, color = surface_buffers(scene, seen.view, seen.triangles, seen.screen, seen.normals)
     normal = smooth_normals(seen)
     if part_colors is not None:
         color = np.where(part[..., None] >= 0, part_colors[part], color)
-    light = key_light(scene, camera.azimuth - 52.0, 52.0, renderer)
+    opaque = scene
+    if look is not None and look.is_blended.any() and not look.is_blended[scene.triangle_face].all():
+        opaque = without_faces(scene, look.is_blended)
+    light = key_light(opaque, camera.azimuth - 52.0, 52.0, renderer)
     shown = part >= 0
     picture = np.broadcast_to(srgb_to_linear(np.array(PAPER, dtype=np.uint8)), (height, width, 3)).copy()
     if camera.elevation > 0.0:
@@ -62,11 +74,51 @@ def portrait(
     sky = (0.5 + 0.5 * up)[:, None] * SKY + (0.5 - 0.5 * up)[:, None] * GROUND
     open_sky = openness(depth, normal, seen.view, 0.10 * seen.view.radius)[shown][:, None]
     # Bright albedos are reduced a little, so that white models keep their shading.
-    albedo = 0.02 + 0.90 * srgb_to_linear(color[shown])
+    base = srgb_to_linear(color[shown])
+    if look is not None:
+        base = sample_colors(scene, seen.triangles, seen.screen, seen.view.projection)[shown, :3].astype(np.float64)
+    albedo = 0.02 + 0.90 * base
     picture[shown] = albedo * (lit[:, None] * KEY * (0.35 + 0.65 * open_sky) + sky * open_sky)
+    for triangles, colors in reversed(layers):
+        _blend_layer(picture, replace(seen, triangles=triangles), colors, light)
     lines = _ink(seen, size)[..., None]
     picture = _reduced(picture) * (1.0 - lines) + srgb_to_linear(np.array(INK, dtype=np.uint8)) * lines
     return linear_to_srgb(picture)
+
+
+def _solid_and_layers(
+    scene: Scene, camera: Camera, width: int, height: int
+) -> tuple[Visible, list[tuple[IntArray, Float32Array]]]:
+    """Return what is seen of solid surfaces, and the layers of what is seen through, nearest first."""
+    from stages.shape.views.layers import layered_moves
+    from stages.shape.views.screen import project_triangles, screen_normals, screen_triangles
+    from stages.shape.views.texels import see_through_layers, visible_solid
+
+    view = camera.look(scene.points, scene.up, width / height)
+    layered = project_triangles(scene, view, layered_moves(scene, view), width, height)
+    screen = screen_triangles(scene, view, width, height)
+    solid = visible_solid(scene, layered, width, height)
+    layers = see_through_layers(scene, layered, screen, view.projection, solid)
+    if solid.max() < 0 and not layers:
+        raise ShardFailed(f"blank picture: {len(scene)} parts, none seen from {camera}")
+    return Visible(scene, view, solid, screen, screen_normals(scene, view, screen)), layers
+
+
+def _blend_layer(picture: FloatArray, seen: Visible, colors: Float32Array, light: KeyLight) -> None:
+    """Blend a layer of surfaces that are seen through into a picture in linear light, (h, w, 3)."""
+    from stages.shape.views.pixel_normals import smooth_normals
+    from stages.shape.views.screen import surface_buffers
+
+    shown = seen.triangles >= 0
+    depth, _, _, _ = surface_buffers(seen.scene, seen.view, seen.triangles, seen.screen, seen.normals)
+    world = to_world(eye_positions(depth, seen.view)[shown], seen.view)
+    upright = smooth_normals(seen)[shown] @ seen.view.eye[:3, :3]
+    lit = np.clip(upright @ light.direction, 0.0, None) * light.reaches(world, 0.012 * seen.view.radius)
+    up = upright[:, 1 if seen.scene.up == "y" else 2]
+    sky = (0.5 + 0.5 * up)[:, None] * SKY + (0.5 - 0.5 * up)[:, None] * GROUND
+    alpha = colors[shown, 3:].astype(np.float64)
+    own = (0.02 + 0.90 * colors[shown, :3]) * (lit[:, None] * KEY + sky)
+    picture[shown] = alpha * own + (1.0 - alpha) * picture[shown]
 
 
 def points_portrait(

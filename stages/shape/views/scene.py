@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
+from stages.shape.appearance import Appearance
+from stages.shape.arrays import BoolArray, ByteArray, Float32Array, FloatArray, IntArray
 from stages.shape.geometry.triangles import unit_normals
 from stages.shape.kit import PartMesh
 from stages.shape.shape import Shape
+
+if TYPE_CHECKING:
+    from stages.shape.views.mesh_look import MeshLook
 
 WELD_DISTANCE_SHARE = 2e-6
 """Vertices closer than this share of half their mesh's longest side count as one vertex."""
@@ -28,6 +32,7 @@ class MeshSet:
     colors: sRGB, uint8 (f, 3)
     vertex_first, face_first: where each mesh begins and ends, int64 (m + 1,)
     centers: the middles, float64 (m, 3)
+    looks: of each mesh, or None where it has the colours of its faces alone; empty if none has more
     """
 
     vertices: FloatArray
@@ -36,10 +41,13 @@ class MeshSet:
     vertex_first: np.ndarray
     face_first: np.ndarray
     centers: FloatArray
+    looks: tuple[Appearance | None, ...] = ()
 
     @staticmethod
-    def of(meshes: Sequence[tuple[FloatArray, IntArray, ByteArray]]) -> MeshSet:
-        """Return the set of `(vertices (v, 3), faces (f, 3), face colors (f, 3))`."""
+    def of(
+        meshes: Sequence[tuple[FloatArray, IntArray, ByteArray]], looks: Sequence[Appearance | None] = ()
+    ) -> MeshSet:
+        """Return the set of `(vertices (v, 3), faces (f, 3), face colors (f, 3))`, with looks if some have more."""
         middles = [(v.min(axis=0) + v.max(axis=0)) / 2 if len(v) else np.zeros(3) for v, _, _ in meshes]
         vertex_first = np.cumsum([0, *(len(v) for v, _, _ in meshes)])
         face_first = np.cumsum([0, *(len(f) for _, f, _ in meshes)])
@@ -51,6 +59,7 @@ class MeshSet:
             vertex_first=vertex_first,
             face_first=face_first,
             centers=np.array(middles, dtype=np.float64).reshape(-1, 3),
+            looks=tuple(looks) if any(look is not None for look in looks) else (),
         )
 
     @cached_property
@@ -63,7 +72,18 @@ class MeshSet:
         """Unit normal at each corner of each face in mesh coordinates, float32 (f, 3, 3), for smooth shading."""
         from stages.shape.views.corner_normals import corner_normals
 
-        return corner_normals(self.vertices, self.faces, self._welded, self.normals)
+        computed = corner_normals(self.vertices, self.faces, self._welded, self.normals)
+        for look, first in zip(self.looks, self.face_first.tolist(), strict=False):
+            if look is not None and look.normals is not None:
+                computed[first : first + len(look)] = look.normals
+        return computed
+
+    @cached_property
+    def look(self) -> MeshLook | None:
+        """Materials and textures of the faces; None if no face has a material."""
+        from stages.shape.views.mesh_look import mesh_look
+
+        return mesh_look(self.looks, np.diff(self.face_first).tolist()) if self.looks else None
 
     @cached_property
     def _welded(self) -> np.ndarray:
@@ -166,10 +186,24 @@ def mesh_scene(vertices: FloatArray, faces: IntArray, face_colors: ByteArray, up
     return Scene(MeshSet.of([(vertices, faces, face_colors)]), single, np.eye(4)[None], single, up)
 
 
+def without_faces(scene: Scene, left_out: BoolArray) -> Scene:
+    """Return the scene without the faces of its mesh set that are `left_out`, bool (f,)."""
+    meshes = scene.meshes
+    kept = []
+    for mesh in range(len(meshes.centers)):
+        first, last = meshes.vertex_first[mesh], meshes.vertex_first[mesh + 1]
+        faces = np.arange(meshes.face_first[mesh], meshes.face_first[mesh + 1])
+        faces = faces[~left_out[faces]]
+        vertices = meshes.vertices[first:last] + meshes.centers[mesh]
+        kept.append((vertices, meshes.faces[faces] - np.int32(first), meshes.colors[faces]))
+    return replace(scene, meshes=MeshSet.of(kept))
+
+
 @lru_cache(maxsize=16)
 def mesh_set(meshes: tuple[PartMesh, ...]) -> MeshSet:
     """Return the set of these meshes, the same object for the same meshes."""
-    return MeshSet.of([(mesh.vertices, mesh.faces, mesh.face_colors) for mesh in meshes])
+    looks = [mesh.appearance for mesh in meshes]
+    return MeshSet.of([(mesh.vertices, mesh.faces, mesh.face_colors) for mesh in meshes], looks)
 
 
 def _layers(parts: int, edges: IntArray) -> IntArray:

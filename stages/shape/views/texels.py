@@ -1,0 +1,331 @@
+"""The base colour of each sample of a picture: materials and textures, perspective-correct, from levels of half sizes.
+
+Two levels are mixed by how many texels a step of one sample passes, and four texels of each by distance. The texture
+coordinates of a sample follow from the plane of its triangle. Only sums, products, quotients and square roots are
+taken, so all machines get the same digits.
+
+Surfaces whose material has holes or is blended hide nothing by themselves: `see_through_layers` finds what of them lies
+in front of the solid surfaces.
+
+Numba compiles this module when it is imported: import it inside functions.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from stages.shape.arrays import Float32Array, FloatArray, IntArray
+from stages.shape.views.palette import srgb_to_linear
+from stages.shape.views.raster import COORDINATE_BITS, GRID_BITS, _centres, raster
+from stages.shape.views.scene import Scene
+from stages.shape.views.screen import clip_at, eye_depth
+
+MAX_LAYERS = 8
+"""Surfaces that are seen through, one behind another, at one sample; farther ones are left out."""
+MASK_MODE, BLEND_MODE = 1, 2
+
+
+def sample_colors(scene: Scene, triangles: IntArray, screen: FloatArray, projection: FloatArray) -> Float32Array:
+    """Return linear colours and alpha of samples, float32 (h, w, 4); zero where nothing is seen.
+
+    triangles: triangle of each sample or -1, int32 (h, w)
+    screen: corners of all triangles on the screen, float64 (t, 3, 3)
+
+    Alpha is 1 for opaque materials; of masked ones it is 1 or 0.
+    """
+    meshes = scene.meshes
+    if meshes.look is None:
+        raise ValueError("the scene has no materials")
+    colors: Float32Array = _sample(
+        *(triangles, screen, projection, scene.triangle_face, srgb_to_linear(meshes.colors)), *meshes.look.arrays
+    )
+    return colors
+
+
+def has_holes(scene: Scene) -> bool:
+    """Return whether something may be seen through a face."""
+    look = scene.meshes.look
+    return look is not None and bool(look.has_holes[scene.triangle_face].any())
+
+
+def solid_screen(scene: Scene, screen: FloatArray, masked: bool = False) -> FloatArray:
+    """Return the corners of triangles on the screen, those that may be seen through drawn together to a point.
+
+    masked: whether masked triangles stay
+    """
+    look = scene.meshes.look
+    if look is None:
+        return screen
+    clear = np.flatnonzero((look.is_blended if masked else look.has_holes)[scene.triangle_face])
+    solid = screen.copy()
+    solid[clear] = solid[clear, :1]
+    return solid
+
+
+def see_through_layers(
+    scene: Scene, layered: FloatArray, screen: FloatArray, projection: FloatArray, solid: IntArray
+) -> list[tuple[IntArray, Float32Array]]:
+    """Return what is seen through, nearest first: triangles int32 (h, w), -1 for none, and their colours (h, w, 4).
+
+    layered: corners of triangles on the screen with parts set back by layer, float64 (t, 3, 3); screen: without
+    solid: triangle of each sample that hides what is behind it, or -1, int32 (h, w)
+    """
+    look = scene.meshes.look
+    if look is None:
+        return []
+    height, width = solid.shape
+    chosen = np.flatnonzero(look.has_holes[scene.triangle_face])
+    farthest = float(np.abs(layered[:, :, :2]).max(initial=1.0))
+    bits = min(COORDINATE_BITS - int(np.frexp(farthest)[1]), GRID_BITS)
+    pixels, depths, owners = _fragments(layered, chosen, width, height, bits, solid)
+    colors = _sample_list(
+        *(pixels, owners, width, screen, projection, scene.triangle_face, srgb_to_linear(scene.meshes.colors)),
+        *look.arrays,
+    )
+    seen = np.flatnonzero(colors[:, 3] > 0.0)
+    order = seen[np.lexsort((owners[seen], depths[seen], pixels[seen]))]
+    pixels, owners, colors = pixels[order], owners[order], colors[order]
+    starts = np.flatnonzero(np.r_[True, pixels[1:] != pixels[:-1]]) if len(pixels) else np.empty(0, np.int64)
+    place = np.arange(len(pixels)) - np.repeat(starts, np.diff(np.r_[starts, len(pixels)]))
+    layers = []
+    for number in range(min(int(place.max(initial=-1)) + 1, MAX_LAYERS)):
+        own = place == number
+        triangles = np.full(height * width, -1, dtype=np.int32)
+        light = np.zeros((height * width, 4), dtype=np.float32)
+        triangles[pixels[own]], light[pixels[own]] = owners[own], colors[own]
+        layers.append((triangles.reshape(height, width), light.reshape(height, width, 4)))
+    return layers
+
+
+def visible_solid(scene: Scene, layered: FloatArray, width: int, height: int, masked: bool = False) -> IntArray:
+    """Return the nearest triangle of each sample through which nothing is seen, int32 (h, w), -1 for none."""
+    return raster(solid_screen(scene, layered, masked), width, height)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _fragments(screen, chosen, width, height, bits, solid):
+    """Return sample, depth and triangle of each sample of some triangles in front of the solid surface."""
+    room = 1024
+    pixels, depths, owners = np.empty(room, np.int64), np.empty(room), np.empty(room, np.int32)
+    count = 0
+    x, y = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
+    grid, half = 2.0**bits, (1 << bits) >> 1
+    for t in chosen:
+        for k in range(3):
+            x[k] = np.int64(np.floor(screen[t, k, 0] * grid + 0.5))
+            y[k] = np.int64(np.floor(screen[t, k, 1] * grid + 0.5))
+        left, right = _centres(x, bits, width)
+        top, bottom = _centres(y, bits, height)
+        area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
+        if left > right or top > bottom or area == 0:
+            continue
+        for row in range(top, bottom + 1):
+            for column in range(left, right + 1):
+                inside = True
+                for k in range(3):
+                    a, b = (k, (k + 1) % 3) if area > 0 else ((k + 1) % 3, k)
+                    dx, dy = x[b] - x[a], y[b] - y[a]
+                    owned = dy < 0 or (dy == 0 and dx > 0)
+                    side = dx * ((row << bits) + half - y[a]) - dy * ((column << bits) + half - x[a])
+                    inside = inside and side >= (0 if owned else 1)
+                if not inside:
+                    continue
+                depth = clip_at(screen, t, column + 0.5, row + 0.5)
+                front = solid[row, column]
+                if front >= 0 and depth >= clip_at(screen, front, column + 0.5, row + 0.5):
+                    continue
+                if count == room:
+                    room *= 2
+                    pixels = np.concatenate((pixels, np.empty(count, np.int64)))
+                    depths = np.concatenate((depths, np.empty(count)))
+                    owners = np.concatenate((owners, np.empty(count, np.int32)))
+                pixels[count], depths[count], owners[count] = row * width + column, depth, t
+                count += 1
+    return pixels[:count], depths[:count], owners[:count]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _sample(
+    triangles,
+    screen,
+    projection,
+    face_of,
+    colors,
+    face_material,
+    uv,
+    base,
+    texture,
+    mode,
+    cutoff,
+    texels,
+    levels,
+    level_first,
+    wraps,
+    nearest,
+):
+    height, width = triangles.shape
+    out = np.zeros((height, width, 4), dtype=np.float32)
+    for row in range(height):
+        for column in range(width):
+            t = triangles[row, column]
+            if t >= 0:
+                _color(
+                    *(out[row, column], t, column + 0.5, row + 0.5, screen, projection, face_of[t], colors),
+                    *(face_material, uv, base, texture, mode, cutoff, texels, levels, level_first, wraps, nearest),
+                )
+    return out
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _sample_list(
+    pixels,
+    owners,
+    width,
+    screen,
+    projection,
+    face_of,
+    colors,
+    face_material,
+    uv,
+    base,
+    texture,
+    mode,
+    cutoff,
+    texels,
+    levels,
+    level_first,
+    wraps,
+    nearest,
+):
+    out = np.zeros((len(pixels), 4), dtype=np.float32)
+    for n in range(len(pixels)):
+        t, x, y = owners[n], pixels[n] % width + 0.5, pixels[n] // width + 0.5
+        _color(
+            *(out[n], t, x, y, screen, projection, face_of[t], colors),
+            *(face_material, uv, base, texture, mode, cutoff, texels, levels, level_first, wraps, nearest),
+        )
+    return out
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _color(
+    out,
+    t,
+    x,
+    y,
+    screen,
+    projection,
+    face,
+    colors,
+    face_material,
+    uv,
+    base,
+    texture,
+    mode,
+    cutoff,
+    texels,
+    levels,
+    level_first,
+    wraps,
+    nearest,
+):
+    """Write linear colour and alpha of triangle t at a point of the screen."""
+    material = face_material[face]
+    if material < 0:
+        out[0], out[1], out[2], out[3] = colors[face, 0], colors[face, 1], colors[face, 2], 1.0
+        return
+    red, green, blue, alpha = base[material, 0], base[material, 1], base[material, 2], base[material, 3]
+    number = texture[material]
+    if number >= 0:
+        first = level_first[number]
+        wide, high = levels[first, 1], levels[first, 2]
+        u, v = _uv_at(screen, t, x, y, projection, uv[face], True)
+        here_u, here_v = _uv_at(screen, t, x, y, projection, uv[face], False)
+        right_u, right_v = _uv_at(screen, t, x + 1.0, y, projection, uv[face], False)
+        down_u, down_v = _uv_at(screen, t, x, y + 1.0, projection, uv[face], False)
+        across = ((right_u - here_u) * wide) ** 2 + ((right_v - here_v) * high) ** 2
+        along = ((down_u - here_u) * wide) ** 2 + ((down_v - here_v) * high) ** 2
+        step = np.sqrt(max(across, along))
+        level, share, last = first, 0.0, level_first[number + 1] - 1
+        if step > 1.0:
+            size = 1.0
+            while step >= 2.0 * size and level < last:
+                size *= 2.0
+                level += 1
+            share = min(step / size - 1.0, 1.0)
+        square = nearest[number] and step <= 1.0
+        r, g, b, a = _texel(texels, levels[level], wraps[number], u, v, square)
+        if share > 0.0 and level < last:
+            r2, g2, b2, a2 = _texel(texels, levels[level + 1], wraps[number], u, v, False)
+            r, g, b, a = r + share * (r2 - r), g + share * (g2 - g), b + share * (b2 - b), a + share * (a2 - a)
+        if a > 0.0:
+            red, green, blue = red * r / a, green * g / a, blue * b / a
+        alpha *= a
+    if mode[material] == MASK_MODE:
+        alpha = 1.0 if alpha >= cutoff[material] else 0.0
+    elif mode[material] != BLEND_MODE:
+        alpha = 1.0
+    out[0], out[1], out[2], out[3] = red, green, blue, alpha
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _uv_at(screen, t, x, y, projection, corners, clamped):
+    """Return perspective-correct texture coordinates of a point of the screen, inside the triangle if clamped."""
+    ax, ay = screen[t, 1, 0] - screen[t, 0, 0], screen[t, 1, 1] - screen[t, 0, 1]
+    bx, by = screen[t, 2, 0] - screen[t, 0, 0], screen[t, 2, 1] - screen[t, 0, 1]
+    px, py = x - screen[t, 0, 0], y - screen[t, 0, 1]
+    area = ax * by - ay * bx
+    if area == 0.0:
+        return corners[0, 0] * 1.0, corners[0, 1] * 1.0
+    two, three = (px * by - py * bx) / area, (ax * py - ay * px) / area
+    if clamped:
+        two = min(max(two, 0.0), 1.0)
+        three = min(max(three, 0.0), 1.0 - two)
+    one = 1.0 - two - three
+    if projection[3, 3] == 0.0:
+        one /= eye_depth(screen[t, 0, 2], projection)
+        two /= eye_depth(screen[t, 1, 2], projection)
+        three /= eye_depth(screen[t, 2, 2], projection)
+    total = one + two + three
+    if total == 0.0:
+        return corners[0, 0] * 1.0, corners[0, 1] * 1.0
+    u = (one * corners[0, 0] + two * corners[1, 0] + three * corners[2, 0]) / total
+    v = (one * corners[0, 1] + two * corners[1, 1] + three * corners[2, 1]) / total
+    return u, v
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _wrapped(index, size, wrap):
+    if wrap == 2:
+        return min(max(index, 0), size - 1)
+    if wrap == 0:
+        return index % size
+    at = index % (2 * size)
+    return at if at < size else 2 * size - 1 - at
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _texel(texels, level, wrap, u, v, square):
+    """Return the texel of a level at texture coordinates, or the mean of four by distance."""
+    first, wide, high = level[0], level[1], level[2]
+    across, down = min(max(u, -1e6), 1e6) * wide, min(max(v, -1e6), 1e6) * high
+    if square:
+        column, row = (
+            _wrapped(np.int64(np.floor(across)), wide, wrap[0]),
+            _wrapped(np.int64(np.floor(down)), high, wrap[1]),
+        )
+        texel = texels[first + row * wide + column]
+        return texel[0] * 1.0, texel[1] * 1.0, texel[2] * 1.0, texel[3] * 1.0
+    across, down = across - 0.5, down - 0.5
+    left, top = np.int64(np.floor(across)), np.int64(np.floor(down))
+    share_x, share_y = across - left, down - top
+    r, g, b, a = 0.0, 0.0, 0.0, 0.0
+    for dy in range(2):
+        row = _wrapped(top + dy, high, wrap[1])
+        for dx in range(2):
+            column = _wrapped(left + dx, wide, wrap[0])
+            weight = (share_x if dx else 1.0 - share_x) * (share_y if dy else 1.0 - share_y)
+            texel = texels[first + row * wide + column]
+            r, g, b, a = r + weight * texel[0], g + weight * texel[1], b + weight * texel[2], a + weight * texel[3]
+    return r, g, b, a
