@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pipeline.paths import DatasetPaths
 from stages.captions.grammar import CaptionParser
 from stages.captions.members import CAPTION
-from stages.captions.stage import PRODUCER_WITH_FRONT
+from stages.captions.placement import placement_of
 from stages.captions.truth import holds, witnessed
 from stages.captions.words import label_nouns, source_noun
 from stages.shape.collection.audit import Audit
@@ -36,8 +36,8 @@ def false_sentences(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
     nouns = label_nouns(shape.labels)
     noun = source_noun(record["kit"], shape.labels, sample.sections.get("captions", {}).get("nouns", {}))
     parser = CaptionParser(noun, list(nouns.values()))
-    front_known = record["producer"] == PRODUCER_WITH_FRONT
-    seen = witnessed(shape, sample.contacts, record["physics"], nouns, noun, front_known)
+    placement = placement_of(record["producer"], record["kit"])
+    seen = witnessed(shape, sample.contacts, record["physics"], nouns, noun, placement)
     for length, text in json.loads(sample.members[CAPTION]).items():
         try:
             facts = parser.facts(text)

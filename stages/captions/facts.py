@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from stages.captions.placement import ShapePlacement
 from stages.captions.words import color_name
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.contact import world_boxes
@@ -51,18 +52,23 @@ class ShapeFacts:
     boxes: FloatArray
     neighbours: Sequence[frozenset[int]]
     physics: Mapping[str, Any]
-    front_known: bool
+    placement: ShapePlacement
 
     @classmethod
     def of(
-        cls, shape: Shape, contacts: IntArray, physics: Mapping[str, Any], nouns: Mapping[str, str], front_known: bool
+        cls,
+        shape: Shape,
+        contacts: IntArray,
+        physics: Mapping[str, Any],
+        nouns: Mapping[str, str],
+        placement: ShapePlacement,
     ) -> ShapeFacts:
         """Return a shape, y up, ready for facts.
 
         contacts: pairs of parts that touch, int32 (m, 2)
         physics: fields of the record
         nouns: noun of each label
-        front_known: whether the shape has its front at +z
+        placement: what is known of its front, and of how it is placed
         """
         names = tuple(nouns.get(shape.labels[label], "") for label in shape.part_labels.tolist())
         touching: list[set[int]] = [set() for _ in names]
@@ -70,7 +76,7 @@ class ShapeFacts:
             touching[first].add(second)
             touching[second].add(first)
         boxes = world_boxes(shape.meshes, shape.assembly.types, shape.assembly.poses)
-        return cls(shape, names, boxes, tuple(map(frozenset, touching)), physics, front_known)
+        return cls(shape, names, boxes, tuple(map(frozenset, touching)), physics, placement)
 
     def parts(self, noun: str) -> list[int]:
         """Return the parts of a noun."""
@@ -80,7 +86,11 @@ class ShapeFacts:
     def groups(self) -> Mapping[str, list[int]]:
         """The parts of each noun, those first that are largest seen from the front and from above."""
         x, y, z = np.ptp(self.boxes, axis=1).T
-        extents = x * y * (1.0 if self.front_known else 0.5) + z * y * (0.0 if self.front_known else 0.5) + x * z / 2
+        extents = (
+            x * y * (1.0 if self.placement.front_known else 0.5)
+            + z * y * (0.0 if self.placement.front_known else 0.5)
+            + x * z / 2
+        )
         found = {noun: self.parts(noun) for noun in dict.fromkeys(filter(None, self.nouns))}
         return dict(sorted(found.items(), key=lambda item: (-round(float(extents[item[1]].sum()), 9), item[0])))
 
@@ -110,8 +120,8 @@ def facts_of(shape: ShapeFacts) -> list[Fact]:
 
 def _proportions(shape: ShapeFacts) -> Iterator[Fact]:
     width, height, depth = shape.sides.tolist()
-    across = "wide" if shape.front_known else "long"
-    length = width if shape.front_known else max(width, depth)
+    across = "wide" if shape.placement.front_known else "long"
+    length = width if shape.placement.front_known else max(width, depth)
     if not min(length, height) > 0:
         return
     ratio = height / length
@@ -189,7 +199,8 @@ def _relations(shape: ShapeFacts) -> Iterator[Fact]:
     ground = float(shape.boxes[:, 0, 1].min())
     lowest = [part for part in range(len(shape.nouns)) if shape.boxes[part, 0, 1] < ground + near]
     standing = {shape.nouns[part] for part in lowest}
-    if shape.physics["stable"] and len(standing) == 1 and "" not in standing:
+    stands = shape.physics["stable"] and not shape.placement.hangs
+    if stands and len(standing) == 1 and "" not in standing:
         noun = standing.pop()
         if len(lowest) == len(groups[noun]) and (shape.boxes[lowest, 0, 1] < ground + near / 4).all():
             yield Fact("stands on", (str(len(lowest)), noun))
@@ -228,11 +239,13 @@ def _color_of(shape: ShapeFacts, parts: Sequence[int]) -> str:
 
 def _statics(shape: ShapeFacts) -> Iterator[Fact]:
     physics = shape.physics
+    if physics["symmetry"] > MIRROR_SHARE:
+        yield Fact("mirror")
+    if shape.placement.hangs:
+        return
     if not physics["rooted"]:
         yield Fact("not rooted")
     yield Fact("stable" if physics["stable"] else "unstable")
     tilt = int(physics["tipping_degrees"])
     if physics["stable"] and tilt >= MIN_TILT_DEGREES and physics["tipping_degrees"] - tilt > 1e-3:
         yield Fact("tilt", (str(tilt),))
-    if physics["symmetry"] > MIRROR_SHARE:
-        yield Fact("mirror")

@@ -20,4 +20,8 @@ def _members(config: Config) -> tuple[Member, ...]:
     return (Member(CAPTION, text),)
 
 
-MEMBERS = Members(of=_members)
+def _tasks(config: Config) -> tuple[str, ...]:
+    return ("text-to-3d",) if config.section(CaptionsConfig).lengths else ()
+
+
+MEMBERS = Members(of=_members, tasks=_tasks, checks=("captions",))

@@ -16,8 +16,6 @@ from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.sample import Sample
 
-PRODUCER_WITH_FRONT = "programs"
-"""Producer of samples whose front is at +z."""
 BYTES_A_CAPTION = 600
 
 
@@ -30,6 +28,7 @@ def run_shard(task: Task) -> Outcome:
     """Make the member of each sample that `members.py` declares. A sample that statics rejects is rejected."""
     from stages.captions.compose import captions
     from stages.captions.facts import ShapeFacts
+    from stages.captions.placement import placement_of
     from stages.captions.words import label_nouns, source_noun
 
     config = task.config.section(CaptionsConfig)
@@ -38,9 +37,9 @@ def run_shard(task: Task) -> Outcome:
     def written(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
         members = judged.members(sample.key)
         shape = collection.shape(sample)
-        front_known = sample.producer == PRODUCER_WITH_FRONT
+        placement = placement_of(sample.producer, sample.kit)
         physics = json.loads(members["json"])["physics"]
-        facts = ShapeFacts.of(shape, pairs_of(members[CONTACTS]), physics, label_nouns(shape.labels), front_known)
+        facts = ShapeFacts.of(shape, pairs_of(members[CONTACTS]), physics, label_nouns(shape.labels), placement)
         noun = source_noun(sample.kit, shape.labels, config.nouns)
         texts = captions(facts, noun, config.lengths, task.rng(sample.key))
         return {"json": json_bytes({}), CAPTION: json_bytes(texts)}

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from stages.captions.facts import Fact
+from stages.captions.placement import ShapePlacement
 from stages.captions.words import plain_color_name
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
@@ -36,7 +37,7 @@ class Witnessed:
     contacts: IntArray
     physics: Mapping[str, Any]
     noun: str
-    front_known: bool
+    placement: ShapePlacement
 
     @property
     def cloud(self) -> FloatArray:
@@ -64,7 +65,7 @@ def witnessed(
     physics: Mapping[str, Any],
     nouns: Mapping[str, str],
     noun: str,
-    front_known: bool,
+    placement: ShapePlacement,
 ) -> Witnessed:
     """Return a shape, y up, ready for questions; `nouns` is the noun of each label, and `noun` that of the shape."""
     points = [
@@ -72,7 +73,7 @@ def witnessed(
         for kind, pose in zip(shape.assembly.types.tolist(), shape.assembly.poses, strict=True)
     ]
     names = [nouns.get(shape.meshes[kind].label, "") for kind in shape.assembly.types.tolist()]
-    return Witnessed(shape, points, names, contacts, physics, noun, front_known)
+    return Witnessed(shape, points, names, contacts, physics, noun, placement)
 
 
 def holds(fact: Fact, seen: Witnessed) -> bool:
@@ -85,12 +86,12 @@ def _side(seen: Witnessed, word: str) -> float:
     if word == "tall":
         return float(y)
     if word == "wide":
-        return float(x) if seen.front_known else float("nan")
+        return float(x) if seen.placement.front_known else float("nan")
     return float(max(x, z)) if word == "long" else float("nan")
 
 
 def _adjective(seen: Witnessed, word: str) -> bool:
-    across = _side(seen, "wide" if seen.front_known else "long")
+    across = _side(seen, "wide" if seen.placement.front_known else "long")
     return _side(seen, "tall") > 1.5 * across if word == "tall" else across > 1.5 * _side(seen, "tall")
 
 
@@ -144,10 +145,14 @@ def _circle(seen: Witnessed, count: str, noun: str) -> bool:
     return len(places) == int(count) and bool(even)
 
 
+def _stands(seen: Witnessed) -> bool:
+    return bool(seen.physics["stable"]) and not seen.placement.hangs
+
+
 def _stands_on(seen: Witnessed, count: str, noun: str) -> bool:
     ground = seen.cloud[:, 1].min()
     low = [part for part in range(len(seen.points)) if seen.points[part][:, 1].min() < ground + seen.slack / 3]
-    return bool(seen.physics["stable"]) and len(low) == int(count) and low == seen.of(noun)
+    return _stands(seen) and len(low) == int(count) and low == seen.of(noun)
 
 
 def _above(seen: Witnessed, count: str, noun: str, others: str, other: str) -> bool:
@@ -197,9 +202,9 @@ CHECKS: Mapping[str, Callable[..., Any]] = {
     "touches": _touches,
     "color": lambda seen, count, noun, word: len(seen.of(noun)) == int(count) and _colored(seen, seen.of(noun), word),
     "all color": lambda seen, word: _colored(seen, range(len(seen.points)), word),
-    "stable": lambda seen: seen.physics["stable"],
-    "unstable": lambda seen: not seen.physics["stable"],
-    "not rooted": lambda seen: seen.physics["floating"] > 0,
-    "tilt": lambda seen, degrees: seen.physics["tipping_degrees"] > float(degrees),
+    "stable": _stands,
+    "unstable": lambda seen: not seen.physics["stable"] and not seen.placement.hangs,
+    "not rooted": lambda seen: seen.physics["floating"] > 0 and not seen.placement.hangs,
+    "tilt": lambda seen, degrees: _stands(seen) and seen.physics["tipping_degrees"] > float(degrees),
     "mirror": lambda seen: seen.physics["symmetry"] > 0.99,
 }

@@ -151,7 +151,7 @@ def card(
         "## Verification",
         f"`sha256sum -c {CHECKSUMS}` checks every file. `python {VERIFIER}` needs numpy and trimesh only. It also "
         "checks every record, and the geometry of 100 samples. `make verify` of Shapemill checks "
-        f"{' and '.join(['statics', *text.checks])}.",
+        f"{_listed(['statics', *text.checks])}.",
         "## Licence and citation",
         f"{facts['license']}.",
         *(["Made from:", origin_table(text.origins)] if text.origins else []),
@@ -160,6 +160,11 @@ def card(
     ]
     front = yaml.safe_dump(header, sort_keys=False, allow_unicode=True, width=1000)
     return f"---\n{front}---\n\n" + "\n\n".join(sections) + "\n"
+
+
+def _listed(words: Sequence[str]) -> str:
+    """Return words as a list in a sentence."""
+    return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
 
 
 def unit_sentence(tallies: Mapping[str, SourceTally]) -> str:

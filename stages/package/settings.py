@@ -22,6 +22,6 @@ class PackageConfig(StrictModel):
     task_categories: tuple[str, ...] = Field(
         (),
         description="Hugging Face task categories of the card; if empty, those that its members serve: image-to-3d "
-        "where samples have drawings or images",
+        "where samples have drawings or images, text-to-3d where they have captions",
     )
     previewed: int = Field(24, ge=1, le=96, description="variants that the preview picture shows; unit: variants")

@@ -92,4 +92,9 @@ def _fields(config: Config) -> Mapping[str, RecordField]:
     return fields
 
 
-MEMBERS = Members(of=_members, fields=_fields)
+def _coordinates(config: Config) -> tuple[str, ...]:
+    asked = config.section(SurfaceConfig).needs_union
+    return ("The union, points with signed distances and the cube have the coordinates of the mesh.",) if asked else ()
+
+
+MEMBERS = Members(of=_members, fields=_fields, coordinates=_coordinates, checks=("surfaces",))

@@ -8,6 +8,7 @@ import numpy as np
 
 from stages.captions.compose import captions
 from stages.captions.facts import ShapeFacts
+from stages.captions.placement import ShapePlacement
 from stages.captions.words import label_nouns
 from stages.programs.files import random_shapes
 from stages.programs.program import build_shape, find_program
@@ -48,7 +49,13 @@ def bench() -> Iterator[Measure]:
     def trimesh_distances() -> int:
         return len(trimesh.proximity.signed_distance(solid, points.astype(np.float64))) // POINT_COUNT
 
-    facts = ShapeFacts.of(shape, np.empty((0, 2), np.int32), STATICS, label_nouns(shape.labels), front_known=True)
+    facts = ShapeFacts.of(
+        shape,
+        np.empty((0, 2), np.int32),
+        STATICS,
+        label_nouns(shape.labels),
+        placement=ShapePlacement(front_known=True),
+    )
     yield Measure("surface, exact flags", "shapes", rate(flags, seconds=1.0), note=note)
     yield Measure("surface, union", "shapes", rate(lambda: len(union_mesh(solids).faces) and 1, seconds=1.0), note=note)
     ours = rate(lambda: len(signed_distances(solids, union, points)) // POINT_COUNT, seconds=1.0)

@@ -8,6 +8,7 @@ import numpy as np
 import trimesh
 
 from stages.captions.facts import ShapeFacts
+from stages.captions.placement import ShapePlacement
 from stages.captions.words import label_nouns
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
@@ -42,4 +43,6 @@ def dresser(shift: float = 0.0) -> Shape:
 
 def facts(shape: Shape, **physics: Any) -> ShapeFacts:
     """The dresser ready for facts; its front is known."""
-    return ShapeFacts.of(shape, CONTACTS, {**PHYSICS, **physics}, label_nouns(shape.labels), front_known=True)
+    return ShapeFacts.of(
+        shape, CONTACTS, {**PHYSICS, **physics}, label_nouns(shape.labels), placement=ShapePlacement(front_known=True)
+    )

@@ -10,6 +10,7 @@ import pytest
 from stages.captions.compose import captions
 from stages.captions.facts import Fact, ShapeFacts, facts_of
 from stages.captions.grammar import SENTENCES, CaptionParser, opening, sentence
+from stages.captions.placement import ShapePlacement, placement_of
 from stages.captions.truth import CHECKS, Witnessed, holds, witnessed
 from stages.captions.words import label_nouns
 from stages.programs.files import random_shapes
@@ -22,7 +23,14 @@ PARSER = CaptionParser("dresser", NOUNS)
 
 
 def seen(shape: Shape, **physics: Any) -> Witnessed:
-    return witnessed(shape, CONTACTS, {**PHYSICS, **physics}, label_nouns(LABELS), "dresser", front_known=True)
+    return witnessed(
+        shape,
+        CONTACTS,
+        {**PHYSICS, **physics},
+        label_nouns(LABELS),
+        "dresser",
+        placement=ShapePlacement(front_known=True),
+    )
 
 
 def test_the_facts_of_a_dresser_are_those_that_one_sees() -> None:
@@ -149,6 +157,19 @@ def test_no_sentence_about_random_shapes_of_programs_is_false(name: str) -> None
     for values in random_shapes(program, 12, seed=4):
         shape = build_shape(program, values)
         contacts = np.empty((0, 2), np.int32)
-        texts = captions(ShapeFacts.of(shape, contacts, PHYSICS, nouns, True), name, ("long",), rng)
-        truth = witnessed(shape, contacts, PHYSICS, nouns, name, front_known=True)
+        texts = captions(
+            ShapeFacts.of(shape, contacts, PHYSICS, nouns, ShapePlacement(front_known=True)), name, ("long",), rng
+        )
+        truth = witnessed(shape, contacts, PHYSICS, nouns, name, placement=ShapePlacement(front_known=True))
         assert [fact for fact in parser.facts(texts["long"]) if not holds(fact, truth)] == []
+
+
+def test_a_lamp_that_hangs_is_not_said_to_stand() -> None:
+    assert placement_of("programs", "ceiling_lamp") == ShapePlacement(front_known=True, hangs=True)
+    assert placement_of("programs", "chair") == ShapePlacement(front_known=True)
+    assert placement_of("variations", "castle") == ShapePlacement()
+    hanging = ShapeFacts.of(dresser(), CONTACTS, PHYSICS, label_nouns(LABELS), ShapePlacement(hangs=True))
+    assert not {"stands on", "stable", "unstable", "tilt"} & {fact.kind for fact in facts_of(hanging)}
+    truth = witnessed(dresser(), CONTACTS, PHYSICS, label_nouns(LABELS), "dresser", ShapePlacement(hangs=True))
+    assert not holds(Fact("stable"), truth)
+    assert not holds(Fact("stands on", ("4", "front leg")), truth)

@@ -62,6 +62,8 @@ MEMBERS: tuple[Sections, ...] = (
     {"points": {"surface": "visible"}, "sketches": {"views": []}},
     {"points": {"normalize": "unit_box"}, "views": {**CAMERAS, "images": ["depth"]}, "sketches": False},
     {"points": False, "sketches": False, "views": {**CAMERAS, "images": ["color"]}},
+    {"sketches": False, "captions": {"lengths": ["short"]}, "surface": {"flags": True, "union": True}},
+    {"surface": {"flags": True}},
 )
 
 
@@ -97,6 +99,8 @@ def enabled(config: Config) -> list[str]:
         "sketches": config.sections["sketches"].enabled and config.sections["sketches"].views,  # type: ignore[attr-defined]
         "views": config.sections["views"].cameras,  # type: ignore[attr-defined]
         "strings": config.sections["strings"].enabled,  # type: ignore[attr-defined]
+        "captions": config.sections["captions"].lengths,  # type: ignore[attr-defined]
+        "surface": config.sections["surface"].is_requested,  # type: ignore[attr-defined]
     }
     return [stage for stage in members() if asked.get(stage)]
 
@@ -158,7 +162,7 @@ def always(_: Config) -> bool:
 
 CONDITIONS: tuple[tuple[str, Callable[[Config], bool]], ...] = (
     ("- image-to-3d", has_pictures),
-    ("text-to-3d", lambda _: False),
+    ("text-to-3d", lambda c: has(c, "captions")),
     ("even where it is hidden inside", lambda c: has(c, "points") and section(c, "points").surface == "all"),
     ("only what is seen from outside", lambda c: has(c, "points") and section(c, "points").surface == "visible"),
     (
@@ -167,8 +171,11 @@ CONDITIONS: tuple[tuple[str, Callable[[Config], bool]], ...] = (
     ),
     ("Points are moved and scaled", lambda c: has(c, "points") and section(c, "points").normalize != "none"),
     ("Instances of points and the two rows", lambda c: has(c, "points")),
-    ("checks statics and drawings", lambda c: has(c, "sketches")),
-    ("checks statics.", lambda c: not has(c, "sketches")),
+    ("checks statics and drawings", lambda c: has(c, "sketches") and not has(c, "surface")),
+    ("checks statics, drawings and surfaces", lambda c: has(c, "sketches") and has(c, "surface")),
+    ("checks statics, captions and surfaces", lambda c: has(c, "captions")),
+    ("checks statics.", lambda c: not has(c, "sketches", "captions")),
+    ("The union, points with signed distances and the cube", lambda c: section(c, "surface").union),
     ("cameras of the drawings", lambda c: has(c, "sketches")),
     ("cameras of the views", lambda c: has(c, "views")),
     ('sample["points.npy"]', lambda c: has(c, "points")),
