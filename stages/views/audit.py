@@ -58,8 +58,20 @@ def _image_faults(view: SampleView, classes: np.ndarray) -> Iterator[str]:
         elif "classes" in view.images and (_classes_of(view, classes) != view.classes).any():
             yield "has classes that are not those of its parts"
     alpha = view.color[..., 3] if "color" in view.images and view.color.shape[2] == 4 else None
-    if alpha is not None and first is not None and (alpha[shown[first]] == 0).any():
+    if alpha is not None and first is not None and _inner(shown[first] & (alpha == 0)).any():
         yield f"has no colour where {first} shows the shape"
+
+
+def _inner(pixels: BoolArray) -> BoolArray:
+    """Return the pixels with all their neighbours, bool (h, w).
+
+    Colour is the mean of samples around the centre of a pixel, and all else is taken at the centre: what is thinner
+    than a pixel may be missed by either, but not in a whole neighbourhood.
+    """
+    from scipy.ndimage import minimum_filter
+
+    inner: BoolArray = minimum_filter(pixels, 3)
+    return inner
 
 
 def _classes_of(view: SampleView, classes: np.ndarray) -> np.ndarray:

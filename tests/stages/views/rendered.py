@@ -44,6 +44,18 @@ def lopsided() -> Shape:
     return kit_shape(kit, Assembly(np.array([0, 1, 2, 1], np.int16), poses, edges))
 
 
+def wires() -> Shape:
+    """A slab under a fan of wires that are thinner than a pixel."""
+    kit = kit_of(
+        part_type("slab", box((3.0, 0.4, 3.0)), (200, 120, 60)), part_type("wire", box((0.012, 2.0, 0.012)), (9, 9, 9))
+    )
+    poses = np.tile(np.eye(4), (9, 1, 1))
+    for number, angle in enumerate(np.linspace(-0.9, 0.9, 8), start=1):
+        c, s = np.cos(angle), np.sin(angle)
+        poses[number, :3] = [[c, -s, 0, -s], [s, c, 0, c + 0.1], [0, 0, 1, 0.1 * number]]
+    return kit_shape(kit, Assembly(np.array([0] + 8 * [1], np.int16), poses, np.empty((0, 2), dtype=np.int32)))
+
+
 def files_of(shape: Shape, config: ViewsConfig) -> tuple[dict[str, bytes], list[dict[str, Any]]]:
     """Return the image files of a shape, and its cameras as the record has them."""
     scene, color = scene_of(shape), config.color
