@@ -48,6 +48,8 @@ SAMPLES ?= 100
 FORMAT  ?=
 ## KEY      keys of the samples that `make export` writes, with commas between; all if empty
 KEY     ?=
+## SHARD    shard that `make reproduce` makes again, such as train-000007
+SHARD   ?=
 ## ROUNDS   rounds of `make chaos`
 ROUNDS  ?= 20
 ## VERSION  version that `make release` makes, such as 0.2.0
@@ -55,8 +57,8 @@ VERSION ?=
 
 # Their values are text: make expands none of it, and recipes read it from the environment, as "$$CONFIG", so that no
 # shell expands it either. A recipe never says $(CONFIG).
-VARIABLES := CONFIG OUT WORKERS SEED STALL_TIMEOUT CLUSTER MESH PROGRAM INPUT UP MODEL TABLE SAMPLES FORMAT KEY ROUNDS \
-             VERSION
+VARIABLES := CONFIG OUT WORKERS SEED STALL_TIMEOUT CLUSTER MESH PROGRAM INPUT UP MODEL TABLE SAMPLES FORMAT KEY SHARD \
+             ROUNDS VERSION
 $(foreach name,$(VARIABLES),$(eval override $(name) := $$(value $(name))))
 ifeq ($(value WORKERS),)
 override WORKERS := $(shell nproc 2>/dev/null || echo 1)
@@ -140,13 +142,15 @@ export: setup  ## Write samples of the finished dataset as FORMAT, for simulator
 
 # Looking at them ----------------------------------------------------------------------------------------------------
 
-.PHONY: plan status verify inspect eval doctor cluster
+.PHONY: plan status verify reproduce inspect eval doctor cluster
 plan: setup  ## Estimate shards, samples, disk and time of the dataset, before it starts
 	@$(SHAPEMILL) plan $(OPTIONS)
 status: setup  ## Show what is done, failed, rejected and left
 	@$(SHAPEMILL) status $(OPTIONS)
 verify: setup  ## Check the finished dataset: every file, every sample, and SAMPLES of them by independent means
 	@$(SHAPEMILL) verify $(OPTIONS) --samples "$$SAMPLES"
+reproduce: setup  ## Make one SHARD of the finished dataset again, from its manifest alone, and compare the bytes
+	@$(SHAPEMILL) reproduce $(DATASET) --workers "$$WORKERS" -- "$$SHARD"
 inspect: setup  ## Show what can be made of MESH and write a config for it, or what PROGRAM can make
 	@[ -n "$$MESH$$PROGRAM" ] || { echo 'make inspect needs MESH=my.glb or PROGRAM=chair' >&2; exit 2; }
 	@[ -z "$$PROGRAM" ] || $(SHAPEMILL) programs inspect --out "$$OUT/inspect" -- "$$PROGRAM"

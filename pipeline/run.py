@@ -65,6 +65,7 @@ class RunOptions:
     only: make only the shards named so or `<only>-<anything>`, and those of the stage that they read
     stall_minutes: minutes without progress after which a shard fails and its worker is killed; 0: never
     cluster: address of a scheduler whose workers make the shards
+    target: in each stage that plans a shard of this name make it alone, with the shards of the stage that it reads
     """
 
     part: Slice = WHOLE
@@ -72,6 +73,7 @@ class RunOptions:
     only: str = ""
     stall_minutes: float = DEFAULT_STALL_MINUTES
     cluster: str = ""
+    target: str = ""
 
 
 def run_stage(
@@ -249,8 +251,8 @@ class _Run:
                 self._log.say(f"{self._name}: {byte_size(freed)} of intermediate files pruned")
 
     def _check_upstream(self) -> None:
-        if not self._stages[self._name].uses_input(self._inventory.config, self._options.only):
-            return
+        if self._options.target or not self._stages[self._name].uses_input(self._inventory.config, self._options.only):
+            return  # a target's inputs are made, and much else is not
         above = [read for read in upstream(self._stages, self._name) if read != self._name]
         if any(self._inventory.stage(read).missing for read in above):
             self._inventory.reread()  # other runs, of other slices, may have made them
@@ -290,6 +292,7 @@ class _Run:
         """Return the requested shards and those that they read. Raises ConfigError without any."""
         names, only = [shard.name for shard in state.shards], self._options.only
         wanted = {name for name in names if not only or f"{name}-".startswith(f"{only}-")}
+        wanted = wanted & {self._options.target} or wanted
         if not wanted and names:
             raise ConfigError(f"{self._name} has no shards {only} or {only}-...; it has {', '.join(names)}")
         for shard in reversed(state.shards):  # a shard's inputs are planned before it

@@ -109,6 +109,25 @@ def test_one_worker_killed_in_every_stage_makes_the_folder_of_two_workers(made: 
     assert digests(one) == digests(two)
 
 
+def test_one_shard_is_reproduced_from_the_manifest(made: tuple[Path, Path], tmp_path: Path) -> None:
+    published = made[1] / "small"
+    code, printed = shapemill("reproduce", "val-000001", published, "--workers", 2)
+    assert (code, printed.splitlines()[-1]) == (0, "val-000001: reproduced, with the same bytes as published"), printed
+    assert "package: 1 of" in printed, "the other shards are not made"
+    manifest = json.loads((published / "manifest.json").read_bytes())
+    (tmp_path / "manifest.json").write_text(json.dumps({**manifest, "seed": 4}), encoding="utf-8")
+    code, printed = shapemill("reproduce", "val-000001", tmp_path, "--workers", 2)
+    assert code == 1
+    assert "has other bytes now" in printed
+    for name, models, words in (
+        ("val-9", "datasets/exemplars", "has no shard val-9"),
+        ("val-000001", "eval", "--models"),
+    ):
+        code, printed = shapemill("reproduce", name, published, "--models", models)
+        assert code == 2
+        assert words in printed
+
+
 def test_every_table_about_kits_is_in_the_report(made: tuple[Path, Path], tmp_path: Path) -> None:
     config, out = made
     for name in ("small", ".work"):

@@ -30,6 +30,7 @@ VARIABLES = (
     "SAMPLES",
     "FORMAT",
     "KEY",
+    "SHARD",
     "ROUNDS",
     "VERSION",
 )
@@ -127,13 +128,13 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     assert values == {
         "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "STALL_TIMEOUT": "-",
         "CLUSTER": "-", "MESH": "-", "PROGRAM": "-", "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-",
-        "SAMPLES": "100", "FORMAT": "-", "KEY": "-", "ROUNDS": "20", "VERSION": "-",
+        "SAMPLES": "100", "FORMAT": "-", "KEY": "-", "SHARD": "-", "ROUNDS": "20", "VERSION": "-",
     }  # fmt: skip
 
 
 def test_every_target_gets_every_value_unchanged(tmp_path: Path) -> None:
     said = nasty(tmp_path)
-    targets = ("package", "plan", "status", "verify", "inspect", "eval", "doctor", "clean")
+    targets = ("package", "plan", "status", "verify", "reproduce", "inspect", "eval", "doctor", "clean")
     arguments = [f"{name}={said}" for name in VARIABLES]
     reached = calls(*targets, *arguments)
     assert len(reached) == 20 + len(targets[1:]) + 1, "20 stages; inspect looks at a program and a model"
