@@ -14,7 +14,12 @@ import numpy as np
 import pytest
 import yaml
 
+from pipeline.paths import DatasetPaths
 from pipeline.shards import bytes_array, read_shard
+from stages.package.standalone_verifier import DatasetFindings, ShardJob, record_faults
+from stages.shape.collection.classes import labels_of_kits
+from stages.shape.collection.discovery import languages
+from stages.verification.samples import read_packaged, sample_faults
 from tests.command import shapemill
 from tests.stated import stated
 
@@ -110,6 +115,29 @@ def test_both_verifiers_find_no_fault(made: tuple[Path, tuple[str, ...]]) -> Non
     command = [sys.executable, str(made[0] / "mix" / "verify.py"), "--samples", "4"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
+
+
+def test_both_verifiers_see_a_class_that_is_not_that_of_the_kit(made: tuple[Path, tuple[str, ...]]) -> None:
+    folder = made[0] / "mix"
+    rows = json.loads((folder / "classes.json").read_text(encoding="utf-8"))
+    names = {row["id"]: row["name"] for row in rows}
+    owned = {(kit, number): row["id"] for row in rows for kit, number in row["own"].items()}
+    job = ShardJob(folder, "shard", "train", [], names, owned, [], set(), (0, 0))
+    rebuild = {name: language.rebuild(DatasetPaths(made[0], "mix")) for name, language in languages().items()}
+    sections = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["config"]
+    seen = set()
+    for record, members in records_of(made[0]):
+        if record["producer"] in seen:
+            continue
+        seen.add(record["producer"])
+        forged = json.loads(members["json"])
+        forged["parts"][0]["own_class"] += 1
+        for said, wrong in ((record, False), (forged, True)):
+            alone = list(record_faults(job, said, members, {}, DatasetFindings()))
+            sample = read_packaged(said["key"], said, members, rebuild, sections, labels_of_kits(rows))
+            assert any("classes.json" in fault for fault in alone) == wrong
+            assert any("in its kit" in fault for fault in sample_faults(sample)) == wrong
+    assert seen == {"variations", "proportions", "programs", "shapeassembly"}
 
 
 def test_several_producers_without_a_mixture_are_refused(tmp_path: Path) -> None:
