@@ -23,7 +23,9 @@ from stages.proportions.stage import CANDIDATES_PER_SAMPLE
 from stages.proportions.text import ProportionShapes, proportion_text
 from stages.proportions.warp import Lattice
 from stages.proportions.warp_check import warp_fault
+from stages.rows.held_rows import is_held_together
 from stages.rows.kit_rows import KitRow, rows_of_kit
+from stages.rows.layout import layout_of
 from stages.rows.settings import RowsConfig
 from stages.shape.kit import Kit
 from stages.shape.physics.judge import unmet_requirement
@@ -37,6 +39,9 @@ MAX_LAYOUTS_TRIED = 24
 """Layouts with other rows that a trial draws, of all exemplars together."""
 MIN_OTHER_LAYOUTS_FOUND = 2
 """Layouts with other rows from which a dataset has them."""
+MIN_LAYOUTS_INSTEAD = 4
+"""Layouts with other rows, of at most MAX_LAYOUTS_TRIED, from which these replace what a search finds."""
+HELD_ROWS = "the parts that hold the rows would stay as they are in an exchange"
 MAX_ROWS_SHOWN = 3
 MIN_SUCCESS_RATE = 0.2
 """Share of the draws that must hold together; with less a run ends before it has the samples requested."""
@@ -95,13 +100,15 @@ class ResizeFallback:
     estimate: ResizeEstimate
 
 
-def resize_fallback(resolved: ResolvedKit, layouts: YieldEstimate, max_shapes: int) -> ResizeFallback | None:
+def resize_fallback(resolved: ResolvedKit, layouts: YieldEstimate | None, max_shapes: int) -> ResizeFallback | None:
     """Return the fallback with at most `max_shapes` shapes; None if it is not needed or not possible.
 
-    It is needed if `layouts` promises next to no layouts or only similar ones, and possible if enough resized
-    exemplars hold together.
+    It is needed if `layouts` promises next to no layouts or only similar ones, and where large parts hold rows, which
+    an exchange leaves as they are. It is possible if enough resized exemplars hold together.
+    layouts: what a search promises; None where its trial found enough
     """
-    if resolved.resolution.is_sufficient or not layouts.is_poor:
+    is_poor = layouts is not None and not resolved.resolution.is_sufficient and layouts.is_poor
+    if not is_poor and not _holds_rows(resolved):
         return None
     for own_kinds in (False, True):
         unvaried = _unvaried(resolved, own_kinds)
@@ -111,12 +118,23 @@ def resize_fallback(resolved: ResolvedKit, layouts: YieldEstimate, max_shapes: i
             break
     else:
         return None
-    reason = f"{estimate.success_rate:.0%} of what is drawn holds together; of other layouts {layouts.sentence}"
+    if not is_poor and estimate.other_layouts < MIN_LAYOUTS_INSTEAD:
+        return None
+    instead = f"of other layouts {layouts.sentence}" if is_poor and layouts else HELD_ROWS
+    reason = f"{estimate.success_rate:.0%} of what is drawn holds together; {instead}"
     stable_reason = "the exemplars are stable" if estimate.stable else "not even the exemplars are stable"
     fallback = ROWS_FALLBACK if estimate.has_rows else PROPORTIONS_FALLBACK
     values = {**unvaried.values, FALLBACK_KEY: fallback, FALLBACK_STABLE_KEY: estimate.stable}
     reasons = {**unvaried.reasons, FALLBACK_KEY: reason, FALLBACK_STABLE_KEY: stable_reason}
     return ResizeFallback(replace(unvaried, values=values, reasons=reasons), built, estimate)
+
+
+def _holds_rows(resolved: ResolvedKit) -> bool:
+    """Return whether parts that span rows hold most of each exemplar."""
+    built = resolved.observe(resolved.resolution.values)
+    if built.refusals or built.kit.one_surface or built.kit.by_meaning:
+        return False
+    return all(is_held_together(layout_of(built.kit, exemplar)) for exemplar in built.kit.exemplars)
 
 
 def _unvaried(resolved: ResolvedKit, own_kinds: bool) -> Resolution:

@@ -52,10 +52,11 @@ def run_shard(task: Task) -> Outcome:
     limits, tries = task.config.section(ExemplarsConfig).limits, task.config.section(AutoconfigConfig).max_tries
     resolved = read_and_resolve(config, limits, tries, task.shard.params["require"])
     resolution = resolved.resolution
-    if task.shard.params["fallback"] and not resolution.is_sufficient:
+    if task.shard.params["fallback"]:
         built = resolved.observe(resolution.values)
         if not built.refusals:
-            layouts = resolved.estimate(config, ContactOracle(built.kit), tries)
+            enough = resolution.is_sufficient
+            layouts = None if enough else resolved.estimate(config, ContactOracle(built.kit), tries)
             fallback = resize_fallback(resolved, layouts, max_shapes=0)
             resolution = resolution if fallback is None else fallback.resolution
     summary = resolution.as_json()
