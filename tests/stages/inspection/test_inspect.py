@@ -49,7 +49,9 @@ class TestJson:
         assert result["contacts"] == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
         assert [kind for _, _, kind in result["contact_kinds"]] == ["face", "line", "face", "face", "line", "face"]
         assert result["types"] == [{"name": "cube", "count": 4, "triangles": 12, "symmetries": 24}]
-        assert result["neighbourhoods"] == {"cube": [{"neighbours": {"cube": 3}, "seen": 4}]}
+        seen, *follow_from_rows = result["neighbourhoods"]["cube"]
+        assert seen == {"neighbours": {"cube": 3}, "seen": 4}
+        assert {rule["seen"] for rule in follow_from_rows} == {0}
         assert [docking["kind"] for docking in result["dockings"]] == ["face", "line"]
         assert result["segmentation"] == {"parts": "objects", "why": "4 named objects"}
         assert result["pieces"] == [[0, 1, 2, 3]]
