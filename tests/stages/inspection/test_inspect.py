@@ -152,7 +152,7 @@ class TestText:
         assert "contacts 6: 4 over a face, 2 along a line" in text
         assert "connected yes" in text
         assert "cube 4 12 24" in text
-        assert "grammar 1 neighbourhoods, 2 dockings of 1 part types" in text
+        assert "grammar 3 neighbourhoods, 2 dockings of 1 part types" in text
         assert f"picture {out / 'ring.png'}" in text
         assert text.endswith(f"config {out / 'ring.yaml'}")
         with Image.open(out / "ring.png") as image:
