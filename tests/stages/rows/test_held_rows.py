@@ -18,6 +18,6 @@ def test_uprights_walls_and_beams_hold_their_rows(build: Callable[[], tuple[Kit,
     assert is_held_together(build()[1])
 
 
-def test_links_hold_each_other() -> None:
+def test_links_are_held_by_no_part() -> None:
     kit = kit_of(CHAIN, [chain(4)])
     assert not is_held_together(layout_of(kit, kit.exemplars[0]))
