@@ -28,12 +28,12 @@ def row(count: int) -> dict[str, tuple[tuple[np.ndarray, np.ndarray], tuple[floa
 
 class TestNeighbourhoods:
     def test_ring_of_four_has_one_for_all(self) -> None:
-        kit = block_kit(ring())
+        kit = block_kit(ring(), row_neighbourhoods=False)
         assert kit.grammar.neighbourhoods == {0: {((0, 3),): 4}}
         assert kit.exemplars[0].assembly.edges.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
 
     def test_only_contacts_that_count_make_neighbours(self) -> None:
-        kit = block_kit(ring(), contact=FACES)
+        kit = block_kit(ring(), contact=FACES, row_neighbourhoods=False)
         assert kit.grammar.neighbourhoods == {0: {((0, 2),): 4}}
         assert kit.exemplars[0].assembly.edges.tolist() == [[0, 1], [0, 3], [1, 2], [2, 3]]
         assert {docking.kind for docking in kit.grammar.dockings} == {"face"}
