@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -58,6 +58,17 @@ class Model:
     warnings: tuple[str, ...]
     up: Literal["y", "z"] | None = None
     unit: float | None = None
+
+    @property
+    def shows_more_than_colors(self) -> bool:
+        """Whether a part has a texture, or a material that is not opaque."""
+        looks = [part.appearance for part in self.parts if part.appearance is not None]
+        materials = [material for look in looks for material in look.materials]
+        return any(material.texture is not None or material.alpha_mode != "opaque" for material in materials)
+
+    def with_colors_alone(self) -> Model:
+        """Return the model with one colour a face."""
+        return replace(self, parts=tuple(replace(part, appearance=None) for part in self.parts))
 
     @property
     def is_cut(self) -> bool:

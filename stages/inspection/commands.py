@@ -55,7 +55,7 @@ def inspect(
 ) -> None:
     """Show what can be made of a mesh, or of several models of one kit, and write a config for it."""
     from stages.exemplars.read import read_parts
-    from stages.exemplars.settings import KitConfig
+    from stages.exemplars.settings import AppearanceConfig, KitConfig
     from stages.grammars.inspect import may_have_grammar, write_grammar_report
     from stages.grammars.read_surface import is_point_cloud
     from stages.inspection.config_text import dataset_name
@@ -96,11 +96,15 @@ def inspect(
         _print_rows(rows)
         return
     read = []
+    textures = AppearanceConfig(keep="textures")
     for path in paths:
-        texture_size = config.appearance.kept_texture_size
-        read.append(read_parts(path, config.parts, limits, config.units, texture_size))
+        read.append(read_parts(path, config.parts, limits, config.units, textures.kept_texture_size))
         if not as_json:
             print(f"{path}: {len(read[-1].parts)} parts by {read[-1].segmentation}", file=sys.stderr, flush=True)
+    if any(model.shows_more_than_colors for model in read):
+        config = config.model_copy(update={"appearance": textures})
+    else:
+        read = [model.with_colors_alone() for model in read]
     with nullcontext() if as_json else ticking("inspect", "looking for settings and trying them out"):
         report = inspect_models(config, read, tries, limits)
     observation = describe_observation(report.observed, report.models, report.config)

@@ -48,7 +48,7 @@ def config_text(
     section: the lines of the section that says what is made of the kit.
     estimate: the yield estimate, a sentence.
     """
-    settings = config.resolved()
+    settings, keep = config.resolved(), config.appearance.keep
     segmentation = ", ".join(dict.fromkeys(model.segmentation for model in models))
     why = "; ".join(dict.fromkeys(model.why for model in models))
     kit: list[tuple[int, str, Any, str]] = [
@@ -58,6 +58,7 @@ def config_text(
         *((4, _value(name), list(patterns), "") for name, patterns in config.label_map.items()),
         (3, "up", settings.up, reasons.get("up", "")),
         *([(3, "units", config.units, "")] if config.units != "auto" else []),
+        *([(3, "appearance", keep, "the models have textures or see-through materials")] if keep != "colors" else []),
         (3, "contact", None, ""),
         (4, "tolerance", settings.tolerance, reasons.get("contact.tolerance", "")),
         (4, "kinds", list(settings.kinds), reasons.get("contact.kinds", "")),

@@ -15,6 +15,7 @@ from PIL import Image
 
 from pipeline.cli import main as shapemill
 from tests.stages.exemplars.model_files import box, write_obj
+from tests.stages.exemplars.test_appearance import textured_file
 
 
 def inspect(*arguments: object) -> int:
@@ -221,3 +222,12 @@ def test_table_has_a_row_for_every_readable_model(tmp_path: Path, capsys: Any) -
     assert header.startswith("| model | parts | types | up |")
     assert row.startswith("| ring | 4 | 1 |")
     assert "cut.glb" in printed.err
+
+
+@pytest.mark.parametrize("textured", [True, False])
+def test_written_config_keeps_textures_that_the_models_have(textured: bool, tmp_path: Path, capsys: Any) -> None:
+    path = textured_file(tmp_path / "ring.glb") if textured else ring(tmp_path)
+    result = inspected(capsys, path, "--out", tmp_path / "report")
+    written = yaml.safe_load((tmp_path / "report/ring.yaml").read_text(encoding="utf-8"))
+    assert written["exemplars"]["kits"][0].get("appearance") == ("textures" if textured else None)
+    assert not any("read as opaque colours" in warning for warning in result["warnings"])
