@@ -109,16 +109,11 @@ def test_one_worker_killed_in_every_stage_makes_the_folder_of_two_workers(made: 
     assert digests(one) == digests(two)
 
 
-def test_one_shard_is_reproduced_from_the_manifest(made: tuple[Path, Path], tmp_path: Path) -> None:
+def test_one_shard_is_reproduced_from_the_manifest(made: tuple[Path, Path]) -> None:
     published = made[1] / "small"
     code, printed = shapemill("reproduce", "val-000001", published, "--workers", 2)
     assert (code, printed.splitlines()[-1]) == (0, "val-000001: reproduced, with the same bytes as published"), printed
     assert "package: 1 of" in printed, "the other shards are not made"
-    manifest = json.loads((published / "manifest.json").read_bytes())
-    (tmp_path / "manifest.json").write_text(json.dumps({**manifest, "seed": 4}), encoding="utf-8")
-    code, printed = shapemill("reproduce", "val-000001", tmp_path, "--workers", 2)
-    assert code == 1
-    assert "has other bytes now" in printed
     for name, models, words in (
         ("val-9", "datasets/exemplars", "has no shard val-9"),
         ("val-000001", "eval", "--models"),
