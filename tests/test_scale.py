@@ -48,6 +48,7 @@ def record_of(surveyed: StageInventory, shard: Shard) -> ShardRecord:
         "renderer_version": "none",
     }
     rows |= {"rooted": samples, "stable": samples, "path": f"{shard.name}.tar", "members": ["glb"], "bytes": 1}
+    rows["kits"] = {"chair": samples}
     return ShardRecord(
         stage=surveyed.stage.name,
         shard=shard.name,
