@@ -56,7 +56,7 @@ def test_unit_goes_from_file_to_shape_and_card(tmp_path: Path) -> None:
     loaded = load_kit(tmp_path / "kit.json", tmp_path / "kit.tar")
     assert upright(kit_shape(loaded, loaded.exemplars[0].assembly)).unit == "metre"
     tallies = {name: SourceTally() for name in ("table", "chest")}
-    assert "no unit" in unit_sentence(tallies)
+    assert "The unit is unknown" in unit_sentence(tallies)
     tallies["table"].unit = "metre"
     assert "the metre for table, and unknown for the others" in unit_sentence(tallies)
     tallies["chest"].unit = "metre"

@@ -33,7 +33,7 @@ def test_node_tree_holds_what_leads_to_a_mesh(tmp_path: Path) -> None:
 
 def test_scene_is_the_same_on_both_sides_of_the_process(tmp_path: Path) -> None:
     for path in write_good(tmp_path):
-        here, there = read_scene(path), read_model(path)
+        here, there = read_scene(path), read_model(path, texture_size=4096)
         assert pack_scene(unpack_scene(pack_scene(here))[0]) == pack_scene(here)
         assert pack_scene(there) == pack_scene(here)
         assert (there.unit is None) == (path.suffix in (".obj", ".ply", ".stl", ".off"))

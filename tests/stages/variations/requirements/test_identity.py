@@ -85,7 +85,7 @@ def test_compiled_test_agrees_with_counts(types: list[int], factor: float) -> No
 
 
 def test_trial_search_keeps_labels_and_gives_up_those_that_cannot_be_kept() -> None:
-    kit = kit_of(GATED_ROAD, [gated_ring(3, 2)])
+    kit = kit_of(GATED_ROAD, [gated_ring(3, 2)], row_neighbourhoods=False)
     search = TrialSearch(ContactOracle(kit), np.random.default_rng(1), keep_types=common_labels(kit))
     result = search.run(500, 12)
     assert result.graphs >= 10
