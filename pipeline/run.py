@@ -292,7 +292,8 @@ class _Run:
         """Return the requested shards and those that they read. Raises ConfigError without any."""
         names, only = [shard.name for shard in state.shards], self._options.only
         wanted = {name for name in names if not only or f"{name}-".startswith(f"{only}-")}
-        wanted = wanted & {self._options.target} or wanted
+        if self._options.target in names:
+            wanted = {self._options.target}
         if not wanted and names:
             raise ConfigError(f"{self._name} has no shards {only} or {only}-...; it has {', '.join(names)}")
         for shard in reversed(state.shards):  # a shard's inputs are planned before it

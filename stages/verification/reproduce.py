@@ -8,19 +8,57 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from pydantic import BaseModel, ValidationError
 
 from pipeline.config import Config, load_config
+from pipeline.display import ticking
 from pipeline.errors import ConfigError
 from pipeline.paths import DatasetPaths, file_digest, read_json
 from pipeline.run import run_stages
 from pipeline.stage import Stage
+from stages.exemplars.diagnostics import listed_names
 from stages.package.layout import MANIFEST
 from stages.package.manifest import config_sections
 from stages.package.versions import code_version, library_versions
 from stages.shape.collection.discovery import producers
 
-FACTS = ("name", "version", "seed")
-"""Keys of a manifest that its config needs besides the sections."""
+
+class _Shard(BaseModel):
+    path: str
+    split: str
+    sha256: str
+
+    @property
+    def short_name(self) -> str:
+        """Split and number: `train-000007`."""
+        return f"{self.split}-{Path(self.path).stem.rpartition('-')[2]}"
+
+
+class _Origin(BaseModel):
+    file: str
+    sha256: str
+
+
+class _Software(BaseModel):
+    shapemill: str
+    libraries: dict[str, str]
+
+
+class _Manifest(BaseModel):
+    """What is read of a manifest."""
+
+    name: str
+    version: str
+    seed: int
+    config: dict[str, Any]
+    shards: list[_Shard]
+    origins: list[_Origin]
+    software: _Software
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What a config has besides the sections."""
+        return {"name": self.name, "version": self.version, "seed": self.seed}
 
 
 def reproduce_shard(
@@ -38,9 +76,11 @@ def reproduce_shard(
     manifest = _manifest(manifest_file)
     published = _shard(manifest, shard_name, manifest_file)
     with tempfile.TemporaryDirectory(prefix="shapemill-") as temporary:
-        config = _config(manifest, _models(manifest, folders), stages, Path(temporary))
+        with ticking("reproduce", "looking for the models by their sha256"):
+            models = _models(manifest, folders)
+        config = _config(manifest, models, stages, Path(temporary))
         paths = DatasetPaths(Path(temporary), config.name)
-        target = f"{config.name}-{published['split']}-{published['path'][-len('000000.tar') : -len('.tar')]}"
+        target = f"{config.name}-{published.short_name}"
         before, after = _split_at_collection(config, stages)
         results = run_stages(before, stages, config, paths, workers)
         failed = [message for result in results.values() for message in result.failed.values()]
@@ -50,41 +90,40 @@ def reproduce_shard(
         made = paths.stage("package").root / f"{target}.tar"
         if failed or not made.is_file():
             yield failed[0] if failed else f"the search makes no shard {target} now"
-        elif file_digest(made) != published["sha256"]:
-            yield f"{published['path']} has other bytes now"
-            yield from _versions(manifest["software"])
+        elif file_digest(made) != published.sha256:
+            yield f"{published.path} has other bytes now"
+            yield from _versions(manifest.software)
 
 
-def _manifest(path: Path) -> dict[str, Any]:
+def _manifest(path: Path) -> _Manifest:
     file = path / MANIFEST if path.is_dir() else path
-    manifest = read_json(file)
-    if not isinstance(manifest, dict) or not {*FACTS, "config", "shards", "origins", "software"} <= manifest.keys():
-        raise ConfigError(f"{file}: is no manifest of a dataset; name the dataset's folder")
-    return manifest
+    try:
+        return _Manifest.model_validate(read_json(file))
+    except ValidationError as error:
+        where = ".".join(map(str, error.errors()[0]["loc"]))
+        raise ConfigError(
+            f"{file}: is no manifest of a dataset ({where or 'all'}); name the dataset's folder"
+        ) from None
 
 
-def _shard(manifest: Mapping[str, Any], name: str, path: Path) -> Mapping[str, Any]:
-    """Return the entry of a shard."""
-    stem = Path(name).name.removesuffix(".tar")
-    for shard in manifest["shards"]:
-        own: str = Path(shard["path"]).name.removesuffix(".tar")
-        if own == stem or own.endswith(f"-{stem}"):
-            return dict(shard)
-    listed = [Path(shard["path"]).name for shard in manifest["shards"]]
-    raise ConfigError(f"{path}: has no shard {name}; it has {', '.join(listed[:3])} and {len(listed) - 3} more")
+def _shard(manifest: _Manifest, name: str, path: Path) -> _Shard:
+    for shard in manifest.shards:
+        if Path(name).name in (shard.short_name, Path(shard.path).name):
+            return shard
+    listed = listed_names([shard.short_name for shard in manifest.shards])
+    raise ConfigError(f"{path}: has no shard {name}; it has {listed}")
 
 
-def _config(
-    manifest: Mapping[str, Any], models: Mapping[str, str], stages: Mapping[str, Stage], folder: Path
-) -> Config:
+def _config(manifest: _Manifest, models: Mapping[str, str], stages: Mapping[str, Stage], folder: Path) -> Config:
     """Return the config of a manifest, with the paths of its models. Raises ConfigError, naming a file in `folder`."""
-    facts = {key: manifest[key] for key in FACTS}
-    file = folder / f"{manifest['name']}.yaml"
+    file = folder / "config.yaml"  # the name may be anything until it is checked
     models_of = {name: stage.config for name, stage in stages.items()}
-    defaults = config_sections(Config(**facts, sections={name: own() for name, own in models_of.items()}, path=file))
+    defaults = config_sections(
+        Config(**manifest.facts, sections={name: own() for name, own in models_of.items()}, path=file)
+    )
     # A section that is left out may hold what it may not state, such as views without cameras.
-    stated = {name: section for name, section in manifest["config"].items() if section != defaults.get(name)}
-    file.write_text(yaml.safe_dump(facts | _located(stated, models)), encoding="utf-8")
+    stated = {name: section for name, section in manifest.config.items() if section != defaults.get(name)}
+    file.write_text(yaml.safe_dump(manifest.facts | _located(stated, models)), encoding="utf-8")
     config = load_config(file, models_of)
     for stage in stages.values():
         stage.check(config)
@@ -100,11 +139,14 @@ def _split_at_collection(config: Config, stages: Mapping[str, Stage]) -> tuple[l
     return names[:place], names[place:]
 
 
-def _models(manifest: Mapping[str, Any], folders: Sequence[Path]) -> dict[str, str]:
-    """Return the path of each model by the name that the manifest's config has for it."""
+def _models(manifest: _Manifest, folders: Sequence[Path]) -> dict[str, str]:
+    """Return the path of each model by the name that the manifest's config has for it: its folder's and its own."""
     found: dict[str, str] = {}
-    for origin in manifest["origins"]:
-        name, digest = origin["file"], origin["sha256"]
+    digests: dict[str, str] = {}
+    for origin in manifest.origins:
+        name, digest = origin.file, origin.sha256
+        if digests.setdefault(name, digest) != digest:
+            raise ConfigError(f"two models of the dataset are called {name}: its manifest does not tell which is where")
         for folder in folders:
             near = (path for path in sorted(folder.rglob(Path(name).name)) if path.is_file())
             match = next((path for path in near if file_digest(path) == digest), None)
@@ -126,11 +168,11 @@ def _located(value: Any, models: Mapping[str, str]) -> Any:
     return models.get(value, value) if isinstance(value, str) else value
 
 
-def _versions(software: Mapping[str, Any]) -> Iterator[str]:
+def _versions(software: _Software) -> Iterator[str]:
     """Yield what else is here than what the dataset was made with."""
-    if software["shapemill"] != code_version():
-        yield f"it was made with Shapemill {software['shapemill']}, and this is {code_version()}"
+    if software.shapemill != code_version():
+        yield f"it was made with Shapemill {software.shapemill}, and this is {code_version()}"
     here = library_versions()
-    for name, version in software["libraries"].items():
+    for name, version in software.libraries.items():
         if here.get(name) != version:
             yield f"it was made with {name} {version}, and this is {here.get(name, 'not installed')}"
