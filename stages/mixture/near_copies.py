@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
@@ -33,18 +34,13 @@ def unit_clouds(shape: Shape, rng: np.random.Generator) -> npt.NDArray[np.float3
     return result
 
 
-def near_pairs(
-    clouds: npt.NDArray[np.float32], extents: FloatArray, groups: npt.NDArray[np.int64], splits: npt.NDArray[np.int64]
-) -> Iterator[tuple[int, int]]:
-    """Yield pairs of near copies in different groups and different splits, the lower index first.
+def copy_features(clouds: npt.NDArray[np.float32], extents: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return features (k, 8), which differ by at most 1 between near copies, and the distance of each pair of clouds.
 
     clouds: two of each shape, float32 (k, 2, n, 3), as `unit_clouds`
     extents: sides of the box around each shape, as shares of its diagonal, float64 (k, 3)
-    groups, splits: int64 (k,)
     """
-    from scipy.spatial import cKDTree
-
-    points = clouds.reshape(len(clouds), -1, 3)
+    points = np.concatenate([clouds[:, 0], clouds[:, 1]], axis=1)
     moments = np.column_stack(
         [
             _turned(points.std(axis=1)),
@@ -53,13 +49,43 @@ def near_pairs(
         ]
     )
     features = np.column_stack([_turned(extents) / MAX_EXTENT_DIFFERENCE, moments / MAX_MOMENT_DIFFERENCE])
-    spacings = np.array([_distance(first, second) for first, second in clouds])
-    pairs = cKDTree(features).query_pairs(1.0, p=np.inf, output_type="ndarray")
-    pairs = pairs[(groups[pairs[:, 0]] != groups[pairs[:, 1]]) & (splits[pairs[:, 0]] != splits[pairs[:, 1]])]
-    for first, second in pairs[np.lexsort(pairs.T[::-1])].tolist():
+    return features, np.array([_distance(first, second) for first, second in clouds], dtype=np.float64)
+
+
+def near_pairs(
+    features: FloatArray,
+    spacings: FloatArray,
+    cloud_of: Callable[[int], npt.NDArray[np.float32]],
+    groups: npt.NDArray[np.int64],
+    splits: npt.NDArray[np.int64],
+) -> Iterator[tuple[int, int]]:
+    """Yield pairs of near copies in different groups and different splits, the lower index first.
+
+    features, spacings: of each shape, as `copy_features`
+    cloud_of: returns a cloud of a shape, float32 (n, 3)
+    groups, splits: int64 (k,)
+    """
+    for first, second in sorted(_candidates(features, groups, splits)):
         limit = MAX_DISTANCE_RATIO * min(spacings[first], spacings[second])
-        if any(_distance(clouds[first, 0] @ turn.T, clouds[second, 0]) <= limit for turn in QUARTER_TURNS):
+        one, other = cloud_of(first), cloud_of(second)
+        if any(_distance(one @ turn.T, other) <= limit for turn in QUARTER_TURNS):
             yield first, second
+
+
+def _candidates(
+    features: FloatArray, groups: npt.NDArray[np.int64], splits: npt.NDArray[np.int64]
+) -> Iterator[tuple[int, int]]:
+    """Yield pairs with similar features in different groups and splits, the lower index first."""
+    from scipy.spatial import cKDTree
+
+    members = [np.flatnonzero(groups == group) for group in np.unique(groups)]
+    trees = [cKDTree(features[own]) for own in members]
+    for a, b in combinations(range(len(trees)), 2):
+        for place, near in enumerate(trees[a].query_ball_tree(trees[b], 1.0, p=np.inf)):
+            first = int(members[a][place])
+            for second in members[b][near].tolist():
+                if splits[first] != splits[second]:
+                    yield min(first, second), max(first, second)
 
 
 def _turned(lengths: FloatArray) -> FloatArray:

@@ -78,9 +78,9 @@ def run_listing(task: Task) -> Outcome:
     Files of the shard:
         `.jsonl`: key, kit, graph and parents of each sample, one a line
         `.clouds.npy`: `unit_clouds` of each, float32 (k, 2, n, 3)
-        `.extents.npy`: sides of the box around each, as shares of its diagonal, float64 (k, 3)
+        `.features.npy`: `copy_features` of each, and the distance of its clouds last, float64 (k, 9)
     """
-    from stages.mixture.near_copies import POINTS_PER_CLOUD, unit_clouds
+    from stages.mixture.near_copies import POINTS_PER_CLOUD, copy_features, unit_clouds
     from stages.shape.collection.collection import Collection
     from stages.shape.geometry.bounds import shape_bounds
 
@@ -94,10 +94,11 @@ def run_listing(task: Task) -> Outcome:
             extents.append((high - low) / np.linalg.norm(high - low))
             row = {"key": sample.key, "kit": sample.kit, "graph": sample.graph}
             stream.write(json_bytes({**row, "parents": list(sample.lineage.get("parents", ()))}))
-    with task.output(f"{task.shard.name}.clouds.npy") as stream:
-        stream.write(array_bytes(np.array(clouds, np.float32).reshape(-1, 2, POINTS_PER_CLOUD, 3)))
-    with task.output(f"{task.shard.name}.extents.npy") as stream:
-        stream.write(array_bytes(np.array(extents, np.float64).reshape(-1, 3)))
+    both = np.array(clouds, np.float32).reshape(-1, 2, POINTS_PER_CLOUD, 3)
+    features = np.column_stack(copy_features(both, np.array(extents, np.float64).reshape(-1, 3)))
+    for what, array in (("clouds", both), ("features", features)):
+        with task.output(f"{task.shard.name}.{what}.npy") as stream:
+            stream.write(array_bytes(array))
     return Outcome(0, {"listed": len(clouds)})
 
 
@@ -152,12 +153,17 @@ def _copies(task: Task, rows: Sequence[Row], splits: npt.NDArray[np.int64]) -> l
     from stages.mixture.near_copies import left_out, near_pairs
 
     listings = task.shard.params["listings"]
-    clouds, extents = (
-        np.concatenate([bytes_array(task.input("mixture", f"{name}.{what}.npy").read_bytes()) for name in listings])
-        for what in ("clouds", "extents")
-    )
+    read = [bytes_array(task.input("mixture", f"{name}.features.npy").read_bytes()) for name in listings]
+    starts, features = np.cumsum([0, *map(len, read)]), np.concatenate(read)
+
+    def cloud_of(number: int) -> npt.NDArray[np.float32]:
+        place = int(np.searchsorted(starts, number, side="right")) - 1
+        path = task.input("mixture", f"{listings[place]}.clouds.npy")
+        cloud: npt.NDArray[np.float32] = np.load(path, mmap_mode="r", allow_pickle=False)[number - starts[place], 0]
+        return cloud
+
     makers = np.array([task.shard.params["joined"].index(row["producer"]) for row in rows], dtype=np.int64)
-    pairs = [*_equal_graphs(rows), *near_pairs(clouds, extents, makers, splits)]
+    pairs = [*_equal_graphs(rows), *near_pairs(features[:, :-1], features[:, -1], cloud_of, makers, splits)]
     return left_out(pairs, splits)
 
 

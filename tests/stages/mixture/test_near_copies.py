@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stages.mixture.near_copies import left_out, near_pairs, unit_clouds
+from stages.mixture.near_copies import copy_features, left_out, near_pairs, unit_clouds
 from stages.programs.program import shape_from_parts
 from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.shape import Shape
@@ -28,7 +28,8 @@ def pairs_of(shapes: list[Shape], groups: list[int], splits: list[int]) -> list[
     clouds = np.array([unit_clouds(shape, rng) for shape, rng in zip(shapes, rngs, strict=True)])
     sides = np.array([np.diff(shape_bounds(shape), axis=0)[0] for shape in shapes])
     extents = sides / np.linalg.norm(sides, axis=1, keepdims=True)
-    return list(near_pairs(clouds, extents, np.array(groups), np.array(splits)))
+    features, spacings = copy_features(clouds, extents)
+    return list(near_pairs(features, spacings, lambda number: clouds[number, 0], np.array(groups), np.array(splits)))
 
 
 def test_copies_in_other_places_sizes_and_quarter_turns_are_found() -> None:
@@ -49,3 +50,8 @@ def test_what_is_in_most_pairs_is_left_out_and_else_what_is_in_train() -> None:
     assert left_out([(0, 1), (1, 2), (1, 3)], splits) == [1]
     assert left_out([(0, 1), (3, 4)], splits) == [0, 3]
     assert left_out([], splits) == []
+
+
+def test_a_shard_without_samples_has_no_features() -> None:
+    features, spacings = copy_features(np.empty((0, 2, 512, 3), np.float32), np.empty((0, 3)))
+    assert (features.shape, spacings.shape) == ((0, 8), (0,))
