@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +15,7 @@ ALPHA_MODES = {"opaque": 0, "mask": 1, "blend": 2}
 WRAPS = {"repeat": 0, "mirror": 1, "clamp": 2}
 
 
-@dataclass(frozen=True, eq=False)
-class MeshLook:
+class MeshLook(NamedTuple):
     """Materials and textures of a set of meshes with f faces in all.
 
     face_material: row of the materials, or -1, int32 (f,)
@@ -44,25 +42,17 @@ class MeshLook:
     wraps: np.ndarray
     nearest: BoolArray
 
-    @cached_property
+    @property
     def has_holes(self) -> BoolArray:
         """Whether each face is masked or blended, so that something behind it may be seen, bool (f,)."""
         holes: BoolArray = np.array([*(self.mode > 0), False])[self.face_material]
         return holes
 
-    @cached_property
+    @property
     def is_blended(self) -> BoolArray:
         """Whether each face is blended with what is behind it, bool (f,)."""
         blended: BoolArray = np.array([*(self.mode == ALPHA_MODES["blend"]), False])[self.face_material]
         return blended
-
-    @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """The arguments of the kernels, in their order."""
-        return (
-            *(self.face_material, self.uv, self.base, self.texture, self.mode, self.cutoff),
-            *(self.texels, self.levels, self.level_first, self.wraps, self.nearest),
-        )
 
 
 def mesh_look(appearances: Sequence[Appearance | None], face_counts: Sequence[int]) -> MeshLook | None:

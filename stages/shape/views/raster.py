@@ -72,8 +72,8 @@ def _raster(screen, width, height, bits):
         for k in range(3):
             x[k] = np.int64(np.floor(screen[t, k, 0] * grid + 0.5))
             y[k] = np.int64(np.floor(screen[t, k, 1] * grid + 0.5))
-        left, right = _centres(x, bits, width)
-        top, bottom = _centres(y, bits, height)
+        left, right = centres_between(x, bits, width)
+        top, bottom = centres_between(y, bits, height)
         if left > right or top > bottom:
             continue
         area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
@@ -113,7 +113,7 @@ def _raster(screen, width, height, bits):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _centres(corners, bits, size):
+def centres_between(corners, bits, size):
     """Return the first and last of `size` pixels whose centres lie between the corners of a triangle along one axis."""
     half = (1 << bits) >> 1
     first = ((min(corners[0], corners[1], corners[2]) - half - 1) >> bits) + 1

@@ -16,14 +16,15 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import Float32Array, FloatArray, IntArray
+from stages.shape.views.mesh_look import ALPHA_MODES
 from stages.shape.views.palette import srgb_to_linear
-from stages.shape.views.raster import COORDINATE_BITS, GRID_BITS, _centres, raster
+from stages.shape.views.raster import COORDINATE_BITS, GRID_BITS, centres_between, raster
 from stages.shape.views.scene import Scene
 from stages.shape.views.screen import clip_at, eye_depth
 
 MAX_LAYERS = 8
 """Surfaces that are seen through, one behind another, at one sample; farther ones are left out."""
-MASK_MODE, BLEND_MODE = 1, 2
+MASK_MODE, BLEND_MODE = ALPHA_MODES["mask"], ALPHA_MODES["blend"]
 
 
 def sample_colors(scene: Scene, triangles: IntArray, screen: FloatArray, projection: FloatArray) -> Float32Array:
@@ -37,9 +38,8 @@ def sample_colors(scene: Scene, triangles: IntArray, screen: FloatArray, project
     meshes = scene.meshes
     if meshes.look is None:
         raise ValueError("the scene has no materials")
-    colors: Float32Array = _sample(
-        *(triangles, screen, projection, scene.triangle_face, srgb_to_linear(meshes.colors)), *meshes.look.arrays
-    )
+    linear = srgb_to_linear(meshes.colors)
+    colors: Float32Array = _sample(triangles, screen, projection, scene.triangle_face, linear, meshes.look)
     return colors
 
 
@@ -79,10 +79,8 @@ def see_through_layers(
     farthest = float(np.abs(layered[:, :, :2]).max(initial=1.0))
     bits = min(COORDINATE_BITS - int(np.frexp(farthest)[1]), GRID_BITS)
     pixels, depths, owners = _fragments(layered, chosen, width, height, bits, solid)
-    colors = _sample_list(
-        *(pixels, owners, width, screen, projection, scene.triangle_face, srgb_to_linear(scene.meshes.colors)),
-        *look.arrays,
-    )
+    linear = srgb_to_linear(scene.meshes.colors)
+    colors = _sample_list(pixels, owners, width, screen, projection, scene.triangle_face, linear, look)
     seen = np.flatnonzero(colors[:, 3] > 0.0)
     order = seen[np.lexsort((owners[seen], depths[seen], pixels[seen]))]
     pixels, owners, colors = pixels[order], owners[order], colors[order]
@@ -115,8 +113,8 @@ def _fragments(screen, chosen, width, height, bits, solid):
         for k in range(3):
             x[k] = np.int64(np.floor(screen[t, k, 0] * grid + 0.5))
             y[k] = np.int64(np.floor(screen[t, k, 1] * grid + 0.5))
-        left, right = _centres(x, bits, width)
-        top, bottom = _centres(y, bits, height)
+        left, right = centres_between(x, bits, width)
+        top, bottom = centres_between(y, bits, height)
         area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
         if left > right or top > bottom or area == 0:
             continue
@@ -146,125 +144,64 @@ def _fragments(screen, chosen, width, height, bits, solid):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _sample(
-    triangles,
-    screen,
-    projection,
-    face_of,
-    colors,
-    face_material,
-    uv,
-    base,
-    texture,
-    mode,
-    cutoff,
-    texels,
-    levels,
-    level_first,
-    wraps,
-    nearest,
-):
+def _sample(triangles, screen, projection, face_of, colors, look):
     height, width = triangles.shape
     out = np.zeros((height, width, 4), dtype=np.float32)
     for row in range(height):
         for column in range(width):
             t = triangles[row, column]
             if t >= 0:
-                _color(
-                    *(out[row, column], t, column + 0.5, row + 0.5, screen, projection, face_of[t], colors),
-                    *(face_material, uv, base, texture, mode, cutoff, texels, levels, level_first, wraps, nearest),
-                )
+                _color(out[row, column], t, column + 0.5, row + 0.5, screen, projection, face_of[t], colors, look)
     return out
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _sample_list(
-    pixels,
-    owners,
-    width,
-    screen,
-    projection,
-    face_of,
-    colors,
-    face_material,
-    uv,
-    base,
-    texture,
-    mode,
-    cutoff,
-    texels,
-    levels,
-    level_first,
-    wraps,
-    nearest,
-):
+def _sample_list(pixels, owners, width, screen, projection, face_of, colors, look):
     out = np.zeros((len(pixels), 4), dtype=np.float32)
     for n in range(len(pixels)):
         t, x, y = owners[n], pixels[n] % width + 0.5, pixels[n] // width + 0.5
-        _color(
-            *(out[n], t, x, y, screen, projection, face_of[t], colors),
-            *(face_material, uv, base, texture, mode, cutoff, texels, levels, level_first, wraps, nearest),
-        )
+        _color(out[n], t, x, y, screen, projection, face_of[t], colors, look)
     return out
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _color(
-    out,
-    t,
-    x,
-    y,
-    screen,
-    projection,
-    face,
-    colors,
-    face_material,
-    uv,
-    base,
-    texture,
-    mode,
-    cutoff,
-    texels,
-    levels,
-    level_first,
-    wraps,
-    nearest,
-):
+def _color(out, t, x, y, screen, projection, face, colors, look):
     """Write linear colour and alpha of triangle t at a point of the screen."""
-    material = face_material[face]
+    material = look.face_material[face]
     if material < 0:
         out[0], out[1], out[2], out[3] = colors[face, 0], colors[face, 1], colors[face, 2], 1.0
         return
-    red, green, blue, alpha = base[material, 0], base[material, 1], base[material, 2], base[material, 3]
-    number = texture[material]
+    base = look.base[material]
+    red, green, blue, alpha = base[0], base[1], base[2], base[3]
+    number = look.texture[material]
     if number >= 0:
-        first = level_first[number]
-        wide, high = levels[first, 1], levels[first, 2]
-        u, v = _uv_at(screen, t, x, y, projection, uv[face], True)
-        here_u, here_v = _uv_at(screen, t, x, y, projection, uv[face], False)
-        right_u, right_v = _uv_at(screen, t, x + 1.0, y, projection, uv[face], False)
-        down_u, down_v = _uv_at(screen, t, x, y + 1.0, projection, uv[face], False)
+        first = look.level_first[number]
+        wide, high = look.levels[first, 1], look.levels[first, 2]
+        u, v = _uv_at(screen, t, x, y, projection, look.uv[face], True)
+        here_u, here_v = _uv_at(screen, t, x, y, projection, look.uv[face], False)
+        right_u, right_v = _uv_at(screen, t, x + 1.0, y, projection, look.uv[face], False)
+        down_u, down_v = _uv_at(screen, t, x, y + 1.0, projection, look.uv[face], False)
         across = ((right_u - here_u) * wide) ** 2 + ((right_v - here_v) * high) ** 2
         along = ((down_u - here_u) * wide) ** 2 + ((down_v - here_v) * high) ** 2
         step = np.sqrt(max(across, along))
-        level, share, last = first, 0.0, level_first[number + 1] - 1
+        level, share, last = first, 0.0, look.level_first[number + 1] - 1
         if step > 1.0:
             size = 1.0
             while step >= 2.0 * size and level < last:
                 size *= 2.0
                 level += 1
             share = min(step / size - 1.0, 1.0)
-        square = nearest[number] and step <= 1.0
-        r, g, b, a = _texel(texels, levels[level], wraps[number], u, v, square)
+        square = look.nearest[number] and step <= 1.0
+        r, g, b, a = _texel(look.texels, look.levels[level], look.wraps[number], u, v, square)
         if share > 0.0 and level < last:
-            r2, g2, b2, a2 = _texel(texels, levels[level + 1], wraps[number], u, v, False)
+            r2, g2, b2, a2 = _texel(look.texels, look.levels[level + 1], look.wraps[number], u, v, False)
             r, g, b, a = r + share * (r2 - r), g + share * (g2 - g), b + share * (b2 - b), a + share * (a2 - a)
         if a > 0.0:
             red, green, blue = red * r / a, green * g / a, blue * b / a
         alpha *= a
-    if mode[material] == MASK_MODE:
-        alpha = 1.0 if alpha >= cutoff[material] else 0.0
-    elif mode[material] != BLEND_MODE:
+    if look.mode[material] == MASK_MODE:
+        alpha = 1.0 if alpha >= look.cutoff[material] else 0.0
+    elif look.mode[material] != BLEND_MODE:
         alpha = 1.0
     out[0], out[1], out[2], out[3] = red, green, blue, alpha
 
