@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,10 +28,12 @@ from stages.model_files.source_materials import (
     stated_number,
     stated_numbers,
 )
-from stages.shape.appearance import NO_MATERIAL, Material, Texture, TextureImage, given_normals
+from stages.shape.appearance import NO_MATERIAL, Material, Texture, TextureImage, Wrap, given_normals
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 _MAX_DEPTH = 200
+_WRAPS: Mapping[str, Wrap] = {"WRAP": "repeat", "MIRROR": "mirror"}
+"""By the words of COLLADA. All others are clamped: CLAMP, BORDER and NONE."""
 _MAX_NODES = 200_000
 """Nodes that are visited. If every node places its children twice, their number doubles at each level."""
 
@@ -209,12 +211,12 @@ class _Reader:
         effect = getattr(target, "effect", None)
         if effect is None:
             return None
-        diffuse, image = effect.diffuse, None
+        diffuse, texture = effect.diffuse, None
         red, green, blue = (1.0, 1.0, 1.0)
         if isinstance(diffuse, tuple):
             red, green, blue = linear_color(stated_numbers(diffuse[:3], (0.0, 0.0, 0.0)))
         elif diffuse is not None:
-            image = self.image(diffuse.sampler.surface.image.path)
+            texture = self.texture(diffuse.sampler)
         alpha = 1.0
         if isinstance(effect.transparent, tuple) and len(effect.transparent) == 4:
             share = stated_number(effect.transparency, 1.0)
@@ -224,6 +226,9 @@ class _Reader:
                 alpha = share * stated_number(effect.transparent[3], 1.0)
         elif effect.transparent is None and effect.transparency is not None:
             alpha = stated_number(effect.transparency, 1.0)
+        if alpha <= 0.0:
+            self.not_kept.append(f"material {name!r} is stated to be invisible; it is taken for opaque")
+            alpha = 1.0
         glow = effect.emission if isinstance(effect.emission, tuple) else (0.0, 0.0, 0.0)
         maps = [key for key in ("emission", "transparent", "bumpmap") if hasattr(getattr(effect, key, None), "sampler")]
         if maps:
@@ -231,11 +236,11 @@ class _Reader:
         shine = effect.shininess if isinstance(effect.shininess, int | float) else 0.0
         return Material(
             name,
-            (red, green, blue, alpha or 1.0),
-            None if image is None else Texture(image),
+            (red, green, blue, alpha),
+            texture,
             roughness=float(np.sqrt(2.0 / (2.0 + max(float(np.nan_to_num(shine)), 0.0)))),
             emissive=linear_color(stated_numbers(glow[:3], (0.0, 0.0, 0.0))),
-            alpha_mode=alpha_mode_of(alpha or 1.0, None if image is None else image.pixels),
+            alpha_mode=alpha_mode_of(alpha, None if texture is None else texture.image.pixels),
             double_sided=True,
         )
 
@@ -271,12 +276,23 @@ class _Reader:
             if paint is None:
                 colors[:] = color_bytes(np.array(diffuse[:3], dtype=np.float64))
         elif diffuse is not None and primitive.sources.get("TEXCOORD"):
-            image = self.image(diffuse.sampler.surface.image.path)
-            if image is not None:
+            texture = self.texture(diffuse.sampler)
+            if texture is not None:
                 offset, *_, source = primitive.sources["TEXCOORD"][0]
                 uv = np.asarray(source.data, dtype=np.float64)[:, :2]
-                colors = sample_texture(image.pixels, uv[table[:, offset]], rows)
+                wraps = texture.wrap_u, texture.wrap_v
+                colors = sample_texture(texture.image.pixels, uv[table[:, offset]], rows, *wraps)
         return colors, paint
+
+    def texture(self, sampler: Any) -> Texture | None:
+        """Return an image with its sampler; None for an image that cannot be read, with a warning."""
+        image = self.image(sampler.surface.image.path)
+        if image is None:
+            return None
+        nodes = [] if sampler.xmlnode is None else sampler.xmlnode.iter()
+        said = {str(node.tag).rpartition("}")[2]: (node.text or "").strip() for node in nodes}
+        wrap_u, wrap_v = (_WRAPS.get(said.get(key, "WRAP"), "clamp") for key in ("wrap_s", "wrap_t"))
+        return Texture(image, wrap_u, wrap_v, nearest=said.get("magfilter") == "NEAREST")
 
     def image(self, name: str) -> TextureImage | None:
         if name not in self.images:

@@ -117,6 +117,22 @@ def test_a_textured_square_has_its_material_pixels_coordinates_and_normals(name:
     np.testing.assert_allclose(look.normals, NORMALS[at], atol=1e-6)
 
 
+def test_sampler_and_invisible_material_of_a_dae(tmp_path: Path) -> None:
+    text = dae(tmp_path).read_text(encoding="utf-8")
+    sampler = "<wrap_s>MIRROR</wrap_s><wrap_t>CLAMP</wrap_t><magfilter>NEAREST</magfilter></sampler2D>"
+    text = text.replace("</sampler2D>", sampler)
+    text = text.replace("</diffuse>", "</diffuse><transparency><float>0</float></transparency>")
+    (tmp_path / "square.dae").write_text(text, encoding="utf-8")
+    scene = read_model(tmp_path / "square.dae", texture_size=512)
+    assert scene.warnings == ("material 'tiles' is stated to be invisible; it is taken for opaque",)
+    assert scene.surfaces[0].appearance is not None
+    (material,) = scene.surfaces[0].appearance.materials
+    texture = material.texture
+    assert texture is not None
+    assert (texture.wrap_u, texture.wrap_v, texture.nearest) == ("mirror", "clamp", True)
+    assert (material.base_color[3], material.alpha_mode) == (1.0, "opaque")
+
+
 def test_numbers_of_a_gltf_material_are_kept(tmp_path: Path) -> None:
     (surface,) = read_model(glb(tmp_path), texture_size=512).surfaces
     assert surface.appearance is not None
