@@ -1,0 +1,162 @@
+"""Clouds of shapes with the part of each point: of finished datasets, and of real shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.errors import ConfigError, Rejected
+from stages.exemplars.read import read_parts
+from stages.exemplars.segmentation import CUTS
+from stages.exemplars.settings import Segmentation
+from stages.model_files.read import ReadFailed
+from stages.package.reader import Dataset
+from stages.points.area_sampling import sample_shape, sample_surface
+from stages.shape.arrays import FloatArray
+from stages.shape.geometry.pose import transform_points
+from stages.shapeassembly.extraction.readers.child_process import read_grass_in_child
+from stages.shapeassembly.shape import shape_of_text
+from stages.shapeassembly.sources import listed_names, program_texts
+from stages.training.recovery.clouds import frame_of, subsample
+
+Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+
+
+@dataclass(frozen=True)
+class LabelledClouds:
+    """Clouds of n shapes, y up, each centred, with a bounding box of diagonal 1.
+
+    points: float32 (n, k, 3).
+    parts: the part of each point, int32 (n, k).
+    """
+
+    points: npt.NDArray[np.float32]
+    parts: npt.NDArray[np.int32]
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def chosen(self, shapes: npt.NDArray[np.integer]) -> LabelledClouds:
+        """Return the clouds of these indices."""
+        return LabelledClouds(self.points[shapes], self.parts[shapes])
+
+    def divided(self, tested: int, points: int) -> tuple[LabelledClouds, LabelledClouds]:
+        """Return the first `tested` clouds, with their first `points` points, and the others."""
+        first = LabelledClouds(self.points[:tested, :points], self.parts[:tested, :points])
+        return first, LabelledClouds(self.points[tested:], self.parts[tested:])
+
+
+def join_clouds(sets: Sequence[LabelledClouds]) -> LabelledClouds:
+    """Join sets of clouds with equally many points."""
+    return LabelledClouds(np.concatenate([s.points for s in sets]), np.concatenate([s.parts for s in sets]))
+
+
+def dataset_clouds(folder: Path, shapes: int, points: int, rng: np.random.Generator) -> LabelledClouds:
+    """Return clouds of at most `shapes` random training shapes of a finished dataset.
+
+    Raises ConfigError for a folder without dataset, and for a dataset without clouds.
+    """
+    dataset = Dataset.open(folder)
+    total = int(dataset.manifest["splits"]["train"])
+    chosen = set(rng.permutation(total)[:shapes].tolist())
+    samples = (sample for index, sample in enumerate(dataset.samples("train")) if index in chosen)
+    try:
+        return _stacked(((sample.points, sample.instances) for sample in samples), points, rng)
+    except KeyError as error:
+        raise ConfigError(f"{folder}: {error.args[0]}; leave out `points: false` in its config") from error
+
+
+def program_clouds(
+    archive: Path, category: str, split: str, shapes: int, points: int, rng: np.random.Generator
+) -> LabelledClouds:
+    """Return clouds of at most `shapes` random shapes of the published ShapeAssembly programs.
+
+    archive: folder or tar archive with `data/<category>/<id>.txt` and `data_splits/<category>/<split>.txt`.
+    """
+    texts = dict(program_texts(archive, f"data/{category}"))
+    names = listed_names(archive, f"data_splits/{category}/{split}.txt")
+    chosen = [names[index] for index in rng.permutation(len(names))[:shapes].tolist()]
+    clouds = (sample_shape(shape_of_text(texts[f"data/{category}/{name}.txt"]), points, rng) for name in chosen)
+    return _stacked(((cloud.points, cloud.instances) for cloud in clouds), points, rng)
+
+
+def grass_clouds(path: Path, shapes: int, points: int, rng: np.random.Generator) -> LabelledClouds:
+    """Return clouds of at most `shapes` random shapes of a GRASS file; shapes with invalid boxes are left out."""
+    from eval.programs.quality import shape_of_boxes
+
+    file = read_grass_in_child(path)
+
+    def clouds() -> Iterator[tuple[FloatArray, npt.NDArray[np.int16]]]:
+        for index in rng.permutation(len(file)).tolist():
+            try:
+                shape = shape_of_boxes([leaf.box for leaf in file.shape(index).root.leaves()])
+            except (Rejected, ConfigError):
+                continue
+            cloud = sample_shape(shape, points, rng)
+            yield cloud.points, cloud.instances
+
+    return _stacked(clouds(), points, rng, shapes)
+
+
+@dataclass(frozen=True)
+class SkippedModels:
+    """Models without use as labelled shapes: how many cannot be read, and how many have one part or none stated."""
+
+    unreadable: int
+    without_parts: int
+
+
+def model_clouds(
+    files: Sequence[Path], segmentation: Segmentation, shapes: int, points: int, rng: np.random.Generator
+) -> tuple[LabelledClouds, SkippedModels]:
+    """Return clouds of at most `shapes` random models, and how many others were skipped on the way.
+
+    Parts are objects, nodes, materials, colours or components, as the segmentation says; others are skipped.
+    """
+    unreadable, without_parts = 0, 0
+
+    def clouds() -> Iterator[tuple[FloatArray, npt.NDArray[np.int64]]]:
+        nonlocal unreadable, without_parts
+        for index in rng.permutation(len(files)).tolist():
+            try:
+                model = read_parts(files[index], segmentation)
+            except (ConfigError, ReadFailed):
+                unreadable += 1
+                continue
+            if len(model.parts) < 2 or model.segmentation in CUTS:
+                without_parts += 1
+                continue
+            placed = [transform_points(part.pose, part.vertices) for part in model.parts]
+            starts = np.cumsum([0, *map(len, placed[:-1])])
+            faces = [part.faces + start for part, start in zip(model.parts, starts, strict=True)]
+            part_of_face = np.repeat(np.arange(len(faces)), [len(corners) for corners in faces])
+            cloud, _, hit = sample_surface(np.concatenate(placed), np.concatenate(faces).astype(np.int32), points, rng)
+            yield cloud @ Z_UP_TO_Y_UP.T if model.up == "z" else cloud, part_of_face[hit]
+
+    return _stacked(clouds(), points, rng, shapes), SkippedModels(unreadable, without_parts)
+
+
+def _stacked(
+    clouds: Iterable[tuple[FloatArray, npt.NDArray[np.integer]]],
+    points: int,
+    rng: np.random.Generator,
+    shapes: int | None = None,
+) -> LabelledClouds:
+    """Return the first `shapes` clouds, or all, with `points` points each, centred and of diagonal 1."""
+    stacked_points, stacked_parts = [], []
+    for cloud, parts in clouds:
+        drawn = subsample(np.column_stack([cloud, parts]).astype(np.float64), points, rng)
+        frame = frame_of(drawn[:, :3])
+        normalized = frame.normalized(drawn[:, :3])
+        diagonal = float(np.linalg.norm(np.ptp(normalized, axis=0))) or 1.0
+        stacked_points.append((normalized / diagonal).astype(np.float32))
+        stacked_parts.append(drawn[:, 3].astype(np.int32))
+        if shapes is not None and len(stacked_points) == shapes:
+            break
+    if not stacked_points:
+        return LabelledClouds(np.empty((0, points, 3), np.float32), np.empty((0, points), np.int32))
+    return LabelledClouds(np.stack(stacked_points), np.stack(stacked_parts))

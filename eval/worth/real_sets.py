@@ -1,0 +1,116 @@
+"""Real shapes with parts: published programs, GRASS chairs, and the models of a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.errors import ConfigError
+from pipeline.randomness import decision_rng
+from stages.exemplars.settings import Segmentation
+
+if TYPE_CHECKING:
+    from eval.worth.labelled_clouds import LabelledClouds
+
+CATEGORIES = {"chair": "chairs", "table": "tables", "storage": "storage furniture"}
+"""Of the published programs, and what their shapes are called."""
+PROGRAMS, GRASS = Path("shapeassembly/programs.tar.xz"), Path("partgraphs/grass_chairs.npz")
+"""Below the folder of shared material."""
+TESTED_POINTS, LEARNT_POINTS = 1024, 2048
+"""Points of a cloud; training draws from the latter at each step."""
+
+
+@dataclass(frozen=True)
+class RealSet:
+    """Real shapes of one kind.
+
+    category: of the published programs; empty for models.
+    files: all files that its clouds depend on.
+    read: returns the shapes to test on, others to learn from, and a sentence on what was left out, or an empty text.
+    """
+
+    name: str
+    category: str
+    files: tuple[Path, ...]
+    read: Callable[[], tuple[LabelledClouds, LabelledClouds, str]]
+
+
+def real_sets(
+    shared: Path, models: Path | None, segmentation: Segmentation, test_shapes: int, labelled: int, seed: int
+) -> list[RealSet]:
+    """Return the real sets that exist.
+
+    test_shapes, labelled: shapes to test on and to learn from, at most.
+    Raises ConfigError for a folder of models that does not exist or holds fewer than two.
+    """
+    sets = []
+    if (archive := shared / PROGRAMS).is_file():
+        sets += [_program_set(archive, category, test_shapes, labelled, seed) for category in CATEGORIES]
+    if (file := shared / GRASS).is_file():
+        sets.append(_grass_set(file, test_shapes, labelled, seed))
+    if models is not None:
+        sets.append(_model_set(models, segmentation, test_shapes, labelled, seed))
+    return sets
+
+
+def real_training_clouds(archive: Path, without: str, shapes: int, seed: int) -> LabelledClouds:
+    """Return clouds of `shapes` published training programs, equally many of each category but one."""
+    from eval.worth.labelled_clouds import join_clouds, program_clouds
+
+    others = [category for category in CATEGORIES if category != without]
+    rng = decision_rng(seed, "worth", "real", without)
+    return join_clouds(
+        [program_clouds(archive, other, "train", shapes // len(others), LEARNT_POINTS, rng) for other in others]
+    )
+
+
+def _program_set(archive: Path, category: str, test_shapes: int, labelled: int, seed: int) -> RealSet:
+    def read() -> tuple[LabelledClouds, LabelledClouds, str]:
+        from eval.worth.labelled_clouds import program_clouds
+
+        rng = decision_rng(seed, "worth", "programs", category)
+        tested = program_clouds(archive, category, "val", test_shapes, TESTED_POINTS, rng)
+        return tested, program_clouds(archive, category, "train", labelled, LEARNT_POINTS, rng), ""
+
+    return RealSet(category, category, (archive,), read)
+
+
+def _grass_set(file: Path, test_shapes: int, labelled: int, seed: int) -> RealSet:
+    def read() -> tuple[LabelledClouds, LabelledClouds, str]:
+        from eval.worth.labelled_clouds import grass_clouds
+
+        clouds = grass_clouds(file, test_shapes + labelled, LEARNT_POINTS, decision_rng(seed, "worth", "grass"))
+        return (*clouds.divided(test_shapes, TESTED_POINTS), "")
+
+    return RealSet("GRASS chair", "chair", (file,), read)
+
+
+def _model_set(folder: Path, segmentation: Segmentation, test_shapes: int, labelled: int, seed: int) -> RealSet:
+    files = model_files(folder)
+
+    def read() -> tuple[LabelledClouds, LabelledClouds, str]:
+        from eval.worth.labelled_clouds import model_clouds
+
+        rng = decision_rng(seed, "worth", "models")
+        clouds, skipped = model_clouds(files, segmentation, test_shapes + labelled, LEARNT_POINTS, rng)
+        note = (
+            f"{folder}: {len(clouds)} of {len(files)} models were taken; {skipped.unreadable} others cannot be read, "
+            f"and {skipped.without_parts} have no parts."
+        )
+        return (*clouds.divided(min(test_shapes, -(-len(clouds) // 2)), TESTED_POINTS), note)
+
+    return RealSet(folder.name or str(folder), "", tuple(files), read)
+
+
+def model_files(folder: Path) -> list[Path]:
+    """Return the model files below a folder, by name. Raises ConfigError for fewer than two."""
+    from stages.model_files.scene_file import READERS
+    from stages.shape.input_file import without_sidecars
+
+    found = (file for file in folder.rglob("*") if file.suffix.lower() in READERS)
+    files, _ = without_sidecars([file for file in found if file.is_file() and not file.is_symlink()])
+    if len(files) < 2:
+        raise ConfigError(f"{folder} holds {len(files)} models; name a folder of at least 2, in {', '.join(READERS)}")
+    return sorted(files)
