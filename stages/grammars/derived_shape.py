@@ -76,13 +76,13 @@ def _shape(grammar: ShapeGrammar, terminals: Sequence[PlacedTerminal], meshes: n
     poses = np.array([terminal.pose for terminal in terminals])
     chosen = tuple(grammar.meshes[index] for index in meshes.tolist())
     parts = Assembly(types, poses, np.empty((0, 2), np.int32))
-    return Shape(chosen, parts, grammar.up, grammar.labels, one_surface=True)
+    return Shape(chosen, parts, grammar.up, grammar.labels, one_surface=True, unit=grammar.unit)
 
 
 def exemplar_shape(grammar: ShapeGrammar) -> Shape:
     """Return the exemplar as a shape of one part."""
     alone = Assembly(np.zeros(1, dtype=np.int16), np.eye(4)[None], np.empty((0, 2), np.int32))
-    return Shape((grammar.exemplar,), alone, grammar.up, (grammar.exemplar.name,), one_surface=True)
+    return Shape((grammar.exemplar,), alone, grammar.up, (grammar.exemplar.name,), one_surface=True, unit=grammar.unit)
 
 
 def surface_digest(grammar: ShapeGrammar, terminals: Sequence[PlacedTerminal]) -> str:

@@ -24,6 +24,7 @@ def describe_grammar(extracted: ExtractedGrammar) -> dict[str, Any]:
     return {
         "grammar": grammar.name,
         "up": grammar.up,
+        "unit": grammar.unit,
         "radius": grammar.radius,
         "made_of": grammar.made_of,
         grammar.made_of: len(grammar.exemplar.faces),

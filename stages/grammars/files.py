@@ -58,6 +58,7 @@ def load_grammar(text: Path, arrays: Path) -> ShapeGrammar:
         seams=seams,
         exemplar=meshes[-1],
         splats=stored["made_of"] == "points",
+        unit=stored["unit"],
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from stages.grammars.derivation import START_SITE, NonTerminal
 from stages.shape.arrays import FloatArray
-from stages.shape.kit import PartMesh
+from stages.shape.kit import LengthUnit, PartMesh
 
 SITE_LETTERS = "ABCDEFHIJKLMNOPQRTUVWXYZ"
 
@@ -63,6 +63,7 @@ class ShapeGrammar:
     seams: for each class of sites points on its first site, float64 (k, 3)
     exemplar: the whole surface
     splats: whether the exemplar is a point cloud, and triangles stand for its points, one each
+    unit: of all coordinates
     """
 
     name: str
@@ -75,6 +76,7 @@ class ShapeGrammar:
     seams: Mapping[int, FloatArray]
     exemplar: PartMesh
     splats: bool = False
+    unit: LengthUnit = "unknown"
 
     @property
     def made_of(self) -> str:

@@ -7,6 +7,7 @@ from typing import Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from pipeline.config import ExistingFile, StrictModel
+from stages.exemplars.settings import Units
 from stages.shape.collection.assignment import SplitConfig
 from stages.shape.collection.origin import Credit
 
@@ -38,6 +39,11 @@ class GrammarConfig(StrictModel):
     )
     up: Literal["auto", "y", "z"] = Field(
         "auto", description="Axis that points up in the file; `auto` takes what the file says, else y."
+    )
+    units: Units = Field(
+        "auto",
+        description="Unit of the numbers in the file; shapes are made in metres. `auto` takes what the file says, as "
+        "in `exemplars.kits[].units`; a point cloud says nothing.",
     )
     upright: bool = Field(True, description="Whether pieces keep the up axis; without it they may be turned over.")
     random_shapes: int = Field(

@@ -64,7 +64,7 @@ def run_extraction(task: Task) -> Outcome:
 
     names = grammar_shards(task.config)
     config = task.config.section(GrammarsConfig).models[names.index(task.shard.name)]
-    surface, file_up, warnings = read_surface(config.model)
+    surface, file_up, warnings = read_surface(config.model, units=config.units)
     up = config.up if config.up != "auto" else file_up or "y"
     extracted = extract_grammar(surface, config.name, config.radius, up, task.rng("sets"), config.upright)
     grammar = extracted.grammar

@@ -23,7 +23,7 @@ from stages.grammars.scans.ridge_frames import ridge_frames
 from stages.grammars.scans.scanned_grid import ScannedCloud, scanned_grid
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
-from stages.shape.kit import PartMesh
+from stages.shape.kit import LengthUnit, PartMesh
 from stages.symmetry.matching.candidate_transforms import candidate_transforms
 from stages.symmetry.surface.corner_frames import CornerFrames, corner_frames
 from stages.symmetry.surface.grid import SurfaceGrid, has_area, surface_grid
@@ -93,11 +93,12 @@ class TerminalMeshes(Sequence[PartMesh]):
 
 @dataclass(frozen=True, eq=False)
 class SurfaceMesh:
-    """A mesh: vertices float64 (v, 3), faces int32 (f, 3), face colours uint8 (f, 3) sRGB."""
+    """A mesh: vertices float64 (v, 3) in `unit`, faces int32 (f, 3), face colours uint8 (f, 3) sRGB."""
 
     vertices: FloatArray
     faces: IntArray
     colors: ByteArray
+    unit: LengthUnit = "unknown"
 
     @property
     def corners(self) -> FloatArray:
@@ -138,6 +139,7 @@ def model_surface(model: Model) -> SurfaceMesh:
         np.concatenate(vertices),
         np.concatenate(faces).astype(np.int32),
         np.concatenate([part.face_colors for part in model.parts]),
+        "metre" if model.unit == 1.0 else "unknown",
     )
 
 
@@ -213,6 +215,7 @@ def extract_grammar(
         seams={site: grid.centres(seam.band) for site, seam in seams.items()},
         exemplar=centred_part(np.zeros(3), "exemplar", faces, vertices, colors),
         splats=grid.splats,
+        unit=surface.unit,
     )
     return ExtractedGrammar(grammar, grid, len(transforms), pieces, seams, rows, seconds)
 

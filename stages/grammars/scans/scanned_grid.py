@@ -10,6 +10,7 @@ from pipeline.errors import ConfigError
 from stages.grammars.scans.planar_patches import planar_patches
 from stages.grammars.scans.point_neighbourhoods import estimate_noise, point_neighbourhoods
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
+from stages.shape.kit import LengthUnit
 from stages.symmetry.surface.grid import CELLS_PER_RADIUS, LATTICE_OFFSET_CELLS, SurfaceGrid
 from stages.symmetry.surface.lattice import neighbours_of, pack, unpack
 
@@ -40,7 +41,7 @@ SPLAT_OVERLAP = 4.0
 class ScannedCloud:
     """A point cloud.
 
-    points: float64 (n, 3)
+    points: float64 (n, 3), in `unit`
     colors: uint8 (n, 3), sRGB
     normals: float64 (n, 3), outward; None if unknown
     """
@@ -48,6 +49,7 @@ class ScannedCloud:
     points: FloatArray
     colors: ByteArray
     normals: FloatArray | None = None
+    unit: LengthUnit = "unknown"
 
 
 @dataclass(frozen=True, eq=False)

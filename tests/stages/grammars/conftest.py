@@ -16,7 +16,7 @@ def found() -> ExtractedGrammar:
     """Extract the grammar of a wall of four windows."""
     vertices, faces = mesh(wall(4))
     colors = np.full((len(faces), 3), 160, np.uint8)
-    return extract_grammar(SurfaceMesh(vertices, faces, colors), "wall", 0.03, "z", np.random.default_rng(0))
+    return extract_grammar(SurfaceMesh(vertices, faces, colors, "metre"), "wall", 0.03, "z", np.random.default_rng(0))
 
 
 @pytest.fixture(scope="session")

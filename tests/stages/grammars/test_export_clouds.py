@@ -99,6 +99,17 @@ class TestFiles:
         assert (read.normals is not None) == (suffix == "xyzn")
         assert is_point_cloud(path)
 
+    def test_surface_is_in_metres_where_the_config_or_the_file_states_the_unit(self, tmp_path: Path) -> None:
+        rows = np.random.default_rng(0).random((40, 3)).round(4)
+        np.savetxt(tmp_path / "scan.xyz", rows)
+        (silent, _, _), (stated, _, _) = (read_surface(tmp_path / "scan.xyz", units=u) for u in ("auto", "mm"))
+        assert isinstance(silent, ScannedCloud)
+        assert isinstance(stated, ScannedCloud)
+        assert (silent.unit, stated.unit) == ("unknown", "metre")
+        np.testing.assert_allclose(stated.points, rows / 1000)
+        facade, _, _ = read_surface(Path("datasets/exemplars/facade/townhouse.glb"))
+        assert facade.unit == "metre"
+
     def test_mesh_is_no_cloud(self) -> None:
         assert not is_point_cloud(Path("datasets/exemplars/facade/townhouse.glb"))
 

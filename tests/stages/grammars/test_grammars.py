@@ -14,6 +14,7 @@ from stages.grammars.derivation_text import DerivationError, format_derivation, 
 from stages.grammars.derived_shape import (
     PlacedTerminal,
     compact_shape_of_text,
+    exemplar_shape,
     placed_terminals,
     shape_of_text,
     surface_digest,
@@ -151,6 +152,7 @@ class TestFiles:
         (tmp_path / "wall.json").write_bytes(text.getvalue())
         (tmp_path / "wall.tar").write_bytes(arrays.getvalue())
         back = load_grammar(tmp_path / "wall.json", tmp_path / "wall.tar")
+        assert (back.unit, exemplar_shape(back).unit) == ("metre", "metre")
         for start in grammar.productions_of_site[START_SITE]:
             written = format_derivation(grammar, original(grammar, start))
             assert format_derivation(back, original(back, start)) == written

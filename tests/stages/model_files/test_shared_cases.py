@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ConfigError
+from stages.api import read_kit
 from stages.model_files.read import read_model
 from stages.model_files.scene_file import read_scene
+from stages.shape.physics.judge import Judge
+from stages.shape.physics.settings import PhysicsConfig
 from tests.stages.model_files.measures import measured
 
 CASES = Path(__file__).resolve().parents[4] / "shared" / "cases"
@@ -88,6 +91,15 @@ def test_tabs_in_a_material_library(tmp_path: Path) -> None:
     for source, target in (("obj-tab-kd.obj", "m.obj"), ("obj-tab2.mtl", "obj-tab-names.mtl")):
         (tmp_path / target).write_bytes((CASES / source).read_bytes())
     assert [part.colors for part in measured(read_scene(tmp_path / "m.obj"))] == [[(255, 0, 0)], [(0, 0, 255)]]
+
+
+def test_balance_of_a_two_sided_arm_is_that_of_its_control() -> None:
+    plain, two_sided = (read_kit(CASES / f"obj-balance-{name}.obj") for name in ("plain", "two-sided"))
+    verdicts = [
+        Judge(kit.types, kit.up, PhysicsConfig()).validity(kit.exemplars[0].assembly) for kit in (plain, two_sided)
+    ]
+    assert verdicts[0].stable
+    assert verdicts[1] == verdicts[0]
 
 
 def test_one_table_is_the_same_in_three_encodings() -> None:
