@@ -190,7 +190,7 @@ release: setup  ## Join the fragments of changes/ into the changelog, set VERSIO
 lock: setup-dev  ## Choose the newest versions of everything and pin them in requirements.lock
 	$(PYTHON) -m venv --clear .venv/lock
 	$(PYTHON) -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
-	    print(*p["dependencies"], *p["optional-dependencies"]["cluster"], *p["optional-dependencies"]["dev"], sep="\n")' > .venv/lock/asked.txt
+	    print(*p["dependencies"], *p["optional-dependencies"]["cluster"], *p["optional-dependencies"]["stores"], *p["optional-dependencies"]["dev"], sep="\n")' > .venv/lock/asked.txt
 	grep '^--' requirements.lock >> .venv/lock/asked.txt
 	.venv/lock/bin/python -m pip install -r .venv/lock/asked.txt
 	{ grep '^[#-]' requirements.lock; .venv/lock/bin/python -m pip freeze --all --exclude pip | sed 's/+.*//'; } > lock.tmp
@@ -198,10 +198,11 @@ lock: setup-dev  ## Choose the newest versions of everything and pin them in req
 
 # The machine --------------------------------------------------------------------------------------------------------
 
-.PHONY: setup setup-models setup-cluster setup-dev clean help
+.PHONY: setup setup-models setup-cluster setup-stores setup-dev clean help
 setup: $(READY)/core  ## Install what datasets need: system libraries, .venv, pinned packages
 setup-models: $(READY)/models  ## Add what models need: torch
 setup-cluster: $(READY)/cluster  ## Add what a cluster needs: dask
+setup-stores: $(READY)/stores  ## Add what object stores need: s3fs and huggingface_hub
 setup-dev: $(READY)/dev  ## Add what tests and benchmarks need, and the groups above
 
 $(READY)/core:
@@ -209,12 +210,12 @@ $(READY)/core:
 	rm -rf .venv/ready-*
 	mkdir $(READY)
 	touch $@
-$(READY)/models $(READY)/cluster: | $(READY)/core
+$(READY)/models $(READY)/cluster $(READY)/stores: | $(READY)/core
 	pipeline/setup.sh $(@F)
 	touch $@
 $(READY)/dev: | $(READY)/core
-	pipeline/setup.sh models cluster dev
-	touch $@ $(READY)/models $(READY)/cluster
+	pipeline/setup.sh models cluster stores dev
+	touch $@ $(READY)/models $(READY)/cluster $(READY)/stores
 
 clean: setup  ## Delete the work folder of CONFIG (records, shards); the finished dataset stays
 	@$(SHAPEMILL) clean $(DATASET)

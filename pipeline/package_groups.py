@@ -6,7 +6,11 @@ from importlib.util import find_spec
 
 from pipeline.errors import ConfigError
 
-_MODULES = {"models": ("torch", "safetensors"), "cluster": ("dask", "distributed")}
+_MODULES = {
+    "models": ("torch", "safetensors"),
+    "cluster": ("dask", "distributed"),
+    "stores": ("s3fs", "huggingface_hub"),
+}
 """Modules that the packages of a group bring."""
 
 
@@ -17,7 +21,7 @@ def require_group(group: str) -> None:
             raise ConfigError(_message(module, group))
 
 
-def missing_group(error: BaseException) -> ConfigError | None:
+def missing_group(error: BaseException | None) -> ConfigError | None:
     """Return what to raise for a failed import of a package whose group is not installed; None for other errors."""
     if isinstance(error, ModuleNotFoundError):
         for group, modules in _MODULES.items():

@@ -1,6 +1,7 @@
 #!/bin/sh
 # Sets up .venv: system libraries (with apt where possible), Python, and the pinned packages of some groups.
-# Usage, from the root of the project: pipeline/setup.sh [models|cluster|dev ...]. What is installed already stays.
+# Usage, from the root of the project: pipeline/setup.sh [models|cluster|stores|dev ...]. What is
+# installed already stays.
 # The groups are those of pyproject.toml; their versions are pinned in requirements.lock.
 set -eu
 

@@ -43,7 +43,7 @@ def make(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
     The stamps of set-up are given, so that nothing is set up by asking what would be done.
     """
     with TemporaryDirectory() as stamps:
-        for group in ("core", "models", "cluster", "dev"):
+        for group in ("core", "models", "cluster", "stores", "dev"):
             (Path(stamps) / group).touch()
         command = ["make", "--no-print-directory", f"READY={stamps}", *arguments]
         return _run(command, variables)
