@@ -75,14 +75,17 @@ class ShardWriter:
             self._tar.close()
 
 
-def read_shard(path: Path) -> Iterator[tuple[str, dict[str, bytes]]]:
+def read_shard(shard: Path | BinaryIO) -> Iterator[tuple[str, dict[str, bytes]]]:
     """Yield the samples of a shard in order, `(key, {member: bytes})`, one in memory at a time.
+
+    shard: its path, or a stream that can seek, which may begin and end between any two samples
 
     Skips entries that are not files, such as folders and links.
     """
     key: str | None = None
     members: dict[str, bytes] = {}
-    with tarfile.open(path, mode="r:") as tar:
+    opened = {"name": shard} if isinstance(shard, Path) else {"fileobj": shard}
+    with tarfile.open(**opened, mode="r:") as tar:
         for entry in tar:
             if not entry.isfile():
                 continue

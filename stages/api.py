@@ -101,11 +101,14 @@ def execute(parsed: ShapeAssemblyProgram) -> Shape:
     return shape_of_execution(execute_program(parsed))
 
 
-def open_dataset(folder: str | Path) -> Dataset:
-    """Open the folder of a finished dataset. Raises ConfigError where its manifest is missing."""
+def open_dataset(location: str | Path) -> Dataset:
+    """Open a finished dataset in a folder, or at a URL such as `s3://bucket/castle`.
+
+    Raises ConfigError where its manifest is missing.
+    """
     from stages.package.reader import Dataset
 
-    return Dataset.open(Path(folder))
+    return Dataset.open(location)
 
 
 def load_model(folder: str | Path, kit: Kit | None = None) -> TrainedModel:

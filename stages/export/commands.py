@@ -15,7 +15,8 @@ from stages.export.settings import DEFAULT_DENSITY, DEFAULT_SHELL_THICKNESS, Exp
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from stages.package.reader import Dataset, DatasetSample
+    from stages.package.dataset_sample import DatasetSample
+    from stages.package.reader import Dataset
 
 COMMANDS = typer.Typer()
 
@@ -91,4 +92,4 @@ def _chosen(dataset: Dataset, wanted: tuple[str, ...], total: int) -> Iterator[D
         if wanted and not left:
             return
     if left:
-        raise ConfigError(f"{dataset.folder} has no sample {', '.join(sorted(left))}")
+        raise ConfigError(f"{dataset.location} has no sample {', '.join(sorted(left))}")

@@ -15,7 +15,7 @@ from stages.export.obj import obj_files
 from stages.export.settings import ExportSettings
 from stages.export.urdf import urdf_files
 from stages.export.usd import usd_files
-from stages.package.reader import DatasetSample
+from stages.package.dataset_sample import DatasetSample
 from stages.programs.language import LANGUAGE as PROGRAM_LANGUAGE
 from stages.programs.program import shape_from_text
 from stages.shape.collection.pairs import JOINTS, pairs_of

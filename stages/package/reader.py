@@ -1,195 +1,72 @@
-"""Finished datasets, sample by sample, as typed values."""
+"""Finished datasets, sample by sample."""
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-import numpy.typing as npt
+from typing import Any
 
 from pipeline.errors import ConfigError
-from pipeline.paths import write_file
-from pipeline.shards import bytes_array, read_shard
-from stages.shape.arrays import ByteArray
-
-if TYPE_CHECKING:
-    import trimesh
-
-    from stages.shape.shape import Shape
-    from stages.views.reading import SampleView
+from pipeline.shards import read_shard
+from stages.package.dataset_sample import DatasetSample
+from stages.package.layout import CLASSES, MANIFEST
+from stages.package.locations import file_system, index_location
+from stages.package.split import DatasetSplit
 
 SPLITS = ("train", "val", "test")
-VIEW_SUFFIXES = (".png", ".jpg", ".webp", ".exr")
-
-
-@dataclass(frozen=True)
-class DatasetSample:
-    """One sample of a dataset. Members are decoded when they are first asked for.
-
-    key: the name of the sample, unique in its dataset.
-    split: `train`, `val` or `test`.
-    members: the bytes of each member, by its name, such as `points.npy`.
-    """
-
-    key: str
-    split: str
-    members: Mapping[str, bytes]
-
-    @cached_property
-    def record(self) -> dict[str, Any]:
-        """The JSON record; `schema.json` of the dataset describes its fields."""
-        record: dict[str, Any] = json.loads(self.members["json"])
-        return record
-
-    @cached_property
-    def mesh(self) -> trimesh.Scene:
-        """The GLB as a trimesh scene, y up: one node a part, named by its label."""
-        import trimesh
-
-        return trimesh.load_scene(io.BytesIO(self.members["glb"]), file_type="glb", process=False)
-
-    @cached_property
-    def shape(self) -> Shape:
-        """The GLB as a `Shape`: part meshes, poses and labels, without contacts."""
-        from stages.package.glb_shape import glb_shape
-
-        return glb_shape(self.members["glb"])
-
-    @property
-    def points(self) -> npt.NDArray[Any]:
-        """Points on the surface, float32 (n, 3)."""
-        return self.array("points")
-
-    @property
-    def normals(self) -> npt.NDArray[Any]:
-        """Unit normals of the points, float32 (n, 3)."""
-        return self.array("normals")
-
-    @property
-    def labels(self) -> npt.NDArray[Any]:
-        """The class of each point, int (n,): its index in `Dataset.classes`."""
-        return self.array("labels")
-
-    @property
-    def instances(self) -> npt.NDArray[Any]:
-        """The part of each point, int (n,): its index in `record["parts"]`."""
-        return self.array("instances")
-
-    @cached_property
-    def union(self) -> trimesh.Trimesh:
-        """The watertight union of all parts, where the dataset has it."""
-        import trimesh
-
-        return trimesh.Trimesh(self.array("union_vertices"), self.array("union_faces"), process=False)
-
-    @property
-    def distances(self) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-        """Points, float32 (n, 3), and their signed distances to the union, float32 (n,), negative inside."""
-        return self.array("sdf_points"), self.array("sdf_values")
-
-    @cached_property
-    def occupancy(self) -> npt.NDArray[Any]:
-        """Which cells of the cube of `record["union"]` are inside, bool (r, r, r), by x, y and z."""
-        return np.unpackbits(self.array("occupancy"), axis=2).astype(bool)
-
-    @property
-    def contacts(self) -> npt.NDArray[Any]:
-        """Pairs of parts that touch, int32 (2, m)."""
-        return self.array("contacts")
-
-    @cached_property
-    def sketches(self) -> tuple[ByteArray, ...]:
-        """The line drawings, uint8 (h, w) each; `record["sketches"]` has their cameras."""
-        from PIL import Image
-
-        names = [f"sketch{index}.png" for index in range(len(self.record.get("sketches", ())))]
-        return tuple(np.asarray(Image.open(io.BytesIO(self.members[name])), dtype=np.uint8) for name in names)
-
-    @cached_property
-    def views(self) -> tuple[SampleView, ...]:
-        """The rendered views: camera, colour, depth, normals, instances and what else the dataset has; else empty."""
-        from stages.views.reading import read_views
-
-        return read_views(self.members, self.record.get("views", []))
-
-    def export_views(self, folder: Path) -> None:
-        """Write the images of all views and `transforms.json` into a folder, as NeRF tools read them.
-
-        Raises KeyError for a sample without colour images, and ValueError for one with orthographic cameras.
-        """
-        from stages.views.transforms import transforms_bytes
-
-        cameras = self.record.get("views", [])
-        suffix = next((name.partition(".")[2] for name in self.members if name.startswith("color0.")), None)
-        if suffix is None:
-            raise KeyError(f"{self.key} has no colour images; its members are {', '.join(self.members)}")
-        colors = [f"color{index}.{suffix}" for index in range(len(cameras))]
-        files = {name: content for name, content in self.members.items() if name.endswith(VIEW_SUFFIXES)}
-        for name, content in {**files, "transforms.json": transforms_bytes(cameras, colors)}.items():
-            write_file(folder / name, content)
-
-    @cached_property
-    def captions(self) -> dict[str, str]:
-        """The captions by length, such as `short`; empty where the dataset has none."""
-        captions: dict[str, str] = json.loads(self.members.get("caption.json", b"{}"))
-        return captions
-
-    @property
-    def text(self) -> str:
-        """What the sample was made from: strings, parameters, a program or a derivation."""
-        return self.members["txt"].decode()
-
-    def array(self, name: str) -> npt.NDArray[Any]:
-        """Return the member `<name>.npy`. Raises KeyError, with the members that exist, where it is missing."""
-        if f"{name}.npy" not in self.members:
-            raise KeyError(f"{self.key} has no {name}.npy; its members are {', '.join(self.members)}")
-        return bytes_array(self.members[f"{name}.npy"])
 
 
 @dataclass(frozen=True)
 class Dataset:
     """A finished dataset.
 
-    folder: the folder that holds `manifest.json`.
+    location: path or URL of the folder that holds `manifest.json`.
     manifest: name, version, seed, counts, config and versions.
     classes: the part label of each class id.
     """
 
-    folder: Path
+    location: str
     manifest: Mapping[str, Any]
     classes: tuple[str, ...]
 
     @classmethod
-    def open(cls, folder: Path) -> Dataset:
-        """Open the dataset in a folder. Raises ConfigError where it holds no finished dataset."""
+    def open(cls, location: str | Path) -> Dataset:
+        """Open the dataset in a folder or at a URL. Raises ConfigError where there is no finished dataset."""
+        files, root = file_system(str(location))
         try:
-            manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-            listed = json.loads((folder / "classes.json").read_text(encoding="utf-8"))
+            manifest = json.loads(files.cat_file(f"{root}/{MANIFEST}"))
+            listed = json.loads(files.cat_file(f"{root}/{CLASSES}"))
         except (OSError, json.JSONDecodeError) as error:
-            raise ConfigError(f"{folder} is no finished dataset: {error}; make it with `make dataset`") from error
-        return cls(folder, manifest, tuple(entry["name"] for entry in listed))
+            raise ConfigError(f"{location} is no finished dataset: {error}; make it with `make dataset`") from error
+        return cls(str(location), manifest, tuple(entry["name"] for entry in listed))
 
     def __len__(self) -> int:
         return int(self.manifest["samples"])
 
-    def shards(self, split: str) -> list[Path]:
-        """Return the shard files of a split, in order. Raises ValueError for another word than a split's."""
-        if split not in SPLITS:
-            raise ValueError(f"{split!r} is no split; take one of {', '.join(SPLITS)}")
-        return sorted((self.folder / "data" / split).glob("*.tar"))
-
     def samples(self, split: str = "") -> Iterator[DatasetSample]:
         """Yield the samples of one split, or of all, in the order of the shards; one is in memory at a time."""
-        for name in (split,) if split else SPLITS:
-            for path in self.shards(name):
-                for key, members in read_shard(path):
-                    yield DatasetSample(key, name, members)
+        files, root = file_system(self.location)
+        for name in (_checked(split),) if split else SPLITS:
+            for path in sorted(files.glob(f"{root}/data/{name}/*.tar")):
+                with files.open(path, "rb") as stream:
+                    for key, members in read_shard(stream):
+                        yield DatasetSample(key, name, members)
+
+    def split(self, name: str) -> DatasetSplit:
+        """Return one split with random access, a map-style dataset for torch.
+
+        Raises ValueError for another word than a split's, and ConfigError where the index cannot be read.
+        """
+        index = index_location(self.location, str(self.manifest["index"]["path"]))
+        return DatasetSplit(self.location, index, _checked(name))
 
     def __iter__(self) -> Iterator[DatasetSample]:
         return self.samples()
+
+
+def _checked(split: str) -> str:
+    if split not in SPLITS:
+        raise ValueError(f"{split!r} is no split; take one of {', '.join(SPLITS)}")
+    return split
