@@ -64,7 +64,7 @@ class Model:
         """Whether a part has a texture, or a material that is not opaque."""
         looks = [part.appearance for part in self.parts if part.appearance is not None]
         materials = [material for look in looks for material in look.materials]
-        return any(material.texture is not None or material.alpha_mode != "opaque" for material in materials)
+        return any(material.textures or material.alpha_mode != "opaque" for material in materials)
 
     def with_colors_alone(self) -> Model:
         """Return the model with one colour a face."""

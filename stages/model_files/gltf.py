@@ -255,27 +255,45 @@ class _Reader:
             red, green, blue, alpha = stated_numbers(factor, (1.0, 1.0, 1.0, 1.0))
             glow_red, glow_green, glow_blue = stated_numbers(stated.get("emissiveFactor"), (0.0, 0.0, 0.0))
             mode = str(stated.get("alphaMode", "OPAQUE")).lower()
+            textures, lost = self.other_textures(stated)
             self.read_materials[index] = Material(
                 name,
                 (red, green, blue, alpha),
-                self.sampled_texture(stated),
+                self.sampled_texture(_base_texture(stated)),
                 stated_number(metallic, 1.0),
                 stated_number(roughness, 1.0),
                 (glow_red, glow_green, glow_blue),
                 "mask" if mode == "mask" else "blend" if mode == "blend" else "opaque",
                 stated_number(stated.get("alphaCutoff"), 0.5),
                 stated.get("doubleSided") is True,
+                **textures,
+                normal_scale=_factor(stated.get("normalTexture", {}).get("scale")),
+                occlusion_strength=stated_number(stated.get("occlusionTexture", {}).get("strength"), 1.0),
             )
-            others = [key for key in ("normalTexture", "occlusionTexture", "emissiveTexture") if key in stated]
-            others += ["metallicRoughnessTexture"] if "metallicRoughnessTexture" in surface else []
-            others += [extension for extension in stated.get("extensions", {}) if extension != _GLOSSY]
-            if others:
-                self.not_kept.append(f"material {name!r}: {', '.join(map(str, others))} is not kept")
+            lost += [extension for extension in stated.get("extensions", {}) if extension != _GLOSSY]
+            if lost:
+                self.not_kept.append(f"material {name!r}: {', '.join(map(str, lost))} is not kept")
         return self.read_materials[index]
 
-    def sampled_texture(self, material: dict[str, Any]) -> Texture | None:
-        """Return the texture of a material's base colour, if its image can be read."""
-        reference = _base_texture(material)
+    def other_textures(self, material: dict[str, Any]) -> tuple[dict[str, Texture], list[str]]:
+        """Return the textures of a material besides that of its base colour, and the names of those not kept.
+
+        A texture is not kept if its image cannot be read, or if it is read at other coordinates than the first one.
+        """
+        textures, lost = {}, []
+        first = _placing(_first_texture(material))
+        for name, (key, reference) in _other_references(material).items():
+            before = len(self.warnings)
+            texture = self.sampled_texture(reference) if _placing(reference) == first else None
+            del self.warnings[before:]
+            if texture is None:
+                lost.append(key)
+            else:
+                textures[name] = texture
+        return textures, lost
+
+    def sampled_texture(self, reference: dict[str, Any] | None) -> Texture | None:
+        """Return the texture that a material refers to, if its image can be read."""
         if reference is None:
             return None
         stated = self.header["textures"][reference["index"]]
@@ -287,14 +305,14 @@ class _Reader:
         return Texture(image, wrap_u, wrap_v, sampler.get("magFilter") == _NEAREST_FILTER)
 
     def texture_coordinates(self, primitive: dict[str, Any], element: str) -> FloatArray | None:
-        """Return the coordinates at which the base colour texture of a primitive is read at its vertices, (n, 2)."""
+        """Return the coordinates at which the textures of a primitive are read at its vertices, (n, 2)."""
         if "material" not in primitive:
             return None
-        texture = _base_texture(self.header["materials"][primitive["material"]])
+        texture = _first_texture(self.header["materials"][primitive["material"]])
         if texture is None:
             return None
-        placing = texture.get("extensions", {}).get("KHR_texture_transform", {})
-        coordinates = f"TEXCOORD_{placing.get('texCoord', texture.get('texCoord', 0))}"
+        number, placing = _placing(texture)
+        coordinates = f"TEXCOORD_{number}"
         if coordinates not in primitive["attributes"]:
             return None
         uv = self.file.accessor(primitive["attributes"][coordinates], element).astype(np.float64)
@@ -420,7 +438,7 @@ class _Reader:
         if glossy is not None:
             factor = glossy.get("diffuseFactor")
         linear = np.tile(np.array(factor or (1.0, 1.0, 1.0, 1.0), dtype=np.float64)[:3], (len(faces), 1))
-        texture = self.sampled_texture(material)
+        texture = self.sampled_texture(_base_texture(material))
         if texture is None or uv is None:
             return linear
         at = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
@@ -465,6 +483,37 @@ def _base_texture(material: dict[str, Any]) -> dict[str, Any] | None:
     if glossy is not None:
         return cast("dict[str, Any] | None", glossy.get("diffuseTexture"))
     return cast("dict[str, Any] | None", material.get("pbrMetallicRoughness", {}).get("baseColorTexture"))
+
+
+def _other_references(material: dict[str, Any]) -> dict[str, tuple[str, dict[str, Any]]]:
+    """Return the key and the reference of each texture but that of the base colour, by the field of `Material`."""
+    surface = material.get("pbrMetallicRoughness", {})
+    holders = {
+        "metallic_roughness_texture": ("metallicRoughnessTexture", surface),
+        "normal_texture": ("normalTexture", material),
+        "occlusion_texture": ("occlusionTexture", material),
+        "emissive_texture": ("emissiveTexture", material),
+    }
+    return {name: (key, holder[key]) for name, (key, holder) in holders.items() if key in holder}
+
+
+def _first_texture(material: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the reference whose coordinates count for all textures: that of the base colour, or the next one."""
+    others = (reference for _, reference in _other_references(material).values())
+    return next((reference for reference in (_base_texture(material), *others) if reference is not None), None)
+
+
+def _placing(reference: dict[str, Any] | None) -> tuple[int, dict[str, Any]]:
+    """Return the number of the coordinates of a texture, and how they are transformed."""
+    if reference is None:
+        return 0, {}
+    placing = dict(reference.get("extensions", {}).get("KHR_texture_transform", {}))
+    return placing.pop("texCoord", reference.get("texCoord", 0)), placing
+
+
+def _factor(value: Any) -> float:
+    """Return a number of a file, or 1 for anything else."""
+    return float(value) if isinstance(value, int | float) and np.isfinite(value) else 1.0
 
 
 def _local_matrix(node: dict[str, Any]) -> FloatArray:

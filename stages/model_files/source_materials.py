@@ -62,7 +62,7 @@ def painted_faces_without_material(
     """
     if paint is None or not len(materials):
         return face_material, {}
-    textured = np.array([*(material.texture is not None for material in materials), True])  # the last for no material
+    textured = np.array([*(bool(material.textures) for material in materials), True])  # the last for no material
     painted = ~textured[face_material] & (paint != 255).any(axis=1)
     names = Counter(materials[number].name for number in face_material[painted].tolist())
     return np.where(painted, NO_MATERIAL, face_material).astype(np.int32), dict(names)
@@ -77,7 +77,7 @@ def appearance_of(
     normals: unit, (f, 3, 3)
     """
     used = {number for number in np.unique(face_material).tolist() if number != NO_MATERIAL}
-    if not any(materials[number].texture is not None for number in used):
+    if not any(materials[number].textures for number in used):
         uv = None
     if not used and normals is None:
         return None

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,9 @@ from stages.shape.input_file import content_fault
 _OPTION_NUMBERS = {"-mm": 2, "-o": 3, "-s": 3, "-t": 3}
 """Largest number of values of the options of maps; the other options take one word."""
 _READ_NUMBERS = {"d", "tr", "ns", "pm", "pr", "ke"}
-_NOT_KEPT_MAPS = {"map_d", "map_bump", "bump", "norm", "map_ke", "map_ks", "map_pr", "map_pm", "refl"}
+_KEPT_MAPS = {"norm": "normal_texture", "map_ke": "emissive_texture"}
+"""Fields of `Material` of maps that are kept, if they are placed as `map_Kd` is."""
+_NOT_KEPT_MAPS = {"map_d", "map_bump", "bump", "map_ks", "map_pr", "map_pm", "refl"}
 _LINEAR_FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 MAX_BRIGHT_COLOR = 4.0
 """Up to here colours beyond 1 are bright; larger ones range to 255."""
@@ -36,6 +39,7 @@ class WavefrontMaterial:
     scale, offset: of texture coordinates, (2,).
     alpha: 1 is opaque.
     emissive: linear red, green, blue.
+    other_images: by the field of `Material`.
     """
 
     color: ByteArray = field(default_factory=lambda: np.array(GREY, np.uint8))
@@ -47,15 +51,19 @@ class WavefrontMaterial:
     metallic: float = 0.0
     roughness: float = 1.0
     emissive: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    other_images: dict[str, TextureImage] = field(default_factory=dict)
 
     def described(self, name: str) -> Material:
         """Return the material with the meanings of glTF; both of its sides are seen."""
         texture = None if self.image is None else Texture(self.image, self.wrap, self.wrap)
         red, green, blue = (1.0, 1.0, 1.0) if texture is not None else linear_color((self.color / 255.0).tolist())
+        others: dict[str, Any] = {key: Texture(image, self.wrap, self.wrap) for key, image in self.other_images.items()}
+        glow = (1.0, 1.0, 1.0) if "emissive_texture" in others and not any(self.emissive) else self.emissive
         return Material(
-            *(name, (red, green, blue, self.alpha), texture, self.metallic, self.roughness, self.emissive),
+            *(name, (red, green, blue, self.alpha), texture, self.metallic, self.roughness, glow),
             alpha_mode=alpha_mode_of(self.alpha, None if self.image is None else self.image.pixels),
             double_sided=True,
+            **others,
         )
 
 
@@ -118,6 +126,7 @@ class _Library:
     def read(self, text: str) -> None:
         name = ""
         ambient_maps: dict[str, TextLine] = {}
+        other_maps: list[tuple[str, TextLine]] = []
         for line in text_lines(text):
             keyword = line.keyword.lower()
             if keyword == "newmtl":
@@ -133,11 +142,15 @@ class _Library:
                 ambient_maps[name] = line
             elif keyword in _READ_NUMBERS:
                 self.read_number(self.materials.setdefault(name, WavefrontMaterial()), keyword, line.rest.split())
+            elif keyword in _KEPT_MAPS:
+                other_maps.append((name, line))
             elif keyword in _NOT_KEPT_MAPS:
                 self.not_kept.append(f"material {name!r}: {keyword} is not kept")
         for name, line in ambient_maps.items():
             if name in self.materials and self.materials[name].image is None and name not in self.diffuse:
                 self.read_map(self.materials[name], line)
+        for name, line in other_maps:
+            self.read_other_map(name, line)
         colors = {**self.ambient, **self.diffuse}  # what has no diffuse colour shows its ambient one
         largest = max((float(color.max()) for color in colors.values()), default=0.0)
         limit = 255.0 if largest > MAX_BRIGHT_COLOR else 1.0
@@ -182,6 +195,18 @@ class _Library:
                 self.warnings.append(f"material colour '{line.keyword} {line.rest}' is {kind}; its faces are grey")
             return None
         return srgb_from_linear(_LINEAR_FROM_XYZ @ values) / 255.0 if is_xyz else values
+
+    def read_other_map(self, name: str, line: TextLine) -> None:
+        """Read a map that is kept if its image can be read and it is placed as that of the diffuse colour."""
+        material, placed = self.materials.setdefault(name, WavefrontMaterial()), WavefrontMaterial()
+        before = len(self.warnings)
+        self.read_map(placed, line)
+        del self.warnings[before:]
+        same = (placed.scale, placed.offset, placed.wrap) == (material.scale, material.offset, material.wrap)
+        if placed.image is not None and material.image is not None and same:
+            material.other_images[_KEPT_MAPS[line.keyword.lower()]] = placed.image
+        else:
+            self.not_kept.append(f"material {name!r}: {line.keyword.lower()} is not kept")
 
     def read_map(self, material: WavefrontMaterial, line: TextLine) -> None:
         """Read the texture of a `map_Kd` line, with its placing; warn if that fails."""

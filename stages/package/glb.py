@@ -174,7 +174,7 @@ class _Packer:
         corners = mesh.faces[faces].reshape(-1)
         rows = [corners.reshape(-1, 1)]
         normals = None if look.normals is None else look.normals[faces].reshape(-1, 3)
-        uv = None if look.uv is None or material.texture is None else look.uv[faces].reshape(-1, 2)
+        uv = None if look.uv is None or not material.textures else look.uv[faces].reshape(-1, 2)
         rows += [values for values in (normals, uv) if values is not None]
         first, indices = _distinct_rows(rows)
         attributes = {"POSITION": self._add_positions(mesh.vertices[corners[first]])}

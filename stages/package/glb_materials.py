@@ -17,6 +17,13 @@ MAX_JPEG_SHARE = 0.5
 """A JPEG is taken where it is smaller than this share of the PNG."""
 PNG_EFFORT = 9
 _WRAPS = {"repeat": 10497, "mirror": 33648, "clamp": 33071}
+_TEXTURE_KEYS = {
+    "texture": "baseColorTexture",
+    "metallic_roughness_texture": "metallicRoughnessTexture",
+    "normal_texture": "normalTexture",
+    "occlusion_texture": "occlusionTexture",
+    "emissive_texture": "emissiveTexture",
+}
 _NEAREST_FILTER, _LINEAR_FILTER, _MIPMAP_FILTER = 9728, 9729, 9987
 
 
@@ -31,11 +38,11 @@ class MaterialTable:
 
     def index(self, material: Material) -> int:
         """Return the number of a material, which is added if new."""
-        if material not in self._materials and material.texture is not None:
-            texture = material.texture
-            self._images.setdefault(texture.image, len(self._images))
-            self._samplers.setdefault((texture.wrap_u, texture.wrap_v, texture.nearest), len(self._samplers))
-            self._textures.setdefault(texture, len(self._textures))
+        if material not in self._materials:
+            for texture in material.textures.values():
+                self._images.setdefault(texture.image, len(self._images))
+                self._samplers.setdefault((texture.wrap_u, texture.wrap_v, texture.nearest), len(self._samplers))
+                self._textures.setdefault(texture, len(self._textures))
         return self._materials.setdefault(material, len(self._materials))
 
     @property
@@ -75,9 +82,14 @@ class MaterialTable:
             "metallicFactor": material.metallic,
             "roughnessFactor": material.roughness,
         }
-        if material.texture is not None:
-            surface["baseColorTexture"] = {"index": self._textures[material.texture]}
         described: dict[str, Any] = {"name": material.name, "pbrMetallicRoughness": surface}
+        for field, texture in material.textures.items():
+            holder = surface if field in ("texture", "metallic_roughness_texture") else described
+            holder[_TEXTURE_KEYS[field]] = {"index": self._textures[texture]}
+        if material.normal_texture is not None and material.normal_scale != 1.0:
+            described["normalTexture"]["scale"] = material.normal_scale
+        if material.occlusion_texture is not None and material.occlusion_strength != 1.0:
+            described["occlusionTexture"]["strength"] = material.occlusion_strength
         if any(material.emissive):
             described["emissiveFactor"] = list(material.emissive)
         if material.alpha_mode != "opaque":

@@ -20,6 +20,14 @@ Wrap = Literal["repeat", "mirror", "clamp"]
 """What a texture shows outside its borders: itself again, its mirror image, or the pixels of the border."""
 AlphaMode = Literal["opaque", "mask", "blend"]
 """Whether alpha is ignored, hides what is below the cutoff, or mixes a surface with what is behind it."""
+TEXTURE_FIELDS = (
+    "texture",
+    "metallic_roughness_texture",
+    "normal_texture",
+    "occlusion_texture",
+    "emissive_texture",
+)
+"""The textures of a material, in the order in which files list them."""
 NO_MATERIAL = -1
 """Material of a face that has its face colour instead."""
 
@@ -28,7 +36,8 @@ NO_MATERIAL = -1
 class TextureImage:
     """The pixels of a texture; images of equal pixels are equal.
 
-    pixels: sRGB, uint8 (h, w, 3), or (h, w, 4) with alpha that the colours are not multiplied by; first row at the top
+    pixels: uint8 (h, w, 3), or (h, w, 4) with alpha that the colours are not multiplied by; first row at the top; sRGB
+        where it is a colour, else numbers
     digest: sha256 of size and pixels
     """
 
@@ -61,7 +70,10 @@ class Material:
     """A material, with the meanings of glTF 2.0.
 
     base_color: linear red, green, blue, and alpha; the texture is multiplied by it
-    emissive: linear red, green, blue
+    metallic, roughness: blue and green of their texture are multiplied by them
+    emissive: linear red, green, blue; its texture is multiplied by it
+
+    All textures are read at the same texture coordinates.
     """
 
     name: str
@@ -73,6 +85,18 @@ class Material:
     alpha_mode: AlphaMode = "opaque"
     alpha_cutoff: float = 0.5
     double_sided: bool = False
+    metallic_roughness_texture: Texture | None = None
+    normal_texture: Texture | None = None
+    normal_scale: float = 1.0
+    occlusion_texture: Texture | None = None
+    occlusion_strength: float = 1.0
+    emissive_texture: Texture | None = None
+
+    @property
+    def textures(self) -> dict[str, Texture]:
+        """The textures that it has, by their field."""
+        stated = {name: getattr(self, name) for name in TEXTURE_FIELDS}
+        return {name: texture for name, texture in stated.items() if texture is not None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,20 +241,22 @@ def unit_vectors(vectors: FloatArray) -> Float32Array:
 
 def describe_materials(materials: Sequence[Material]) -> tuple[list[dict[str, Any]], tuple[TextureImage, ...]]:
     """Return materials as JSON whose textures name their image by its index, and these images."""
-    images = tuple(dict.fromkeys(material.texture.image for material in materials if material.texture is not None))
+    images = tuple(dict.fromkeys(texture.image for material in materials for texture in material.textures.values()))
     described = []
     for material in materials:
-        fields = {**asdict(replace(material, texture=None))}
-        if material.texture is None:
-            del fields["texture"]
-        else:
-            texture = material.texture
-            fields["texture"] = {
-                "image": images.index(texture.image),
-                "wrap_u": texture.wrap_u,
-                "wrap_v": texture.wrap_v,
-                "nearest": texture.nearest,
-            }
+        without: dict[str, Any] = dict.fromkeys(TEXTURE_FIELDS)
+        fields = asdict(replace(material, **without))
+        for name in TEXTURE_FIELDS:
+            texture = material.textures.get(name)
+            if texture is None:
+                del fields[name]
+            else:
+                fields[name] = {
+                    "image": images.index(texture.image),
+                    "wrap_u": texture.wrap_u,
+                    "wrap_v": texture.wrap_v,
+                    "nearest": texture.nearest,
+                }
         described.append(fields)
     return described, images
 
@@ -242,8 +268,9 @@ def restore_materials(described: Sequence[Mapping[str, Any]], images: Sequence[T
         stated: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()
         }
-        if "texture" in stated:
-            texture: Mapping[str, Any] = stated["texture"]
-            stated["texture"] = Texture(**{**texture, "image": images[texture["image"]]})
+        for name in TEXTURE_FIELDS:
+            if name in stated:
+                texture: Mapping[str, Any] = stated[name]
+                stated[name] = Texture(**{**texture, "image": images[texture["image"]]})
         materials.append(Material(**stated))
     return tuple(materials)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,17 @@ from PIL import Image
 from stages.model_files.kept_appearance import shrunk
 from stages.model_files.read import read_model
 from stages.model_files.scene import ModelScene
+from stages.package.glb import glb_bytes
+from stages.shape.appearance import (
+    Appearance,
+    Material,
+    Texture,
+    TextureImage,
+    describe_materials,
+    restore_materials,
+)
+from stages.shape.kit import Assembly, PartMesh
+from stages.shape.shape import Shape
 
 PIXELS = np.array([[[250, 10, 20], [0, 200, 0]], [[0, 0, 255], [90, 90, 90]]], np.uint8)
 CORNERS = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], float)
@@ -141,6 +154,79 @@ def test_numbers_of_a_gltf_material_are_kept(tmp_path: Path) -> None:
     assert (material.alpha_mode, material.alpha_cutoff) == ("mask", 0.25)
 
 
+def shade(level: int) -> Texture:
+    """Return a texture of one grey, which no other map has."""
+    return Texture(TextureImage.of(np.full((2, 2, 3), level, np.uint8)))
+
+
+def with_every_map() -> Material:
+    return Material(
+        "all",
+        texture=shade(10),
+        metallic=0.5,
+        roughness=0.25,
+        emissive=(1.0, 0.5, 0.25),
+        metallic_roughness_texture=shade(20),
+        normal_texture=shade(30),
+        normal_scale=0.5,
+        occlusion_texture=shade(40),
+        occlusion_strength=0.25,
+        emissive_texture=shade(50),
+    )
+
+
+@pytest.mark.parametrize("without", ["", "texture"])
+def test_every_map_of_a_gltf_material_goes_through_reader_kit_and_file(without: str, tmp_path: Path) -> None:
+    material = replace(with_every_map(), texture=None) if without else with_every_map()
+    look = Appearance((material,), np.zeros(2, np.int32), UV[FACES].astype(np.float32), None)
+    part = PartMesh(
+        "square", CORNERS.astype(float), FACES.astype(np.int32), np.full((2, 3), 9, np.uint8), appearance=look
+    )
+    alone = Assembly(np.zeros(1, np.int16), np.eye(4)[None], np.empty((0, 2), np.int32))
+    (tmp_path / "all.glb").write_bytes(glb_bytes(Shape((part,), alone, "y", ("square",))))
+    scene = read_model(tmp_path / "all.glb", texture_size=512)
+    assert scene.warnings == ()
+    read = scene.surfaces[0].appearance
+    assert read is not None
+    assert read.uv is not None
+    assert read.materials == (material,)
+    assert sorted(map(tuple, read.uv.reshape(-1, 2).tolist())) == sorted(map(tuple, look.uv.reshape(-1, 2).tolist()))
+    described, images = describe_materials(read.materials)
+    assert restore_materials(json.loads(json.dumps(described)), images) == (material,)
+
+
+def test_a_map_at_other_coordinates_or_without_an_image_is_named(tmp_path: Path) -> None:
+    path = glb(tmp_path)
+    content = path.read_bytes()
+    length = int.from_bytes(content[12:16], "little")
+    header = json.loads(content[20 : 20 + length])
+    header["images"].append({"uri": "missing.png"})
+    header["textures"].append({"source": len(header["images"]) - 1})
+    header["materials"][0] |= {"normalTexture": {"index": 0, "texCoord": 1}, "emissiveTexture": {"index": 1}}
+    edited = json.dumps(header).encode()
+    edited += b" " * (-len(edited) % 4)
+    chunks = len(edited).to_bytes(4, "little") + b"JSON" + edited + content[20 + length :]
+    path.write_bytes(content[:8] + (12 + len(chunks)).to_bytes(4, "little") + chunks)
+    scene = read_model(path, texture_size=512)
+    assert scene.warnings == ("material 'tiles': normalTexture, emissiveTexture is not kept",)
+    assert scene.surfaces[0].appearance is not None
+    assert list(scene.surfaces[0].appearance.materials[0].textures) == ["texture"]
+
+
+def test_maps_of_an_obj_are_kept_where_they_are_placed_as_its_texture(tmp_path: Path) -> None:
+    path = obj(tmp_path)
+    Image.fromarray(np.full((2, 2, 3), 128, np.uint8)).save(tmp_path / "bumps.png")
+    library = tmp_path / "square.mtl"
+    maps = "norm bumps.png\nmap_Ke bumps.png\nnewmtl spare\nnorm bumps.png\n"
+    library.write_text(library.read_text(encoding="utf-8").replace("map_Bump bumps.png\n", maps), encoding="utf-8")
+    scene = read_model(path, texture_size=512)
+    assert scene.warnings == ("material 'spare': norm is not kept",)
+    assert scene.surfaces[0].appearance is not None
+    material = scene.surfaces[0].appearance.materials[0]
+    assert list(material.textures) == ["texture", "normal_texture", "emissive_texture"]
+    assert material.emissive == (1.0, 1.0, 1.0)
+
+
 def test_an_obj_says_what_it_does_not_keep(tmp_path: Path) -> None:
     scene = read_model(obj(tmp_path), texture_size=512)
     assert scene.warnings == ("material 'tiles': map_bump is not kept",)
@@ -192,6 +278,12 @@ def test_large_textures_are_reduced_in_linear_light() -> None:
     assert small.shape == (2, 32, 3)
     assert (small == 188).all(), "half of white is 188 in sRGB"
     assert shrunk(stripes, 64) is stripes
+
+
+def test_numbers_of_a_reduced_map_are_means() -> None:
+    stripes = np.zeros((4, 64, 3), np.uint8)
+    stripes[:, ::2] = 200
+    assert (shrunk(stripes, 32, is_color=False) == 100).all()
 
 
 def test_what_is_transparent_does_not_darken_a_reduced_texture() -> None:
