@@ -75,6 +75,7 @@ def _measure(run: DatasetRun, searches: int, trained: TrainedModel[TrainedString
 
     model, seed, kits = trained.model, run.config.seed, dataset_kits(run.paths)
     train, test = (corpus_strings(run.corpus, trained.kit, split, model) for split in ("train", "test"))
+    test = [string for string in test if model.is_valid(model.target_of(string))]
     image_rows: list[ImageRow] = []
     if not trained.seed and trained.kit in kits:
         instantiator = instantiator_of(run, kits[trained.kit])
