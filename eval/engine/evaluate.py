@@ -96,7 +96,7 @@ def print_table_of_files(name: str, files: Sequence[Path], out: Path, values: Ma
     if table.compute_from_files is None:
         raise ConfigError(f"{name} is a table about datasets, not about files; leave out {files[0]}")
     result = table.compute_from_files(files, table_options(name, table.options, values))
-    print(_markdown(result), end="")
+    print(markdown(result), end="")
     for figure in result.figures:
         print(f"\n{figure.title}: {write_file(out / 'eval' / f'{name}_{figure.name}.png', figure.png)}")
 
@@ -112,10 +112,10 @@ def make_table(run: DatasetRun, name: str, values: Mapping[str, object]) -> None
         raise ConfigError(f"{name}: {missing}")
     start, started = perf_counter(), datetime.now(UTC)
     result = table.compute(run, options)
-    _write_tables(run, name, result)
+    write_tables(run, name, result)
     finished = FinishedTable(name, table.question, result, perf_counter() - start)
     write_file(run.results / f"{name}.html", report_html(run, [finished], {}, started).encode())
-    print(_markdown(result), end="")
+    print(markdown(result), end="")
     pictures = ", with charts and pictures" if result.charts or result.image_rows else ""
     print(f"\nAlso in {run.results}: {name}.html{pictures}, {name}.md, {name}.csv, {name}.tex")
 
@@ -152,20 +152,21 @@ def make_all_tables(run: DatasetRun, values: Mapping[str, object]) -> int:
             traceback.print_exc()
             continue
         finished.append(FinishedTable(name, table.question, result, perf_counter() - start))
-        _write_tables(run, name, result)
+        write_tables(run, name, result)
         print(f"{name}: made in {finished[-1].seconds:.0f} s")
     write_file(run.results / REPORT_FILE, report_html(run, finished, unmade, started).encode())
     print(f"\n{run.results / REPORT_FILE}: {len(finished)} tables, {len(unmade)} not made")
     return failed
 
 
-def _markdown(result: TableResult) -> str:
+def markdown(result: TableResult) -> str:
+    """Return the tables of a result as Markdown."""
     return "\n".join(table.markdown() for table in result.tables)
 
 
-def _write_tables(run: DatasetRun, name: str, result: TableResult) -> None:
+def write_tables(run: DatasetRun, name: str, result: TableResult) -> None:
     """Write the tables as `<name>`, `<name>_2`, ..., all in one `.md`, and the figures as `<name>_<figure>.png`."""
-    write_file(run.results / f"{name}.md", _markdown(result).encode())
+    write_file(run.results / f"{name}.md", markdown(result).encode())
     for number, table in enumerate(result.tables, 1):
         stem = name if number == 1 else f"{name}_{number}"
         write_file(run.results / f"{stem}.csv", table.csv().encode())

@@ -49,6 +49,8 @@ class TableResult:
     charts: Sequence[Chart] = ()
     image_rows: Sequence[ImageRow] = ()
     figures: Sequence[Figure] = ()
+    printed: str = ""
+    """What a command printed, for results that a command made."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The report: all tables of one dataset in one self-contained HTML page.
+"""Reports: tables and figures in one self-contained HTML page, such as all tables of one dataset.
 
 The page is a jinja2 template with autoescape, so names from configs, kits and model files are never markup. Its
 Content-Security-Policy forbids it to load anything.
@@ -38,13 +38,31 @@ class FinishedTable:
     question: str
     result: TableResult
     seconds: float
-    """That it took."""
+    """That it took; 0 where the page does not show it."""
 
 
 def report_html(
     run: DatasetRun, finished: Sequence[FinishedTable], unmade: Mapping[str, str], started: datetime
 ) -> str:
-    """Return the page. `unmade`: the reason for each table that was not made, by name."""
+    """Return the report of a dataset. `unmade`: the reason for each table that was not made, by name."""
+    configs = [("Config", run.config.path.read_text(encoding="utf-8"))]
+    return page_html(run.config.title, _subtitle(run), finished, unmade, _facts(run, started), configs)
+
+
+def page_html(
+    title: str,
+    subtitle: str,
+    finished: Sequence[FinishedTable],
+    unmade: Mapping[str, str],
+    facts: Sequence[tuple[str, str]],
+    configs: Sequence[tuple[str, str]],
+) -> str:
+    """Return a page of tables.
+
+    unmade: the reason for each table that was not made, by name
+    facts: what was run, when and on what, as names and texts
+    configs: names and texts of the configs
+    """
     environment = Environment(
         loader=FileSystemLoader(TEMPLATE.parent),
         autoescape=True,
@@ -52,15 +70,14 @@ def report_html(
         trim_blocks=True,
     )
     environment.filters["cell"] = cell_text
-    config = run.config
     return environment.get_template(TEMPLATE.name).render(
-        title=config.title,
-        subtitle=_subtitle(run),
+        title=title,
+        subtitle=subtitle,
         finished=[_section(table) for table in finished],
         unmade=list(unmade.items()),
-        facts=_facts(run, started),
+        facts=facts,
         libraries=list(library_versions().items()),
-        config=config.path.read_text(encoding="utf-8"),
+        configs=configs,
         colors=NUM_COLORS,
     )
 
@@ -72,6 +89,7 @@ def _section(table: FinishedTable) -> Mapping[str, object]:
         "question": table.question,
         "tables": result.tables,
         "seconds": table.seconds,
+        "printed": result.printed,
         "charts": [(chart, Markup(chart_svg(chart))) for chart in result.charts if any(chart.lines.values())],
         "image_rows": [
             (row.title, [(caption, _data_url(png)) for caption, png in row.pictures])
@@ -101,13 +119,20 @@ def _changed_sections(run: DatasetRun) -> list[str]:
     return [name for name, section in sections.items() if name in before and before[name] != section]
 
 
+def machine_facts(started: datetime) -> list[tuple[str, str]]:
+    """Return when tables were made, with which code and on which machine."""
+    return [
+        ("Tables made", f"{started:%Y-%m-%d %H:%M} to {datetime.now(UTC):%H:%M} UTC"),
+        ("Code", f"shapemill {code_version(tables)}, Python {platform.python_version()}"),
+        ("Machine", f"{os.cpu_count()} cores, {platform.machine()}, {sys.platform}"),
+    ]
+
+
 def _facts(run: DatasetRun, started: datetime) -> list[tuple[str, str]]:
     """Return what was run, when and on what."""
     manifest = run.manifest
     facts = [
-        ("Tables made", f"{started:%Y-%m-%d %H:%M} to {datetime.now(UTC):%H:%M} UTC"),
-        ("Code", f"shapemill {code_version(tables)}, Python {platform.python_version()}"),
-        ("Machine", f"{os.cpu_count()} cores, {platform.machine()}, {sys.platform}"),
+        *machine_facts(started),
         ("Config", f"{run.config.path}, seed {run.config.seed}"),
     ]
     if manifest:

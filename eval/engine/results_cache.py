@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -43,6 +43,7 @@ class _CachedResult(BaseModel):
     model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64", ser_json_inf_nan="constants")
 
     result: TableResult
+    seconds: float
 
 
 def cached_sections(
@@ -70,33 +71,42 @@ def cached_sections(
                     "code": code_digest(transitive_imports([module, *section.modules])),
                     "files": [digest(path) for path in section.input_files],
                 }
-                key = hashlib.sha256(json_bytes(inputs)).hexdigest()
-                yield _cached(section, key, run.results / "cache" / table / f"{section.name}.json")
+                path = run.results / "cache" / table / f"{section.name}.json"
+                yield cached_result(section.name, inputs, path, section.compute)[0]
 
         return join_results(list(results()))
 
     return compute
 
 
-def _cached(section: TableSection, key: str, path: Path) -> TableResult:
-    result = _read(path, key)
-    if result is not None:
-        print(f"{section.name}: cached", file=sys.stderr)
-        return result
+def cached_result(
+    name: str, inputs: Mapping[str, Any], path: Path, compute: Callable[[], TableResult]
+) -> tuple[TableResult, float]:
+    """Return a result and the seconds that it took; compute it unless `path` has it for the same inputs.
+
+    name: what standard error calls it
+    inputs: all that its values depend on, as JSON
+    """
+    key = hashlib.sha256(json_bytes(dict(inputs))).hexdigest()
+    kept = _read(path, key)
+    if kept is not None:
+        print(f"{name}: cached", file=sys.stderr)
+        return kept.result, kept.seconds
     start = perf_counter()
-    result = section.compute()
-    content = _CachedResult(result=result).model_dump_json().encode()
+    result = compute()
+    made = _CachedResult(result=result, seconds=perf_counter() - start)
+    content = made.model_dump_json().encode()
     write_file(path, _checksum(key, content) + b"\n" + content)
-    print(f"{section.name}: made in {perf_counter() - start:.0f} s", file=sys.stderr)
-    return result
+    print(f"{name}: made in {made.seconds:.0f} s", file=sys.stderr)
+    return made.result, made.seconds
 
 
-def _read(path: Path, key: str) -> TableResult | None:
-    """Return the result with this key, or None for a missing, outdated or corrupted file."""
+def _read(path: Path, key: str) -> _CachedResult | None:
+    """Return what was kept under this key, or None for a missing, outdated or corrupted file."""
     if not path.is_file():
         return None
     checksum, _, content = path.read_bytes().partition(b"\n")
-    return _CachedResult.model_validate_json(content).result if checksum == _checksum(key, content) else None
+    return _CachedResult.model_validate_json(content) if checksum == _checksum(key, content) else None
 
 
 def _checksum(key: str, content: bytes) -> bytes:

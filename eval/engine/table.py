@@ -34,6 +34,8 @@ class Table:
     """How to read the table; printed below it."""
     reference_rows: Sequence[ReferenceRow] = ()
     """Printed below ours."""
+    is_text: bool = False
+    """Whether cells are sentences, which are aligned to the left and wrapped."""
 
     def __post_init__(self) -> None:
         for row in self.reference_rows:
@@ -56,8 +58,8 @@ class Table:
             yield from ((f"{name} ({source})", *cells) for name, *cells in rows)
 
     def markdown(self) -> str:
-        """Return GitHub Markdown, numbers to the right."""
-        marks = ["---", *("---:" for _ in self.columns[1:])]
+        """Return GitHub Markdown, numbers aligned to the right."""
+        marks = ["---", *("---" if self.is_text else "---:" for _ in self.columns[1:])]
         rows = [[cell_text(cell) for cell in row] for row in self._all_rows()]
         lines = [self.columns, marks, *rows]
         body = "\n".join("| " + " | ".join(cell.replace("|", r"\|") for cell in line) + " |" for line in lines)
