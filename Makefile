@@ -42,6 +42,10 @@ UP      ?=
 MODEL   ?=
 ## TABLE    table for `make eval`, or all, for the report; lists the tables if empty
 TABLE   ?=
+## PAPER    paper for `make paper`: strings, shapeassembly, substructures, symmetry, geocode or all; lists them if empty
+PAPER   ?=
+## SCALE    how much `make paper` makes: minutes, hours or full
+SCALE   ?= minutes
 ## SAMPLES  samples that `make verify` checks by independent means: a number, or all
 SAMPLES ?= 100
 ## FORMAT   format of `make export`: urdf, mjcf, usd or obj
@@ -57,8 +61,8 @@ VERSION ?=
 
 # Their values are text: make expands none of it, and recipes read it from the environment, as "$$CONFIG", so that no
 # shell expands it either. A recipe never says $(CONFIG).
-VARIABLES := CONFIG OUT WORKERS SEED STALL_TIMEOUT CLUSTER MESH PROGRAM INPUT UP MODEL TABLE SAMPLES FORMAT KEY SHARD \
-             ROUNDS VERSION
+VARIABLES := CONFIG OUT WORKERS SEED STALL_TIMEOUT CLUSTER MESH PROGRAM INPUT UP MODEL TABLE PAPER SCALE SAMPLES \
+             FORMAT KEY SHARD ROUNDS VERSION
 $(foreach name,$(VARIABLES),$(eval override $(name) := $$(value $(name))))
 ifeq ($(value WORKERS),)
 override WORKERS := $(shell nproc 2>/dev/null || echo 1)
@@ -142,7 +146,7 @@ export: setup  ## Write samples of the finished dataset as FORMAT, for simulator
 
 # Looking at them ----------------------------------------------------------------------------------------------------
 
-.PHONY: plan status verify reproduce inspect eval doctor cluster
+.PHONY: plan status verify reproduce inspect eval paper doctor cluster
 plan: setup  ## Estimate shards, samples, disk and time of the dataset, before it starts
 	@$(SHAPEMILL) plan $(OPTIONS)
 status: setup  ## Show what is done, failed, rejected and left
@@ -157,6 +161,8 @@ inspect: setup  ## Show what can be made of MESH and write a config for it, or w
 	@[ -z "$$MESH" ] || $(SHAPEMILL) inspect --out "$$OUT/inspect" -- "$$MESH"
 eval: setup-models  ## Print TABLE about the finished dataset and keep it; all: every table, and a report; empty: list them
 	@$(SHAPEMILL) eval $(DATASET) --workers "$$WORKERS" -- "$$TABLE"
+paper: setup-models  ## Make what the tables and figures of PAPER need at SCALE, and one report of them
+	@$(SHAPEMILL) paper --scale "$$SCALE" --out "$$OUT" --workers "$$WORKERS" -- "$$PAPER"
 cluster: setup-cluster  ## Start a cluster of WORKERS workers on this machine, and print the CLUSTER of its scheduler
 	@$(SHAPEMILL) cluster --workers "$$WORKERS"
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the remedy for what fails
@@ -164,7 +170,7 @@ doctor: setup  ## Try everything that Shapemill needs on this machine, with the 
 
 # Working on it ------------------------------------------------------------------------------------------------------
 
-.PHONY: test chaos style lint bench kits kernels config-docs release lock
+.PHONY: test chaos style lint bench kits kernels config-docs results release lock
 test: style  ## Check style and types and run the tests, on WORKERS cores
 	@$(PYTHON) -m mypy > types.tmp & types=$$!; code=0; \
 	$(PYTHON) -m pytest --numprocesses "$$WORKERS" --dist loadfile --no-loadscope-reorder || code=$$?; \
@@ -185,6 +191,8 @@ kernels: setup  ## Record the kernels that stages use, which a first run compile
 	$(PYTHON) -m pipeline.make_kernel_list .venv/kernels configs/default.yaml
 config-docs: setup  ## Write the tables of config keys in configs/sections from the code
 	$(SHAPEMILL) config-docs
+results: setup  ## Write eval/RESULTS.md from eval/papers
+	$(SHAPEMILL) results
 release: setup  ## Join the fragments of changes/ into the changelog, set VERSION and tag it
 	$(PYTHON) changes/release.py "$$VERSION"
 lock: setup-dev  ## Choose the newest versions of everything and pin them in requirements.lock

@@ -13,6 +13,7 @@ from pipeline.options import (
     DEFAULT_OUT,
     DEFAULT_WORKERS,
     EVALUATION,
+    SYSTEM,
     ConfigOption,
     OutOption,
     WorkersOption,
@@ -59,3 +60,39 @@ def make_tables(
         make_table(run, table, values)
     else:
         print(list_tables(run), end="")
+
+
+@COMMANDS.command("paper", rich_help_panel=EVALUATION)
+def report_paper(
+    paper: Annotated[str, typer.Argument(help="its short name, or all; without, papers are listed")] = "",
+    scale: Annotated[str, typer.Option("--scale", help="how large: minutes, hours or full")] = "minutes",
+    out: OutOption = DEFAULT_OUT,
+    workers: WorkersOption = DEFAULT_WORKERS,
+) -> None:
+    """Make what the tables and figures of a paper need, and one report of them, next to the published figures.
+
+    Exits with 1 if a step fails; data that is not available here is stated in the report, and the rest goes on.
+    """
+    from eval.papers.make_paper import list_papers, make_paper
+    from eval.papers.paper import ALL_PAPERS, PAPERS, known_scale, load_paper
+    from pipeline.package_groups import require_group
+
+    if not paper:
+        print(list_papers(), end="")
+        return
+    chosen = known_scale(scale)
+    names = PAPERS if paper == ALL_PAPERS else (paper,)
+    for name in names:
+        load_paper(name)
+    require_group("models")
+    if sum(make_paper(name, chosen, out, workers) for name in names):
+        raise typer.Exit(1)
+
+
+@COMMANDS.command("results", rich_help_panel=SYSTEM)
+def write_results() -> None:
+    """Write eval/RESULTS.md, the page of all papers, from eval/papers."""
+    from eval.papers.results_page import RESULTS_PAGE, results_page
+    from pipeline.paths import write_file
+
+    print(write_file(RESULTS_PAGE, results_page().encode()))

@@ -27,6 +27,8 @@ VARIABLES = (
     "UP",
     "MODEL",
     "TABLE",
+    "PAPER",
+    "SCALE",
     "SAMPLES",
     "FORMAT",
     "KEY",
@@ -128,13 +130,14 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     assert values == {
         "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "STALL_TIMEOUT": "-",
         "CLUSTER": "-", "MESH": "-", "PROGRAM": "-", "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-",
-        "SAMPLES": "100", "FORMAT": "-", "KEY": "-", "SHARD": "-", "ROUNDS": "20", "VERSION": "-",
+        "PAPER": "-", "SCALE": "minutes", "SAMPLES": "100", "FORMAT": "-", "KEY": "-", "SHARD": "-", "ROUNDS": "20",
+        "VERSION": "-",
     }  # fmt: skip
 
 
 def test_every_target_gets_every_value_unchanged(tmp_path: Path) -> None:
     said = nasty(tmp_path)
-    targets = ("package", "plan", "status", "verify", "reproduce", "inspect", "eval", "doctor", "clean")
+    targets = ("package", "plan", "status", "verify", "reproduce", "inspect", "eval", "paper", "doctor", "clean")
     arguments = [f"{name}={said}" for name in VARIABLES]
     reached = calls(*targets, *arguments)
     assert len(reached) == 20 + len(targets[1:]) + 1, "20 stages; inspect looks at a program and a model"
