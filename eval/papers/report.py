@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import groupby
 from pathlib import Path
@@ -19,8 +19,8 @@ from pipeline.paths import write_file
 
 NOTICES: Mapping[Scale, str] = {
     "minutes": "A smoke run: it shows that every step works. Its data and models are tiny, so its own figures do not "
-    "compare with the published ones; the column `ours` has the kept results of full runs.",
-    "hours": "A short run: data and models are smaller than in full runs; the column `ours` has their kept results.",
+    "compare with the published ones; the column ours has the kept results of full runs.",
+    "hours": "A short run: data and models are smaller than in full runs; the column ours has their kept results.",
     "full": "A full run: what it made compares with the column `ours`, the kept results of earlier full runs.",
 }
 
@@ -136,15 +136,22 @@ def write_report(report: PaperReport, folder: Path, started: datetime) -> tuple[
 
 
 def _html(report: PaperReport, folder: Path, started: datetime) -> str:
-    sections = [FinishedTable("overview", report.paper.citation, TableResult([report.overview()]), 0)]
+    sections = [FinishedTable("overview", _plain(report.paper.citation), TableResult([report.overview()]), 0)]
     for number, results in report.numbers():
         own = report.result(results)
-        tables = [_kept(report, results), *own.tables]
+        kept = _kept(report, results)
+        plain_rows = tuple(tuple(_plain(str(cell)) for cell in row) for row in kept.rows)
+        tables = [replace(kept, rows=plain_rows), *own.tables]
         shown = TableResult(tables, own.charts, own.image_rows, own.figures, own.printed)
         sections.append(FinishedTable(number.replace(" ", "_"), results[0].subject, shown, report.seconds(results)))
     sections.append(FinishedTable("commands", "What was run", TableResult([report.commands()]), 0))
     configs = [(path.name, path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.yaml"))]
     return page_html(report.paper.title, report.notice, sections, {}, machine_facts(started), configs)
+
+
+def _plain(text: str) -> str:
+    """Return a text without Markdown's marks of code and emphasis."""
+    return text.replace("`", "").replace("*", "")
 
 
 def _markdown(report: PaperReport, started: datetime) -> str:
