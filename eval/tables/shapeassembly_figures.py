@@ -1,5 +1,5 @@
-"""`make eval TABLE=shapeassembly_figures`: generated ShapeAssembly programs in pictures (shapeassembly §7, figures 7,
-8, 9, 11 and 12)."""
+"""`make eval TABLE=shapeassembly_figures`: generated ShapeAssembly programs in pictures (shapeassembly §7, figures 7
+to 12)."""
 
 from __future__ import annotations
 
@@ -46,6 +46,7 @@ def _compute(run: DatasetRun, options: ShapeassemblyFiguresOptions) -> TableResu
     )
     from eval.programs.part_surfaces import curve_parts, surfaces_figure, train_surfaces
     from eval.programs.quality import boxes_of_programs, clouds_of
+    from eval.programs.structure_clusters import clusters
     from pipeline.randomness import decision_rng
     from stages.training.part_graph_vae.trained import TrainedPartGraphVae
     from stages.training.program_vae.trained import TrainedProgramVae
@@ -54,8 +55,8 @@ def _compute(run: DatasetRun, options: ShapeassemblyFiguresOptions) -> TableResu
     seed = run.config.seed
     figures: list[Figure] = []
     rows = []
-    for category in sorted({model.kit for model in models}):
-        train = category_programs(run, category, "train")
+    by_category = {kit: category_programs(run, kit, "train") for kit in sorted({model.kit for model in models})}
+    for category, train in by_category.items():
         clouds = clouds_of(boxes_of_programs(train))
         rng = decision_rng(seed, "shapeassembly_figures", category)
         surfaces = None
@@ -85,7 +86,8 @@ def _compute(run: DatasetRun, options: ShapeassemblyFiguresOptions) -> TableResu
             ends = commonly_readable_programs(run, category, "val", 2 * options.pairs, rng)
             pairs = list(zip(ends[::2], ends[1::2], strict=False))
             figures.append(interpolation_figure(category, latent, pairs))
-    return TableResult([neighbours_table(rows)], figures=sorted(figures, key=_number))
+    clusters_table, charts = clusters(by_category)
+    return TableResult([neighbours_table(rows), clusters_table], charts, figures=sorted(figures, key=_number))
 
 
 def _number(figure: Figure) -> int:
