@@ -27,6 +27,23 @@ VIEW_SUFFIXES = (".png", ".jpg", ".webp", ".exr")
 
 
 @dataclass(frozen=True)
+class LabelledCloud:
+    """A point cloud of a sample.
+
+    points, normals: float32 (n, 3)
+    labels: class of the part of each point, int (n,)
+    instances: part of each point, int (n,)
+    cameras: of a scan, the camera that saw each point, by its place in the record of the scan, int (n,); else empty
+    """
+
+    points: npt.NDArray[Any]
+    normals: npt.NDArray[Any]
+    labels: npt.NDArray[Any]
+    instances: npt.NDArray[Any]
+    cameras: npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
 class DatasetSample:
     """One sample of a dataset. Members are decoded when they are first asked for.
 
@@ -78,6 +95,23 @@ class DatasetSample:
     def instances(self) -> npt.NDArray[Any]:
         """The part of each point, int (n,): its index in `record["parts"]`."""
         return self.array("instances")
+
+    @cached_property
+    def clouds(self) -> tuple[LabelledCloud, ...]:
+        """All clouds of the whole surface; the first is that of `points`."""
+        count = self.record.get("points", {"clouds": 0}).get("clouds", 1)
+        return tuple(self._cloud("", str(index) if index else "") for index in range(count))
+
+    @cached_property
+    def scans(self) -> tuple[LabelledCloud, ...]:
+        """The partial scans, where the dataset has them; `record["scans"]` has their cameras and noise."""
+        return tuple(self._cloud("scan_", str(index)) for index in range(len(self.record.get("scans", ()))))
+
+    def _cloud(self, prefix: str, number: str) -> LabelledCloud:
+        names = ("points", "normals", "labels", "instances")
+        points, normals, labels, instances = (self.array(f"{prefix}{name}{number}") for name in names)
+        cameras = self.array(f"{prefix}cameras{number}") if prefix else np.empty(0, dtype=np.int16)
+        return LabelledCloud(points, normals, labels, instances, cameras)
 
     @cached_property
     def union(self) -> trimesh.Trimesh:

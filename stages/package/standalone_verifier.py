@@ -16,6 +16,7 @@ import argparse
 import hashlib
 import io
 import json
+import re
 import struct
 import sys
 import tarfile
@@ -39,6 +40,8 @@ POSE_TOLERANCE_SHARE = 1e-5
 POINT_TOLERANCE_SHARE = 1e-4
 """Largest distance of a point from its part, as a share of the diagonal."""
 MIN_NORMAL_COSINE = 0.99
+MAX_NOISE_DEVIATIONS = 4.0
+"""The noise of scans is cut at this many standard deviations."""
 POINTS_PER_SAMPLE = 128
 """Points whose place on the mesh is checked."""
 PAIRS_PER_SAMPLE = 64
@@ -245,8 +248,8 @@ def sample_faults(
             if array.dtype.kind == "f" and not np.isfinite(array).all():
                 yield f"{name} holds values that are not finite"
     yield from record_faults(job, record, members, arrays, findings)
-    if "labels.npy" in arrays:
-        yield from label_faults(record, arrays)
+    for cloud in clouds(arrays):
+        yield from label_faults(record, cloud)
     if rng is not None and "glb" in members:
         yield from geometry_faults(record, members, arrays, rng)
         findings.checked["samples with geometry"] += 1
@@ -302,15 +305,41 @@ def record_faults(
         findings.note("mesh", members["glb"], sample)
 
 
-def label_faults(record: dict[str, Any], arrays: dict[str, np.ndarray]) -> Iterator[str]:
+@dataclass(frozen=True)
+class Cloud:
+    """A point cloud of a sample. name: of the member with its points; scan: its number, -1 for a whole cloud"""
+
+    name: str
+    scan: int
+    points: np.ndarray
+    normals: np.ndarray
+    labels: np.ndarray
+    instances: np.ndarray
+
+
+def clouds(arrays: dict[str, np.ndarray]) -> Iterator[Cloud]:
+    """Yield the clouds and scans of a sample: `points.npy`, `points1.npy`, `scan_points0.npy` and so on."""
+    for name in arrays:
+        found = re.fullmatch(r"(scan_)?points(\d*)\.npy", name)
+        if found:
+            prefix, number = found[1] or "", found[2]
+            columns = (f"{prefix}{kind}{number}.npy" for kind in ("points", "normals", "labels", "instances"))
+            yield Cloud(name, int(number) if prefix else -1, *(arrays[column] for column in columns))
+
+
+def label_faults(record: dict[str, Any], cloud: Cloud) -> Iterator[str]:
     """Yield what is wrong with labels, instances and normals of points."""
-    instances, classes = arrays["instances.npy"], np.array([part["class"] for part in record["parts"]])
+    instances, classes = cloud.instances, np.array([part["class"] for part in record["parts"]])
     if instances.size and not 0 <= instances.min() <= instances.max() < len(classes):
-        yield "instances.npy names a part that the record does not have"
-    elif not np.array_equal(classes[instances], arrays["labels.npy"]):
-        yield "labels.npy are not the classes of the parts in instances.npy"
-    if np.abs(np.linalg.norm(arrays["normals.npy"], axis=1) - 1).max(initial=0) > 1e-3:
-        yield "normals.npy are no unit vectors"
+        yield f"the instances of {cloud.name} name a part that the record does not have"
+    elif not np.array_equal(classes[instances], cloud.labels):
+        yield f"the labels of {cloud.name} are not the classes of the parts of its instances"
+    elif cloud.scan < 0 and "min_per_part" in record["points"] and record["points"]["surface"] == "all":
+        counts = np.bincount(instances[record["points"]["farthest"] :], minlength=len(classes))
+        if counts.min() < record["points"]["min_per_part"]:
+            yield f"{cloud.name} has {counts.min()} points on a part, fewer than its json says"
+    if np.abs(np.linalg.norm(cloud.normals, axis=1) - 1).max(initial=0) > 1e-3:
+        yield f"the normals of {cloud.name} are no unit vectors"
 
 
 def geometry_faults(
@@ -342,8 +371,8 @@ def geometry_faults(
     gap = max(np.abs(corners.min(axis=0) - low).max(), np.abs(corners.max(axis=0) - high).max())
     if gap > POSE_TOLERANCE_SHARE * diagonal:
         yield f"its bounds differ from those of the GLB by {gap:.3g}"
-    if "points.npy" in arrays:
-        yield from point_faults(record, triangles, arrays, POINT_TOLERANCE_SHARE * diagonal, rng)
+    for cloud in clouds(arrays):
+        yield from point_faults(record, triangles, cloud, POINT_TOLERANCE_SHARE * diagonal, rng)
     if "contacts.npy" in arrays:
         tolerance = max(float(record["contact_tolerance"]), 1e-6 * diagonal)
         names = [part["name"] for part in record["parts"]]
@@ -357,27 +386,29 @@ def geometry_faults(
 def point_faults(
     record: dict[str, Any],
     triangles: list[np.ndarray],
-    arrays: dict[str, np.ndarray],
+    cloud: Cloud,
     tolerance: float,
     rng: np.random.Generator,
 ) -> Iterator[str]:
     """Yield points outside the bounds, and what is wrong with a random choice of points."""
     made = record["points"]
-    points = arrays["points.npy"].astype(np.float64) / made["scale"] + np.array(made["centre"])
-    instances, normals = arrays["instances.npy"], arrays["normals.npy"]
+    points = cloud.points.astype(np.float64) / made["scale"] + np.array(made["centre"])
+    instances, normals = cloud.instances, cloud.normals
+    if cloud.scan >= 0:
+        tolerance += MAX_NOISE_DEVIATIONS * record["scans"][cloud.scan]["depth_noise"]
     low, high = np.array(record["bounds"])
     if (points < low - tolerance).any() or (points > high + tolerance).any():
-        yield "points lie outside its bounds"
+        yield f"{cloud.name} has points outside its bounds"
     for index in rng.permutation(len(points))[:POINTS_PER_SAMPLE].tolist():
         near = near_triangles(triangles[instances[index]], points[index], tolerance)
         if not len(near):
-            yield f"point {index} does not lie on its part"
+            yield f"point {index} of {cloud.name} does not lie on its part"
             return
         across = np.cross(near[:, 1] - near[:, 0], near[:, 2] - near[:, 0])
         lengths = np.linalg.norm(across, axis=1)
         cosines = across[lengths > 0] @ normals[index] / lengths[lengths > 0]
         if len(cosines) and cosines.max() < MIN_NORMAL_COSINE:
-            yield f"the normal of point {index} is not that of its face"
+            yield f"the normal of point {index} of {cloud.name} is not that of its face"
             return
 
 

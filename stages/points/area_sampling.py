@@ -52,6 +52,12 @@ class SurfacePoints:
         """Return the points of these indices, in their order."""
         return SurfacePoints(self.points[chosen], self.normals[chosen], self.labels[chosen], self.instances[chosen])
 
+    def replaced(self, places: npt.NDArray[np.int64], others: SurfacePoints) -> SurfacePoints:
+        """Return these points with those at `places` (k,) replaced by the k points of `others`."""
+        chosen = np.arange(len(self.points))
+        chosen[places] = len(self.points) + np.arange(len(places))
+        return self.followed_by(others).take(chosen)
+
     def followed_by(self, other: SurfacePoints) -> SurfacePoints:
         """Return these points, then those of `other`."""
         return SurfacePoints(
@@ -101,10 +107,14 @@ def sample_shape(shape: Shape, n: int, rng: np.random.Generator) -> SurfacePoint
 
     Surface inside another part, or where two parts meet, counts like any other.
     """
-    table, meshes, poses = mesh_table(shape.meshes), shape.assembly.types, shape.assembly.poses
-    part_reach = np.cumsum(table.area[meshes])
+    part_reach = np.cumsum(mesh_table(shape.meshes).area[shape.assembly.types])
     parts = np.searchsorted(part_reach, rng.random(n) * part_reach[-1], side="right")
-    parts = np.minimum(parts, len(part_reach) - 1)
+    return sample_parts(shape, np.minimum(parts, len(part_reach) - 1), rng)
+
+
+def sample_parts(shape: Shape, parts: npt.NDArray[np.int64], rng: np.random.Generator) -> SurfacePoints:
+    """Return one point on each of the parts `parts` (n,), which may repeat; uniform by area on each of them."""
+    table, meshes, poses = mesh_table(shape.meshes), shape.assembly.types, shape.assembly.poses
     points, normals, _ = _points_of_meshes(table, meshes[parts].astype(np.int64), rng)
     rotations = poses[parts, :3, :3]
     points = np.einsum("nij,nj->ni", rotations, points) + poses[parts, :3, 3]

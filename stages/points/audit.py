@@ -6,11 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from stages.points.members import cloud_number
+from stages.points.scan_checks import scan_faults
+from stages.points.triangle_distances import point_triangle_distances
 from stages.points.visibility import MIN_HIT_DISTANCE_SHARE, view_directions
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import PackagedSample
-from stages.shape.geometry.triangles import area_vectors, unit_normals
+from stages.shape.geometry.triangles import unit_normals
 
 MAX_SURFACE_GAP_SHARE = 1e-5
 """Largest distance of the 32-bit points from the surface, as a share of the shape's size."""
@@ -18,14 +21,25 @@ MAX_COSINE_ERROR = 1e-3
 """Largest deviation from 1 of the cosine between a normal and that of its triangle."""
 
 
-def point_faults(sample: PackagedSample) -> Iterator[str]:
-    """Yield a sentence for points that are not on their part, and for normals that are not its own."""
+def cloud_faults(sample: PackagedSample) -> Iterator[str]:
+    """Yield a sentence for points of clouds and scans that are not on their part, and for normals not its own."""
     if "points" not in sample.record:
         return
+    for index in range(sample.record["points"].get("clouds", 1)):
+        where = f"cloud {index}: " if index else ""
+        for fault in _point_faults(sample, cloud_number(index)):
+            yield where + fault
+    for index in range(len(sample.record.get("scans", []))):
+        for fault in scan_faults(sample, index):
+            yield f"scan {index}: {fault}"
+
+
+def _point_faults(sample: PackagedSample, number: str) -> Iterator[str]:
+    """Yield the faults of one cloud. number: what its members' names end with"""
     described = sample.record["points"]
-    points = sample.arrays["points.npy"].astype(np.float64) / described["scale"] + described["centre"]
-    normals = sample.arrays["normals.npy"].astype(np.float64)
-    instances = sample.arrays["instances.npy"].astype(np.int32)
+    points = sample.arrays[f"points{number}.npy"].astype(np.float64) / described["scale"] + described["centre"]
+    normals = sample.arrays[f"normals{number}.npy"].astype(np.float64)
+    instances = sample.arrays[f"instances{number}.npy"].astype(np.int32)
     if not np.isfinite(points).all() or not np.isfinite(normals).all():
         return  # other checks report arrays that are not finite
     if len(points) != described["farthest"] + described["uniform"]:
@@ -36,8 +50,11 @@ def point_faults(sample: PackagedSample) -> Iterator[str]:
     if instances.min() < 0 or instances.max() >= len(sample.shape):
         yield "its points name parts that do not exist"
         return
-    if (sample.shape.part_classes[instances] != sample.arrays["labels.npy"]).any():
+    if (sample.shape.part_classes[instances] != sample.arrays[f"labels{number}.npy"]).any():
         yield "its point labels are not the classes of their parts"
+    counts = np.bincount(instances[described["farthest"] :], minlength=len(sample.shape))
+    if described["surface"] == "all" and counts.min() < described.get("min_per_part", 0):
+        yield f"a part has {counts.min()} points, fewer than the {described['min_per_part']} of its json"
     near = MAX_SURFACE_GAP_SHARE * max(sample.size, float(np.abs(sample.record["bounds"]).max()))
     off, turned = _misplaced(sample, points, normals, instances, near)
     if off:
@@ -66,7 +83,7 @@ def _misplaced(
     for part in np.unique(instances[doubtful]).tolist():
         mine = doubtful[instances[doubtful] == part]
         triangles = corners[parts == part]
-        gaps = _distances(points[mine], triangles)
+        gaps = point_triangle_distances(points[mine], triangles)
         touching = gaps <= near
         off += int((~touching.any(axis=1)).sum())
         fitting = normals[mine] @ unit_normals(triangles).T > 1.0 - MAX_COSINE_ERROR
@@ -87,34 +104,4 @@ def _unseen(sample: PackagedSample, points: FloatArray) -> int:
     return len(points)
 
 
-def _distances(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Return the distance of each of n points from each of t triangles, float64 (n, t), by barycentric regions."""
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    inside = _plane_distances(points, corners)
-    edges = np.minimum.reduce([_segment_distances(points, *ends) for ends in ((a, b), (b, c), (c, a))])
-    return np.minimum(inside, edges)
-
-
-def _plane_distances(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Return the distance from the plane of a triangle if the foot of the point lies inside, else infinity."""
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    normals = area_vectors(corners)
-    area = np.einsum("ij,ij->i", normals, normals)
-    safe = np.where(area > 0, area, 1.0)
-    away = points[:, None] - a[None]
-    first = np.einsum("ntj,tj->nt", np.cross((b - a)[None], away), normals) / safe
-    second = np.einsum("ntj,tj->nt", np.cross(away, (c - a)[None]), normals) / safe
-    height = np.abs(np.einsum("ntj,tj->nt", away, normals)) / np.sqrt(safe)
-    return np.where((first >= 0) & (second >= 0) & (first + second <= 1) & (area > 0), height, np.inf)
-
-
-def _segment_distances(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    along = end - start
-    length = np.einsum("ij,ij->i", along, along)
-    away = points[:, None] - start[None]
-    share = np.einsum("ntj,tj->nt", away, along) / np.where(length > 0, length, 1.0)
-    distances: FloatArray = np.linalg.norm(away - np.clip(share, 0, 1)[:, :, None] * along[None], axis=2)
-    return distances
-
-
-AUDIT = Audit(faults=point_faults)
+AUDIT = Audit(faults=cloud_faults)

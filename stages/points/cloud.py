@@ -10,7 +10,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from stages.points.area_sampling import SurfacePoints, sample_shape
+from stages.points.area_sampling import SurfacePoints, sample_parts, sample_shape
 from stages.points.settings import SampledSurface
 from stages.points.visibility import seen_from_outside
 from stages.shape.geometry.bounds import shape_bounds
@@ -20,6 +20,9 @@ from stages.shape.shape import Shape
 
 MAX_DRAW_ROUNDS = 1000
 """Maximum rounds of drawing the requested number of points until enough of them are visible."""
+
+MAX_PART_DRAWS = 16
+"""Draws for each point that a part lacks; only visible ones count."""
 
 BOX_POINTS = 64
 
@@ -35,22 +38,77 @@ class Normalization:
 
 
 def sample_cloud(
-    shape: Shape, uniform: int, farthest: int, pool: int, surface: SampledSurface, rng: np.random.Generator
+    shape: Shape,
+    uniform: int,
+    farthest: int,
+    pool: int,
+    surface: SampledSurface,
+    rng: np.random.Generator,
+    min_per_part: int = 0,
 ) -> SurfacePoints:
     """Return `farthest` points picked out of `pool` uniform ones, in the order of picking, then `uniform` further
     points.
 
     All are on the whole surface or on what is visible of it. The two kinds have separate streams: the uniform points do
-    not depend on `farthest` and `pool`. At least one of the two counts is positive. Raises ValueError for a shape of
-    which next to nothing is visible.
+    not depend on `farthest` and `pool`. At least one of the two counts is positive. Of the uniform points each part has
+    at least `min_per_part`, of a visible surface as far as enough of it is seen. Raises ValueError if
+    next to nothing is visible, and for more parts than points.
     """
     rays = RayCaster(shape) if surface == "visible" else None
     farthest_rng, uniform_rng = rng.spawn(2)
-    if farthest == 0:
-        return _draw_points(shape, uniform, rays, uniform_rng)
+    drawn = None
+    if uniform:
+        drawn = _draw_points(shape, uniform, rays, uniform_rng)
+        drawn = _fill_parts(shape, drawn, min_per_part, rays, rng.spawn(1)[0]) if min_per_part else drawn
+        if farthest == 0:
+            return drawn
     pooled = _draw_points(shape, pool, rays, farthest_rng)
     picked = _spread(pooled, farthest, farthest_rng)
-    return picked if uniform == 0 else picked.followed_by(_draw_points(shape, uniform, rays, uniform_rng))
+    return picked if drawn is None else picked.followed_by(drawn)
+
+
+def min_points_of_parts(shape: Shape, uniform: int, min_per_part: int) -> int:
+    """Return how many of `uniform` points each part has at least: `min_per_part`, or an equal share of too few."""
+    return min(min_per_part, uniform // len(shape))
+
+
+def _fill_parts(
+    shape: Shape, cloud: SurfacePoints, minimum: int, rays: RayCaster | None, rng: np.random.Generator
+) -> SurfacePoints:
+    """Return the cloud with some points of parts that have more than `minimum` moved to parts that have fewer.
+
+    Which points are replaced is random, so that the order of the cloud stays random. Points that `rays` cannot see are
+    not drawn.
+    """
+    if minimum * len(shape) > len(cloud.points):
+        raise ValueError(f"{len(cloud.points):,} points are too few for {minimum} on each of {len(shape)} parts")
+    counts = np.bincount(cloud.instances, minlength=len(shape))
+    lacking = np.maximum(minimum - counts, 0)
+    added = _points_of_parts(shape, lacking, rays, rng)
+    spare = np.maximum(counts - minimum, 0)
+    places: list[int] = []
+    for place in rng.permutation(len(cloud.points)).tolist():
+        if len(places) == len(added.points):
+            break
+        part = cloud.instances[place]
+        if spare[part]:
+            spare[part] -= 1
+            places.append(place)
+    return cloud.replaced(np.array(places, dtype=np.int64), added)
+
+
+def _points_of_parts(
+    shape: Shape, wanted: npt.NDArray[np.int64], rays: RayCaster | None, rng: np.random.Generator
+) -> SurfacePoints:
+    """Return `wanted` (n,) points of each part; fewer where MAX_PART_DRAWS draws for each find too few visible ones."""
+    draws = wanted if rays is None else wanted * MAX_PART_DRAWS
+    drawn = sample_parts(shape, np.repeat(np.arange(len(shape)), draws), rng)
+    if rays is None:
+        return drawn
+    seen = drawn.take(np.flatnonzero(seen_from_outside(rays, drawn.points, drawn.normals)))
+    # points are in the order of their parts: the rank of each within its part
+    first = np.searchsorted(seen.instances, np.arange(len(shape)))
+    return seen.take(np.flatnonzero(np.arange(len(seen.points)) - first[seen.instances] < wanted[seen.instances]))
 
 
 def _draw_points(shape: Shape, n: int, rays: RayCaster | None, rng: np.random.Generator) -> SurfacePoints:

@@ -194,4 +194,9 @@ class ViewsConfig(StrictModel):
 
 def view_count(config: ViewsConfig) -> int:
     """Return the number of views of each sample."""
-    return sum(len(cameras.poses) if isinstance(cameras, PosedCameras) else cameras.count for cameras in config.cameras)
+    return sum(map(camera_count, config.cameras))
+
+
+def camera_count(cameras: AnyCameras) -> int:
+    """Return the number of cameras of an entry."""
+    return len(cameras.poses) if isinstance(cameras, PosedCameras) else cameras.count

@@ -82,9 +82,20 @@ def pixel_rays(camera: Mapping[str, Any], columns: FloatArray, rows: FloatArray)
 
     columns, rows: coordinates of the points in pixels, (w,) and (h,)
     """
+    return picture_rays(camera, np.stack(np.meshgrid(columns, rows), axis=-1))
+
+
+def picture_rays(camera: Mapping[str, Any], pixels: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return origins and directions, float64 (..., 3), of the rays through picture points, in mesh coordinates.
+
+    pixels: coordinates of the points in pixels, (..., 2)
+
+    The directions are as long as the way from one unit of depth to the next.
+    """
     intrinsics, pose = np.array(camera["intrinsics"]), np.array(camera["world_to_camera"])
     rotation, origin = pose[:3, :3].T, -pose[:3, :3].T @ pose[:3, 3]
-    x, y = np.meshgrid((columns - intrinsics[0, 2]) / intrinsics[0, 0], (rows - intrinsics[1, 2]) / intrinsics[1, 1])
+    x = (pixels[..., 0] - intrinsics[0, 2]) / intrinsics[0, 0]
+    y = (pixels[..., 1] - intrinsics[1, 2]) / intrinsics[1, 1]
     ahead = np.stack([x, y, np.ones_like(x)], axis=-1)
     if camera["projection"] == "perspective":
         return np.broadcast_to(origin, ahead.shape), ahead @ rotation.T

@@ -64,6 +64,8 @@ MEMBERS: tuple[Sections, ...] = (
     {"points": False, "sketches": False, "views": {**CAMERAS, "images": ["color"]}},
     {"sketches": False, "captions": {"lengths": ["short"]}, "surface": {"flags": True, "union": True}},
     {"surface": {"flags": True}},
+    {"points": {"min_per_part": 4, "scans": {"points": 64}}},
+    {"points": {"surface": "visible", "min_per_part": 4, "clouds": 2, "scans": {"depth_noise": 0.01}}},
 )
 
 
@@ -152,6 +154,14 @@ def has_pictures(config: Config) -> bool:
     return has(config, "sketches") or (has(config, "views") and "color" in section(config, "views").images)
 
 
+def fills(config: Config) -> bool:
+    return has(config, "points") and section(config, "points").min_per_part > 0
+
+
+def scanned(config: Config) -> bool:
+    return has(config, "points") and section(config, "points").scans is not None
+
+
 def rows(config: Config) -> bool:
     return uses(config, "proportions") and section(config, "variations").rows.use is not False
 
@@ -170,6 +180,20 @@ CONDITIONS: tuple[tuple[str, Callable[[Config], bool]], ...] = (
         lambda c: has(c, "points") and section(c, "points").normalize == "none",
     ),
     ("Points are moved and scaled", lambda c: has(c, "points") and section(c, "points").normalize != "none"),
+    ("so that sizes and units are kept", lambda c: has(c, "points") and section(c, "points").normalize == "none"),
+    ("Points are not uniform by area", lambda c: has(c, "points") and section(c, "points").min_per_part > 0),
+    (
+        "each part that is seen well has",
+        lambda c: fills(c) and section(c, "points").surface == "visible",
+    ),
+    ("each part has at least", lambda c: fills(c) and section(c, "points").surface == "all"),
+    ("Point cloud 1 of what is seen from outside, drawn independently", lambda c: section(c, "points").clouds > 1),
+    ("Scans have the coordinates of the points", scanned),
+    ("Points that the cameras of scan 0 see", scanned),
+    ("Scans have no noise and no outliers", lambda c: scanned(c) and not section(c, "points").scans.depth_noise),
+    ("The noise of scans is normal", lambda c: scanned(c) and section(c, "points").scans.depth_noise > 0),
+    ("standard deviation of 0.01 radii", lambda c: scanned(c) and section(c, "points").scans.depth_noise == 0.01),
+    ("Scans have no outliers", lambda c: scanned(c) and section(c, "points").scans.depth_noise > 0),
     ("Instances of points and the two rows", lambda c: has(c, "points")),
     ("checks statics and drawings", lambda c: has(c, "sketches") and not has(c, "surface")),
     ("checks statics, drawings and surfaces", lambda c: has(c, "sketches") and has(c, "surface")),

@@ -34,6 +34,8 @@ from tests.stages.package.toy import (
 )
 
 MEMBERS = ["glb", "txt", "caption.json", "points.npy", "normals.npy", "labels.npy", "instances.npy"]
+MEMBERS += ["points1.npy", "normals1.npy", "labels1.npy", "instances1.npy", "scan_points0.npy", "scan_normals0.npy"]
+MEMBERS += ["scan_labels0.npy", "scan_instances0.npy", "scan_cameras0.npy"]
 MEMBERS += ["sketch0.png", "sketch1.png", "union_vertices.npy", "union_faces.npy", "union_instances.npy"]
 MEMBERS += ["sdf_points.npy", "sdf_values.npy", "occupancy.npy", "contacts.npy", "joints.npy"]
 MEMBERS += ["color0.png", "depth0.exr", "instances0.png", "json"]
@@ -97,7 +99,15 @@ def test_record_agrees_with_the_collection(toy_folder: Path) -> None:
     }
     assert record["lineage"] == sample.lineage
     assert record["contact_tolerance"] == toy_kit(sample.kit).contact_tolerance
-    assert record["points"] == {"farthest": 16, "uniform": 64, "surface": "all", "centre": [0, 0, 0], "scale": 1.0}
+    assert record["points"] == {
+        "farthest": 16,
+        "uniform": 64,
+        "surface": "all",
+        "centre": [0, 0, 0],
+        "scale": 1.0,
+        "min_per_part": 4,
+        "clouds": 2,
+    }
 
 
 def test_classes_are_listed_with_their_counts_by_split(toy_folder: Path) -> None:

@@ -22,14 +22,13 @@ from stages.captions.stage import STAGE as CAPTIONS
 from stages.exemplars.settings import ExemplarsConfig
 from stages.package.settings import PackageConfig
 from stages.package.stage import STAGE as PACKAGE
-from stages.points.settings import PointsConfig
+from stages.points.settings import PointsConfig, ScansConfig
 from stages.points.stage import STAGE as POINTS
 from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.shards import PRODUCERS, collection_shards
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType
 from stages.shape.kit_files import write_kit
-from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample, read_samples, write_sample
 from stages.shape.views.scene import scene_of
 from stages.sketches.settings import SketchesConfig, SketchView
@@ -38,6 +37,7 @@ from stages.sketches.stage import plan as plan_sketches
 from stages.strings.settings import StringsConfig
 from stages.surface.settings import DistanceConfig, SurfaceConfig
 from stages.surface.stage import STAGE as SURFACE
+from stages.validity.settings import ValidityConfig
 from stages.validity.stage import STAGE as VALIDITY
 from stages.variations.settings import VariationsConfig
 from stages.views.settings import RingCameras, ViewsConfig
@@ -213,9 +213,11 @@ def toy_config(shards: int = 4) -> Config:
         "exemplars": ExemplarsConfig(),
         "variations": ToyConfig(shards=shards),
         "strings": StringsConfig(),
-        "validity": PhysicsConfig(),
+        "validity": ValidityConfig(),
         "abstraction": AbstractionConfig(),
-        "points": PointsConfig(uniform=64, farthest=16, pool=256),
+        "points": PointsConfig(
+            uniform=64, farthest=16, pool=256, clouds=2, min_per_part=4, scans=ScansConfig(points=32, depth_noise=0.01)
+        ),
         "sketches": SketchesConfig(
             size=24, renderer="raster", views=(SketchView(name="left"), SketchView(name="right", azimuth=30.0))
         ),
