@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import fmean, median
@@ -45,9 +44,6 @@ PUBLISHED = tuple(
 )
 """Shapes of ShapeAssembly programs: real ones, and ones that its model generates."""
 
-TILT_PUSH = 0.1
-"""In weights, the tangent of a tilt; the value whose shares of real shape programs are nearest to published ones."""
-
 NOTES = (
     "Stable: connected parts are one rigid body that bears a sideways push of each part and a twist. "
     "Dropped: the shape is rooted, and its components keep their height, within 2.5 %, after a tilt that amounts to a "
@@ -71,9 +67,8 @@ def judge_all(shapes: Sequence[Shape], config: PhysicsConfig) -> list[Validity]:
 
 
 def stays_up(shapes: Sequence[Shape], config: PhysicsConfig) -> list[bool]:
-    """Return which shapes are rooted and keep their height after a push of TILT_PUSH (shapeassembly App. E)."""
-    min_tilt = math.degrees(math.atan(TILT_PUSH))
-    return [Judge(shape.meshes, shape.up, config).tilt_to_fall(shape.assembly) > min_tilt for shape in shapes]
+    """Return which shapes are rooted and keep their height after a push of FALL_PUSH (shapeassembly App. E)."""
+    return [not Judge(shape.meshes, shape.up, config).fall(shape.assembly).falls for shape in shapes]
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +13,9 @@ from stages.shape.collection.discovery import languages
 from stages.shape.collection.packaged import PackagedSample
 from stages.shape.collection.pairs import CONTACTS, JOINTS
 from stages.shape.geometry.components import connected_components
-from stages.shape.physics.judge import judge_of, physical_fields
-from stages.shape.physics.settings import PhysicsConfig
+from stages.shape.physics.judge import fall_fields, judge_of, physical_fields
+from stages.shape.physics.settling import Fall
+from stages.validity.settings import ValidityConfig
 
 FIELD_ROUNDING = 2e-6
 """Numbers of a record are rounded to this."""
@@ -34,6 +36,17 @@ def contradictions(sample: PackagedSample) -> Iterator[str]:
         yield "its json counts more pieces or floating parts than it has parts"
     if not -1 <= physics["weakest"] < parts:
         yield "its json names a weakest part that does not exist"
+    if _config(sample).falls:
+        yield from _fall_faults(physics, parts)
+
+
+def _fall_faults(physics: Mapping[str, Any], parts: int) -> Iterator[str]:
+    if physics["falls"] != Fall(physics["fall_degrees"], physics["fallen"]).falls:
+        yield f"its json says falls: {physics['falls']}, with a tilt of {physics['fall_degrees']} degrees"
+    if not physics["rooted"] and not physics["falls"]:
+        yield "its json says that it does not fall, and that a part is not connected to the ground"
+    if not -1 <= physics["fallen"] < parts:
+        yield "its json names a fallen part that does not exist"
 
 
 def recomputed_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
@@ -43,7 +56,10 @@ def recomputed_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
     validity = judge.validity(shape.assembly)
     if validity.joints.tolist() != sample.arrays[JOINTS].T.tolist():
         yield "its joints are not the pairs that statics counts as connected"
-    for name, value in physical_fields(validity).items():
+    fields = physical_fields(validity)
+    if _config(sample).falls:
+        fields |= fall_fields(judge.fall(shape.assembly, validity.joints))
+    for name, value in fields.items():
         if isinstance(value, float):
             wrong = abs(value - recorded[name]) > max(FIELD_ROUNDING, RELATIVE_TOLERANCE * abs(value))
         else:
@@ -76,8 +92,8 @@ def _pair_faults(sample: PackagedSample) -> Iterator[str]:
         yield "its joints do not make as many components as physics says"
 
 
-def _config(sample: PackagedSample) -> PhysicsConfig:
-    return PhysicsConfig.model_validate(sample.sections["validity"])
+def _config(sample: PackagedSample) -> ValidityConfig:
+    return ValidityConfig.model_validate(sample.sections["validity"])
 
 
 AUDIT = Audit(faults=contradictions, recheck=recomputed_faults)

@@ -8,6 +8,7 @@ from typing import Any
 from pipeline.config import Config
 from stages.shape.collection.members import IndexColumn, Member, Members, RecordField
 from stages.shape.collection.pairs import CONTACTS, JOINTS
+from stages.validity.settings import ValidityConfig
 
 
 def _number(description: str, **limits: float) -> dict[str, Any]:
@@ -45,6 +46,24 @@ PHYSICS: Mapping[str, Mapping[str, Any]] = {
 }
 
 
+FALLS: Mapping[str, Mapping[str, Any]] = {
+    "falls": {
+        "type": "boolean",
+        "description": "dropped on the ground and pushed by a tenth of its weight, a piece of it comes to rest with "
+        "its centre of mass 2.5 % higher or lower; connected parts are one rigid body, and what no chain of joints "
+        "connects to the ground falls",
+    },
+    "fall_degrees": _number("least tilt of the ground after which it falls; 0: by itself; 90: never", minimum=0),
+    "fallen": {
+        "type": "integer",
+        "minimum": -1,
+        "description": "place of the first part of the piece that falls at this tilt, or of the first part that no "
+        "chain of joints connects to the ground; -1: none",
+    },
+}
+"""What `validity.falls` adds."""
+
+
 def _members(_: Config) -> tuple[Member, ...]:
     return (
         Member(
@@ -64,14 +83,15 @@ def _members(_: Config) -> tuple[Member, ...]:
     )
 
 
-def _fields(_: Config) -> Mapping[str, RecordField]:
+def _fields(config: Config) -> Mapping[str, RecordField]:
+    facts = {**PHYSICS, **FALLS} if config.section(ValidityConfig).falls else PHYSICS
     return {
         "physics": RecordField(
             {
                 "description": "does it stand? By statics on its geometry; the pairs of joints.npy hold together",
                 "type": "object",
-                "properties": PHYSICS,
-                "required": list(PHYSICS),
+                "properties": facts,
+                "required": list(facts),
                 "additionalProperties": False,
             }
         ),

@@ -14,21 +14,23 @@ from stages.shape.collection.discovery import language_of
 from stages.shape.collection.pairs import CONTACTS, JOINTS, pair_bytes
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.geometry.pose import rounded
-from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample
+from stages.validity.settings import ValidityConfig
 
-COUNTED_FIELDS = ("rooted", "stable")
+COUNTED_FIELDS = ("rooted", "stable", "falls")
+SAID = {"falls": "fall"}
 BYTES_A_SAMPLE = 4096
 
 
 def run_shard(task: Task) -> Outcome:
     """Make the fields of each sample's record that `members.py` declares.
 
-    A sample without extent or weight is rejected. The summary counts the rooted and the stable samples.
+    A sample without extent or weight is rejected. The summary counts the rooted and the stable samples, and
+    those that fall where that is asked for.
     """
-    from stages.shape.physics.judge import judge_of, physical_fields
+    from stages.shape.physics.judge import fall_fields, judge_of, physical_fields
 
-    config = task.config.section(PhysicsConfig)
+    config = task.config.section(ValidityConfig)
     counts: Counter[str] = Counter()
 
     def judged(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
@@ -47,12 +49,14 @@ def run_shard(task: Task) -> Outcome:
         if graphs:
             touching = collection.decoder.sources[sample.kit].contact_tolerance
         physics = physical_fields(validity)
+        if config.falls:
+            physics |= fall_fields(judge.fall(assembly, validity.joints))
         fields = {
             "physics": physics,
             "contact_tolerance": _short(touching),
             "joint_tolerance": _short(connected),
         }
-        counts.update(name for name in COUNTED_FIELDS if physics[name])
+        counts.update(name for name in COUNTED_FIELDS if physics.get(name))
         return {
             CONTACTS: pair_bytes(known),
             JOINTS: pair_bytes(validity.joints),
@@ -60,7 +64,8 @@ def run_shard(task: Task) -> Outcome:
         }
 
     samples = add_members(task, judged)
-    summary = {"split": task.shard.params["split"], **{name: counts[name] for name in COUNTED_FIELDS}}
+    counted = [name for name in COUNTED_FIELDS if name != "falls" or config.falls]
+    summary = {"split": task.shard.params["split"], **{name: counts[name] for name in counted}}
     return Outcome(samples, {**summary, "samples": samples})
 
 
@@ -70,20 +75,21 @@ def _short(length: float) -> float:
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """Return how many samples are rooted and stable."""
+    """Return how many samples are rooted and stable, and how many fall where that is asked for."""
     summaries = [plan.summary("validity", name) for name in plan.shards("validity")]
     done = [summary for summary in summaries if summary is not None]
     judged = sum(summary["samples"] for summary in done)
     if not judged:
         return []
-    shares = [f"{sum(summary[name] for summary in done) / judged:.1%} {name}" for name in COUNTED_FIELDS]
+    counted = [name for name in COUNTED_FIELDS if name in done[0]]
+    shares = [f"{sum(summary[name] for summary in done) / judged:.1%} {SAID.get(name, name)}" for name in counted]
     return [f"{judged:,} judged: {', '.join(shares)}"]
 
 
 STAGE = Stage(
     name="validity",
     module=__name__,
-    config=PhysicsConfig,
+    config=ValidityConfig,
     inputs=(PRODUCERS,),
     plan=collection_shards,
     run_shard=run_shard,

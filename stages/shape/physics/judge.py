@@ -14,12 +14,14 @@ from stages.shape.geometry.components import connected_components
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.physics.contacts import ContactPatches, PairContacts
 from stages.shape.physics.settings import PhysicsConfig, Requirements
-from stages.shape.physics.settling import Body, tilt_to_fall
+from stages.shape.physics.settling import Body, Fall, hull_vertices, tilt_to_fall
 from stages.shape.physics.solids import MeshSolids, PlacedParts
 from stages.shape.physics.stability import Stability, stability, standing_points, tipping_angle
 from stages.shape.physics.structure import ground_share, mirror_score
 from stages.shape.shape import Shape
 
+NEVER_FALLS_DEGREES = 90.0
+"""Tilt in records of a shape that no tilt brings to another height."""
 TIPPING_TOLERANCE_DEGREES = 1e-4
 """A shape that just stands may seem to be this far beyond tipping."""
 
@@ -87,19 +89,26 @@ class Judge:
         depths = self._touch.overlaps(placed, connected)[1] if dry else np.zeros(len(connected))
         return None if self._stability(placed, connected, depths, standing).stable else "not stable"
 
-    def tilt_to_fall(self, assembly: Assembly) -> float:
-        """Return the least tilt, in degrees, by which a dropped component comes to rest at another height.
+    def fall(self, assembly: Assembly, connected: IntArray | None = None) -> Fall:
+        """Return the least tilt by which a dropped piece comes to rest at another height, and the piece.
 
-        It is 0 if one falls by itself or a part is not rooted, since stable shapes are rooted (shapeassembly App. E).
-        Connected parts are one rigid body whatever `config.joints` is. See `stages.shape.physics.settling`. Raises
-        ValueError as `validity` does.
+        connected: the joints of `validity` for this assembly, if they are known
+
+        The tilt is 0 if a part is not rooted, since stable shapes are rooted (shapeassembly App. E). Connected parts
+        are one rigid body whatever `config.joints` is. See `stages.shape.physics.settling`. Raises ValueError as
+        `validity` does.
         """
         placed = self._placed(assembly)
-        connected = self._connected(placed, assembly)
-        if _floating(placed, connected, self.config).any():
-            return 0.0
+        connected = self._connected(placed, assembly) if connected is None else connected
+        floating = _floating(placed, connected, self.config)
+        if floating.any():
+            return Fall(0.0, int(floating.argmax()))
         pieces = connected_components(len(placed), connected)
-        return min(tilt_to_fall(_body(placed, pieces == piece), placed.diagonal) for piece in range(pieces.max() + 1))
+        tilts = np.array(
+            [tilt_to_fall(_body(placed, pieces == piece), placed.diagonal) for piece in range(pieces.max() + 1)]
+        )
+        first = int(tilts.argmin())
+        return Fall(float(tilts[first]), int((pieces == first).argmax()) if np.isfinite(tilts[first]) else -1)
 
     def contacts(self, assembly: Assembly) -> IntArray:
         """Return the pairs of parts that touch or overlap, int32 (m, 2), i < j in lexicographic order.
@@ -171,6 +180,12 @@ def physical_fields(validity: Validity) -> dict[str, Any]:
     return {name: round(value, 6) + 0.0 if isinstance(value, float) else value for name, value in values.items()}
 
 
+def fall_fields(fall: Fall) -> dict[str, Any]:
+    """Return what a fall adds to the `physics` field of a record."""
+    degrees = round(min(fall.tilt_degrees, NEVER_FALLS_DEGREES), 6)
+    return {"falls": fall.falls, "fall_degrees": degrees, "fallen": fall.part}
+
+
 def unmet_requirement(requirements: Requirements, shape: Shape) -> str | None:
     """Return why a shape is rejected, as counted among the rejects, or None if it is kept.
 
@@ -188,7 +203,7 @@ def _body(placed: PlacedParts, own: BoolArray) -> Body:
     """Return the parts `own`, bool (n,), as one body."""
     weights = placed.weights[own]
     points = np.concatenate([placed.points[part] for part in np.flatnonzero(own).tolist()])
-    return Body(points, weights @ placed.centroids[own] / max(weights.sum(), np.finfo(float).tiny))
+    return Body(hull_vertices(points), weights @ placed.centroids[own] / max(weights.sum(), np.finfo(float).tiny))
 
 
 def _floating(placed: PlacedParts, connected: np.ndarray, config: PhysicsConfig) -> np.ndarray:

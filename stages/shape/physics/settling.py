@@ -9,6 +9,7 @@ mass has another height. Nothing slides, and nothing bounces.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from heapq import heappop, heappush
 
@@ -21,10 +22,31 @@ FALL_SHARE = 0.025
 """Relative change of the height of the centre of mass of a fallen component, as in the authors' programs; their text
 has 0.1.
 """
+FALL_PUSH = 0.1
+"""Push of a dropped shape, in weights, the tangent of a tilt; the value whose shares of real shape programs are nearest
+to published ones.
+"""
 SAME_PLACE_SHARE = 1e-4
 """Points this near, as a share of the diagonal of the shape, lie on the ground together."""
 MAX_RESTS = 40
 """A body that has rested on this many faces without falling rolls."""
+
+
+@dataclass(frozen=True)
+class Fall:
+    """Whether a shape that is dropped and pushed comes to rest at another height, and what of it.
+
+    tilt_degrees: least tilt of the ground after which a piece does; 0: by itself; infinite: never
+    part: first part of the piece, or the first part that nothing connects to the ground; -1: none
+    """
+
+    tilt_degrees: float
+    part: int
+
+    @property
+    def falls(self) -> bool:
+        """Whether a push of FALL_PUSH is enough."""
+        return self.tilt_degrees <= math.degrees(math.atan(FALL_PUSH))
 
 
 @dataclass(frozen=True)
@@ -83,6 +105,17 @@ def come_to_rest(body: Body, diagonal: float) -> Body:
         pivot, way = _downhill(support, body.centre[:2], near)
         body = body.tipped(pivot, way, near)
     return body
+
+
+def hull_vertices(points: FloatArray) -> FloatArray:
+    """Return the points, (q, 3), that are corners of their convex hull; all of them if they have no volume."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        corners: FloatArray = points[ConvexHull(points).vertices]
+    except QhullError:
+        return points
+    return corners
 
 
 def tilt_to_fall(body: Body, diagonal: float) -> float:

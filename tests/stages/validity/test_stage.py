@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +21,10 @@ from stages.shape.collection.packaged import PackagedSample
 from stages.shape.collection.pairs import CONTACTS, JOINTS, pairs_of
 from stages.shape.kit import Assembly
 from stages.shape.kit_files import write_kit
-from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample, write_sample
 from stages.shape.shape import Shape
 from stages.validity.audit import AUDIT
+from stages.validity.settings import ValidityConfig
 from stages.validity.stage import STAGE
 from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
 from tests.stages.shape.views.solids import box, kit_of, part_type, posed
@@ -50,7 +51,7 @@ def small(_: Plan) -> int:
     return 1000
 
 
-def judged(out: Path, *samples: Sample) -> tuple[dict[str, dict[str, Any]], dict[str, int]]:
+def judged(out: Path, *samples: Sample, falls: bool = False) -> tuple[dict[str, dict[str, Any]], dict[str, int]]:
     """The fields of each sample, with its arrays by their names, and the rejects by reason, of a collection of
     `samples` of one producer."""
 
@@ -76,7 +77,7 @@ def judged(out: Path, *samples: Sample) -> tuple[dict[str, dict[str, Any]], dict
         "exemplars": KitsConfig(),
         "variations": SamplesConfig(),
         **ABSENT_SECTIONS,
-        "validity": PhysicsConfig(),
+        "validity": ValidityConfig(falls=falls),
     }
     if producer == "programs":
         sections["programs"] = ProgramsConfig(program=samples[0].kit)
@@ -104,6 +105,21 @@ def test_a_tower_stands_and_what_hangs_in_the_air_does_not(tmp_path: Path) -> No
     assert not found["loose"]["physics"]["rooted"]
     assert found["loose"]["physics"]["floating"] == 1
     assert rejects == {}
+
+
+def test_what_topples_falls_where_that_is_asked_for(tmp_path: Path) -> None:
+    """A tower of seven cubes tips at an angle of half a width in half a height."""
+    tower = boxes("tower", *[(0, level, 0) for level in range(7)])
+    tall = boxes("tall", *[(0, level, 0) for level in range(12)])
+    found, _ = judged(tmp_path, tower, tall, boxes("loose", (0, 0, 0), (0, 4, 0)), falls=True)
+    verdicts = {
+        key: [record["physics"][name] for name in ("stable", "falls", "fallen")] for key, record in found.items()
+    }
+    assert verdicts == {"tower": [True, False, 0], "tall": [True, True, 0], "loose": [False, True, 1]}
+    degrees = {key: record["physics"]["fall_degrees"] for key, record in found.items()}
+    assert degrees["tower"] == pytest.approx(math.degrees(math.atan(1 / 7)))
+    assert degrees["tall"] == pytest.approx(math.degrees(math.atan(1 / 12)))
+    assert degrees["loose"] == 0.0
 
 
 def test_a_sample_without_a_body_is_refused_and_counted(tmp_path: Path) -> None:
@@ -136,10 +152,10 @@ def test_contradictions_between_joints_and_physics_are_found() -> None:
     physics = {"components": 1, "floating": 0, "rooted": True, "stable": True, "margin": 0.5, "weakest": -1}
     shape = Shape((), Assembly(np.zeros(2, np.int16), np.tile(np.eye(4), (2, 1, 1)), joints), "y", ())
 
-    def faults(pairs: np.ndarray = joints, **changed: object) -> list[str]:
+    def faults(pairs: np.ndarray = joints, dropped: bool = False, **changed: object) -> list[str]:
         arrays = {CONTACTS: np.empty((2, 0), np.int32), JOINTS: pairs.T}
         record = {"parts": [{}, {}], "physics": {**physics, **changed}}
-        sections = {"validity": PhysicsConfig().model_dump()}
+        sections = {"validity": ValidityConfig(falls=dropped).model_dump()}
         return list(AUDIT.faults(PackagedSample("key", record, {}, arrays, shape, sections)))
 
     assert faults() == []
@@ -149,9 +165,14 @@ def test_contradictions_between_joints_and_physics_are_found() -> None:
     assert faults(stable=False) == ["its json says stable: False, with a margin of 0.5 for a push of 0.01"]
     assert faults(joints[:, ::-1]) == [f"{JOINTS} holds entries that are not pairs of its parts"]
     assert faults(joints.astype(np.int64)) == [f"{JOINTS} is not an array int32 (2, m)"]
+    upright: dict[str, Any] = {"falls": False, "fall_degrees": 20.0, "fallen": 0}
+    assert faults(dropped=True, **upright) == []
+    leaning = faults(dropped=True, **{**upright, "fall_degrees": 5.0})
+    assert leaning == ["its json says falls: False, with a tilt of 5.0 degrees"]
+    assert faults(dropped=True, **{**upright, "fallen": 2}) == ["its json names a fallen part that does not exist"]
 
 
 @pytest.mark.parametrize("friction", [-0.1, 11.0])
 def test_friction_out_of_range_is_a_mistake(friction: float) -> None:
     with pytest.raises(ValueError, match="friction"):
-        PhysicsConfig(friction=friction)
+        ValidityConfig(friction=friction)

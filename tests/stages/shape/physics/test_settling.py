@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stages.shape.arrays import FloatArray
-from stages.shape.physics.judge import Judge
+from stages.shape.physics.judge import Judge, fall_fields
 from stages.shape.physics.settings import PhysicsConfig
-from stages.shape.physics.settling import Body, come_to_rest, tilt_to_fall
+from stages.shape.physics.settling import Body, Fall, come_to_rest, hull_vertices, tilt_to_fall
 from stages.shape.shape import Shape
 from tests.stages.shape.geometry.bodies import box
 from tests.stages.shape.physics.structures import solid
@@ -54,7 +54,7 @@ PLACES = ((-0.95, -0.95), (0.95, -0.95), (-0.95, 0.95), (0.95, 0.95))
 
 
 def tilt(shape: Shape) -> float:
-    return Judge(shape.meshes, shape.up, PhysicsConfig()).tilt_to_fall(shape.assembly)
+    return Judge(shape.meshes, shape.up, PhysicsConfig()).fall(shape.assembly).tilt_degrees
 
 
 def test_a_table_rocks_on_a_leg_a_little_short_and_falls_on_one_that_is_missing() -> None:
@@ -69,6 +69,28 @@ def test_what_does_not_hang_together_falls_by_itself_and_what_floats_is_not_root
     sound, lean = box(1.0, 1.0, 1.0, at=(0.0, 0.0, 0.0)), box(0.05, 1.0, 1.0, at=(3.0, 0.0, 0.0))
     assert tilt(solid(sound, lean)) == pytest.approx(math.degrees(math.atan(0.05)))
     assert tilt(solid(sound, box(1.0, 1.0, 1.0, at=(0.0, 0.0, 3.0)))) == 0.0
+
+
+def test_the_piece_that_falls_and_the_part_that_floats_are_named() -> None:
+    sound, lean = box(1.0, 1.0, 1.0, at=(0.0, 0.0, 0.0)), box(0.05, 1.0, 1.0, at=(3.0, 0.0, 0.0))
+    shape = solid(sound, lean)
+    fall = Judge(shape.meshes, shape.up, PhysicsConfig()).fall(shape.assembly)
+    assert (fall.part, fall.falls) == (1, True)
+    floating = solid(sound, box(1.0, 1.0, 1.0, at=(0.0, 0.0, 3.0)))
+    assert Judge(floating.meshes, floating.up, PhysicsConfig()).fall(floating.assembly) == Fall(0.0, 1)
+    cube = solid(sound)
+    fall = Judge(cube.meshes, cube.up, PhysicsConfig()).fall(cube.assembly)
+    assert fall_fields(fall) == {"falls": False, "fall_degrees": 90.0, "fallen": -1}
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10_000))
+def test_points_within_the_hull_do_not_matter(seed: int) -> None:
+    points = np.random.default_rng(seed).normal(size=(60, 3))
+    corners = hull_vertices(points)
+    assert len(corners) < len(points)
+    whole, hull = (tilt_to_fall(Body(cloud, points.mean(axis=0)), 5.0) for cloud in (points, corners))
+    assert hull == pytest.approx(whole, abs=1e-9)
 
 
 CLOUDS = st.integers(0, 10_000).map(lambda seed: np.random.default_rng(seed).normal(size=(12, 3)))
