@@ -52,6 +52,10 @@ SAMPLES ?= 100
 FORMAT  ?=
 ## KEY      keys of the samples that `make export` writes, with commas between; all if empty
 KEY     ?=
+## DEST     where `make publish` puts the dataset: a folder, s3://bucket/name or hf://organization/name
+DEST    ?=
+## DRY_RUN  1 for a `make publish` that lists what would be sent, and sends nothing
+DRY_RUN ?=
 ## SHARD    shard that `make reproduce` makes again, such as train-000007
 SHARD   ?=
 ## ROUNDS   rounds of `make chaos`
@@ -62,7 +66,7 @@ VERSION ?=
 # Their values are text: make expands none of it, and recipes read it from the environment, as "$$CONFIG", so that no
 # shell expands it either. A recipe never says $(CONFIG).
 VARIABLES := CONFIG OUT WORKERS SEED STALL_TIMEOUT CLUSTER MESH PROGRAM INPUT UP MODEL TABLE PAPER SCALE SAMPLES \
-             FORMAT KEY SHARD ROUNDS VERSION
+             FORMAT KEY DEST DRY_RUN SHARD ROUNDS VERSION
 $(foreach name,$(VARIABLES),$(eval override $(name) := $$(value $(name))))
 ifeq ($(value WORKERS),)
 override WORKERS := $(shell nproc 2>/dev/null || echo 1)
@@ -133,7 +137,7 @@ captions: validity  ## Describe each shape in words, if the config asks for it
 package: validity abstraction strings points sketches views surface captions  ## Write the dataset's folder: shards, index, card, checksums
 	$(RUN)
 
-.PHONY: train recover export
+.PHONY: train recover export publish
 train: setup-models  ## Train the models of CONFIG, after making the samples that they learn from
 	@$(SHAPEMILL) train $(OPTIONS) $(RUNNING) $${MODEL:+--only "$$MODEL"}
 recover: setup-models  ## Find the parameters of PROGRAM, or of the likeliest program, that give the shape of INPUT
@@ -143,6 +147,10 @@ recover: setup-models  ## Find the parameters of PROGRAM, or of the likeliest pr
 export: setup  ## Write samples of the finished dataset as FORMAT, for simulators and modelling programs
 	@[ -n "$$FORMAT" ] || { echo 'make export needs FORMAT=urdf, mjcf, usd or obj' >&2; exit 2; }
 	@$(SHAPEMILL) export $(DATASET) --key "$$KEY" -- "$$FORMAT"
+
+publish: setup-stores  ## Put the finished, verified dataset at DEST, where people load it
+	@[ -n "$$DEST" ] || { echo 'make publish needs DEST=s3://bucket/name, hf://organization/name or a folder' >&2; exit 2; }
+	@$(SHAPEMILL) publish $(DATASET) $${DRY_RUN:+--dry-run} -- "$$DEST"
 
 # Looking at them ----------------------------------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@ command of `shapemill`, and a Typer with a name becomes a group. Heavy imports b
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from pipeline.config import Config, load_config
+from pipeline.errors import ConfigError
 from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
 from pipeline.stage import Stage
@@ -44,6 +46,11 @@ def load_dataset(
     context: typer.Context, config: Path, out: Path, seed: int | None = None
 ) -> tuple[dict[str, Stage], Config, DatasetPaths]:
     """Return the stages, the dataset's config, checked by every stage, and its folders. Raises ConfigError."""
+    if re.match(r"\w+:/", str(out)):
+        url = str(out).replace(":/", "://", 1)
+        raise ConfigError(
+            f"OUT={url}: datasets are made in a local folder; put the finished one there by `make publish`"
+        )
     stages = find_stages(context.obj)
     overrides = {} if seed is None else {"seed": seed}
     loaded = load_config(config, {name: stage.config for name, stage in stages.items()}, overrides)

@@ -97,7 +97,7 @@ def test_rooms_do_not_import_in_a_circle() -> None:
             reads.setdefault(place[1], set()).update(targets - {place[1]})
     order = list(TopologicalSorter(reads).static_order())
     assert order[0] == "shape"
-    assert [room for room, read in reads.items() if "package" in read] == ["export", "verification"]
+    assert [room for room, read in reads.items() if "package" in read] == ["export", "publishing", "verification"]
 
 
 def test_stages_are_found_without_numba_and_scipy() -> None:

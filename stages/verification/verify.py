@@ -31,15 +31,20 @@ from stages.verification.files import (
 )
 from stages.verification.findings import Findings
 from stages.verification.shard import check_shard
+from stages.verification.verified import record_verification
 
 
 def print_findings(folder: Path, samples: int | None, seed: int, workers: int) -> int:
-    """Verify the dataset in `folder`, print a table, return the exit code: 1 for any fault."""
+    """Verify the dataset in `folder`, print a table, store the result, return the exit code: 1 for any fault."""
     if not (folder / MANIFEST).is_file():
         print(f"{folder}: no dataset: it has no {MANIFEST}. Make one with: make dataset")
         return 1
     findings = verify_dataset(folder, samples, seed, workers)
     print("\n".join([str(folder), *findings.lines()]))
+    try:
+        record_verification(folder, bool(findings.faults))
+    except OSError as error:
+        print(f"the result cannot be stored, which publishing needs: {error.strerror}")
     return 1 if findings.faults else 0
 
 

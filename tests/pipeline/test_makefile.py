@@ -32,6 +32,8 @@ VARIABLES = (
     "SAMPLES",
     "FORMAT",
     "KEY",
+    "DEST",
+    "DRY_RUN",
     "SHARD",
     "ROUNDS",
     "VERSION",
@@ -130,14 +132,17 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     assert values == {
         "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "STALL_TIMEOUT": "-",
         "CLUSTER": "-", "MESH": "-", "PROGRAM": "-", "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-",
-        "PAPER": "-", "SCALE": "minutes", "SAMPLES": "100", "FORMAT": "-", "KEY": "-", "SHARD": "-", "ROUNDS": "20",
+        "PAPER": "-", "SCALE": "minutes", "SAMPLES": "100", "FORMAT": "-", "KEY": "-", "DEST": "-", "DRY_RUN": "-",
+        "SHARD": "-", "ROUNDS": "20",
         "VERSION": "-",
     }  # fmt: skip
 
 
 def test_every_target_gets_every_value_unchanged(tmp_path: Path) -> None:
     said = nasty(tmp_path)
-    targets = ("package", "plan", "status", "verify", "reproduce", "inspect", "eval", "paper", "doctor", "clean")
+    targets = (
+        "package", "publish", "plan", "status", "verify", "reproduce", "inspect", "eval", "paper", "doctor", "clean",
+    )  # fmt: skip
     arguments = [f"{name}={said}" for name in VARIABLES]
     reached = calls(*targets, *arguments)
     assert len(reached) == 20 + len(targets[1:]) + 1, "20 stages; inspect looks at a program and a model"

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.errors import ConfigError
+from stages.verification.verified import require_verification
 from stages.verification.verify import verify_dataset
 from tests.command import shapemill
 from tests.stages.verification.forge import FOLDER_FORGERIES, FORGERIES, copy_dataset, forge
@@ -52,6 +54,7 @@ def test_a_finished_dataset_is_good(folder: Path, capsys: pytest.CaptureFixture[
     printed = capsys.readouterr().out
     assert "23 checked   good" in printed
     assert "faults" not in printed
+    require_verification(folder)
 
 
 @pytest.mark.parametrize("place", [0, 700, -1])
@@ -62,6 +65,8 @@ def test_a_corrupted_byte_is_found_and_its_file_named(
     flip(folder / file, place)
     assert verified(folder, "--samples", "0") == 1
     assert f"checksums: {file}: is corrupted" in capsys.readouterr().out
+    with pytest.raises(ConfigError, match="has not been verified without faults as it is now: run `make verify` first"):
+        require_verification(folder)
 
 
 def test_a_missing_shard_is_found_and_named(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

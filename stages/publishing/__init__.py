@@ -1,0 +1,1 @@
+"""Publishing: a finished, verified dataset in an object store, on Hugging Face or in another folder."""
