@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from itertools import combinations
 
 import numpy as np
@@ -57,15 +57,16 @@ def near_pairs(
     spacings: FloatArray,
     cloud_of: Callable[[int], npt.NDArray[np.float32]],
     groups: npt.NDArray[np.int64],
+    makers: npt.NDArray[np.int64],
     splits: npt.NDArray[np.int64],
 ) -> Iterator[tuple[int, int]]:
-    """Yield pairs of near copies in different groups and different splits, the lower index first.
+    """Yield pairs of near copies of different groups, producers and splits, the lower index first.
 
     features, spacings: of each shape, as `copy_features`
     cloud_of: returns a cloud of a shape, float32 (n, 3)
-    groups, splits: int64 (k,)
+    groups, makers, splits: int64 (k,); makers are producers
     """
-    for first, second in sorted(_candidates(features, groups, splits)):
+    for first, second in sorted(_candidates(features, groups, makers, splits)):
         limit = MAX_DISTANCE_RATIO * min(spacings[first], spacings[second])
         one, other = cloud_of(first), cloud_of(second)
         if any(_distance(one @ turn.T, other) <= limit for turn in QUARTER_TURNS):
@@ -73,18 +74,21 @@ def near_pairs(
 
 
 def _candidates(
-    features: FloatArray, groups: npt.NDArray[np.int64], splits: npt.NDArray[np.int64]
+    features: FloatArray,
+    groups: npt.NDArray[np.int64],
+    makers: npt.NDArray[np.int64],
+    splits: npt.NDArray[np.int64],
 ) -> Iterator[tuple[int, int]]:
-    """Yield pairs with similar features in different groups and splits, the lower index first."""
+    """Yield pairs of different groups, producers and splits with similar features, the lower index first."""
     from scipy.spatial import cKDTree
 
-    members = [np.flatnonzero(groups == group) for group in np.unique(groups)]
+    members = [np.flatnonzero(makers == maker) for maker in np.unique(makers)]
     trees = [cKDTree(features[own]) for own in members]
     for a, b in combinations(range(len(trees)), 2):
         for place, near in enumerate(trees[a].query_ball_tree(trees[b], 1.0, p=np.inf)):
             first = int(members[a][place])
             for second in members[b][near].tolist():
-                if splits[first] != splits[second]:
+                if splits[first] != splits[second] and groups[first] != groups[second]:
                     yield min(first, second), max(first, second)
 
 
@@ -98,23 +102,3 @@ def _distance(first: npt.NDArray[np.float32], second: npt.NDArray[np.float32]) -
     squares = (first**2).sum(axis=1)[:, None] + (second**2).sum(axis=1)[None] - 2.0 * first @ second.T
     gaps = np.sqrt(np.maximum(squares, 0.0))
     return float(gaps.min(axis=0).mean() + gaps.min(axis=1).mean()) / 2
-
-
-def left_out(pairs: Sequence[tuple[int, int]], splits: npt.NDArray[np.int64]) -> list[int]:
-    """Return which samples to leave out so that none of the pairs remains, ascending: those in most pairs first.
-
-    splits: split of each sample, int64 (k,); of samples in equally many pairs one of the first split is left out.
-    """
-    rivals: dict[int, set[int]] = {}
-    for first, second in pairs:
-        rivals.setdefault(first, set()).add(second)
-        rivals.setdefault(second, set()).add(first)
-    out = []
-    while rivals:
-        worst = max(rivals, key=lambda row: (len(rivals[row]), -splits[row], -row))
-        for other in rivals.pop(worst):
-            rivals[other].discard(worst)
-            if not rivals[other]:
-                del rivals[other]
-        out.append(worst)
-    return sorted(out)

@@ -10,7 +10,6 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -149,8 +148,9 @@ def _listed_rows(task: Task, listing: str) -> Iterator[Row]:
 
 
 def _copies(task: Task, rows: Sequence[Row], splits: npt.NDArray[np.int64]) -> list[int]:
-    """Return the samples to leave out so that no near copies of two producers are in two splits."""
-    from stages.mixture.near_copies import left_out, near_pairs
+    """Return the samples to leave out so that no near copies and no equal graphs of two producers are in two splits."""
+    from stages.mixture.near_copies import near_pairs
+    from stages.mixture.rivals import left_out
 
     listings = task.shard.params["listings"]
     read = [bytes_array(task.input("mixture", f"{name}.features.npy").read_bytes()) for name in listings]
@@ -163,20 +163,11 @@ def _copies(task: Task, rows: Sequence[Row], splits: npt.NDArray[np.int64]) -> l
         return cloud
 
     makers = np.array([task.shard.params["joined"].index(row["producer"]) for row in rows], dtype=np.int64)
-    pairs = [*_equal_graphs(rows), *near_pairs(features[:, :-1], features[:, -1], cloud_of, makers, splits)]
-    return left_out(pairs, splits)
-
-
-def _equal_graphs(rows: Sequence[Row]) -> Iterator[tuple[int, int]]:
-    """Yield pairs of samples of one kit and graph in different splits and of different producers."""
-    groups: dict[tuple[str, str], list[int]] = {}
-    for number, row in enumerate(rows):
-        groups.setdefault((row["kit"], row["graph"]), []).append(number)
-    for group in groups.values():
-        if len({rows[number]["producer"] for number in group}) > 1:
-            for first, second in combinations(group, 2):
-                if all(rows[first][what] != rows[second][what] for what in ("producer", "split")):
-                    yield first, second
+    numbers: dict[tuple[str, str], int] = {}
+    graphs = [numbers.setdefault((row["kit"], row["graph"]), len(numbers)) for row in rows]
+    groups = np.array(graphs, dtype=np.int64)
+    pairs = near_pairs(features[:, :-1], features[:, -1], cloud_of, groups, makers, splits)
+    return left_out(pairs, groups, makers, splits)
 
 
 def _surplus(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stages.mixture.near_copies import copy_features, left_out, near_pairs, unit_clouds
+from stages.mixture.near_copies import copy_features, near_pairs, unit_clouds
 from stages.programs.program import shape_from_parts
 from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.shape import Shape
@@ -23,13 +23,16 @@ def scaled_and_turned(shape: Shape) -> Shape:
     return replace(shape, assembly=replace(shape.assembly, poses=turn @ shape.assembly.poses))
 
 
-def pairs_of(shapes: list[Shape], groups: list[int], splits: list[int]) -> list[tuple[int, int]]:
+def pairs_of(
+    shapes: list[Shape], makers: list[int], splits: list[int], groups: list[int] | None = None
+) -> list[tuple[int, int]]:
     rngs = np.random.default_rng(0).spawn(len(shapes))
     clouds = np.array([unit_clouds(shape, rng) for shape, rng in zip(shapes, rngs, strict=True)])
     sides = np.array([np.diff(shape_bounds(shape), axis=0)[0] for shape in shapes])
     extents = sides / np.linalg.norm(sides, axis=1, keepdims=True)
     features, spacings = copy_features(clouds, extents)
-    return list(near_pairs(features, spacings, lambda number: clouds[number, 0], np.array(groups), np.array(splits)))
+    numbers = (np.arange(len(shapes)) if groups is None else np.array(groups), np.array(makers), np.array(splits))
+    return list(near_pairs(features, spacings, lambda number: clouds[number, 0], *numbers))
 
 
 def test_copies_in_other_places_sizes_and_quarter_turns_are_found() -> None:
@@ -38,18 +41,12 @@ def test_copies_in_other_places_sizes_and_quarter_turns_are_found() -> None:
     assert pairs_of(shapes, [0, 0, 1, 1], [0, 0, 1, 1]) == [(0, 2)]
 
 
-def test_copies_of_one_producer_or_in_one_split_are_left_to_others() -> None:
+def test_copies_of_one_producer_split_or_group_are_left_to_others() -> None:
     shape = stool_of(0.5, 1.0)
     assert pairs_of([shape, shape], [0, 0], [0, 1]) == []
     assert pairs_of([shape, shape], [0, 1], [1, 1]) == []
+    assert pairs_of([shape, shape], [0, 1], [2, 1], groups=[5, 5]) == []
     assert pairs_of([shape, shape], [0, 1], [2, 1]) == [(0, 1)]
-
-
-def test_what_is_in_most_pairs_is_left_out_and_else_what_is_in_train() -> None:
-    splits = np.array([0, 1, 0, 0, 2])
-    assert left_out([(0, 1), (1, 2), (1, 3)], splits) == [1]
-    assert left_out([(0, 1), (3, 4)], splits) == [0, 3]
-    assert left_out([], splits) == []
 
 
 def test_a_shard_without_samples_has_no_features() -> None:
