@@ -2,6 +2,7 @@
 
     OUT/.work/<dataset>/log.txt                    event log
     OUT/.work/<dataset>/workers.txt                output of workers and native libraries
+    OUT/.work/<dataset>/verified.json              what the last verification found without faults
     OUT/.work/<dataset>/<stage>/<shard>.<...>      files of finished shards
     OUT/.work/<dataset>/<stage>/records/           one record for each finished shard
     OUT/.work/<dataset>/<stage>/rejects/           refused items, one JSON line each
