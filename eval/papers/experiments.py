@@ -78,7 +78,8 @@ def make_experiment(experiment: Experiment, scale: Scale, folder: Path, workers:
         return [_command_step(step, folder) for step in planned]
     if experiment.files:
         return [_table_step(step, None, scaled, experiment.files, folder) for step in planned]
-    config = write_scaled_config(experiment, scaled, folder)
+    assert experiment.config is not None
+    config = write_scaled_config(experiment, experiment.config, scale, folder)
     steps, failed = [], ""
     for step in planned:
         if failed:
@@ -98,7 +99,7 @@ def planned_steps(experiment: Experiment, scale: Scale, folder: Path, workers: i
     if experiment.command:
         command = " ".join(filter(None, [experiment.command, scaled.arguments]))
         return [PaperStep(experiment.name, "", command.format(out=shlex.quote(str(folder))))]
-    given = ["--config", str(_config_path(experiment, scaled, folder)), "--out", str(folder)]
+    given = ["--config", str(_config_path(experiment, folder)), "--out", str(folder)]
     steps = []
     if experiment.config and experiment.dataset:
         steps.append(shlex.join(["shapemill", "run", *given, "--workers", str(workers)]))
@@ -118,20 +119,16 @@ def _not_at_scale(experiment: Experiment, scale: Scale) -> str:
     return f"not part of SCALE={scale}; SCALE={' or '.join(name for name in SCALES if name in experiment.scales)}"
 
 
-def _config_path(experiment: Experiment, scaled: ScaledExperiment, folder: Path) -> Path:
-    assert experiment.config is not None or experiment.files
-    own = folder / f"{experiment.name}.yaml"
-    return own if scaled.config or experiment.config is None else experiment.config
+def write_scaled_config(experiment: Experiment, config: Path, scale: Scale, folder: Path) -> Path:
+    """Write the config of an experiment at a scale into the folder of the run, and return its path."""
+    values, _ = read_yaml(config)
+    scaled = experiment.scales.get(scale, ScaledExperiment())
+    text = yaml.safe_dump(_merged(values, scaled.config), sort_keys=False, allow_unicode=True, width=120)
+    return write_file(_config_path(experiment, folder), f"# {config} at SCALE={scale}\n{text}".encode())
 
 
-def write_scaled_config(experiment: Experiment, scaled: ScaledExperiment, folder: Path) -> Path:
-    """Write the config of a scaled experiment and return its path: the config itself where nothing is scaled."""
-    path = _config_path(experiment, scaled, folder)
-    if scaled.config and experiment.config is not None:
-        values, _ = read_yaml(experiment.config)
-        text = yaml.safe_dump(_merged(values, scaled.config), sort_keys=False, allow_unicode=True, width=120)
-        write_file(path, f"# {experiment.config} on a smaller scale\n{text}".encode())
-    return path
+def _config_path(experiment: Experiment, folder: Path) -> Path:
+    return folder / f"{experiment.name}.yaml"
 
 
 def _merged(values: Mapping[str, Any], scaled: Mapping[str, Any]) -> dict[str, Any]:

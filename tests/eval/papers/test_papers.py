@@ -123,4 +123,4 @@ def test_every_experiment_can_be_planned_at_every_scale(paper: Paper, scale: str
                 table_options(step.table, table.options, scaled.options.get(step.table, {}))
                 assert not experiment.files or table.compute_from_files
         if experiment.config and all(path.exists() for path in experiment.needs):
-            load_config(write_scaled_config(experiment, scaled, tmp_path), sections)
+            load_config(write_scaled_config(experiment, experiment.config, scale, tmp_path), sections)
