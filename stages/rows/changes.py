@@ -33,6 +33,7 @@ def change_json(change: Change) -> dict[str, Any]:
         "shift": change.shift.tolist(),
         "at": change.at,
         "times": change.times,
+        **({"is_bay": True} if change.is_bay else {}),
     }
 
 
@@ -59,4 +60,4 @@ def read_change(stated: Mapping[str, Any]) -> Change:
     numbers = [*normal.tolist(), *shift.tolist(), at]
     if not np.isfinite(numbers).all() or normal @ shift <= 0 or not (times == -1 or 0 < times <= MAX_TIMES):
         raise ValueError(f"a row changes by 1 to {MAX_TIMES} or -1 periods, with a step along its normal: {stated}")
-    return RowChange(normal, shift, at, times)
+    return RowChange(normal, shift, at, times, bool(stated.get("is_bay", False)))

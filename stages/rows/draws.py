@@ -12,7 +12,7 @@ from stages.rows.layout import Layout
 from stages.rows.rows import Row, find_rows
 from stages.rows.settings import RowsConfig
 from stages.rows.slabs import RowChange, SlabError, repeat
-from stages.rows.steps import longest_row, steps_of
+from stages.rows.steps import bays_of, longest_row, steps_of
 from stages.rows.turns import MIN_SECTORS, find_circles, turned
 
 MAX_PARTS_FACTOR = 4.0
@@ -26,9 +26,10 @@ TRIES_PER_CHANGE = 6
 class LayoutDraws:
     """Draws layouts of one exemplar. What it remembers saves time and never changes a result."""
 
-    def __init__(self, layout: Layout, config: RowsConfig) -> None:
+    def __init__(self, layout: Layout, config: RowsConfig, bays: bool = False) -> None:
+        """Find the rows of a layout. bays: whether its bays are inserted and removed too."""
         self.exemplar, self.config = layout, config
-        self.steps = steps_of(layout)
+        self.steps = [*steps_of(layout), *(bays_of(layout) if bays else ())]
         self.refused = Counter[str]()  # places of the exemplar's rows that were left out, by reason
         self._rows: dict[bytes, list[Row]] = {}
         self._limits = [self._limits_of(step.count) for step in self.steps]
@@ -103,6 +104,8 @@ class LayoutDraws:
         if (changed.extent > MAX_SIDE_FACTOR * self.exemplar.extent).any():
             return None
         for step, (least, most) in zip(self.steps, self._limits, strict=True):
+            if step.is_bay and not change.is_bay:
+                continue
             count = max(longest_row(changed.mates(step.shift)), 1)
             if count > most or (count < least and change.times < 0):
                 return None

@@ -9,6 +9,7 @@ import numpy as np
 
 from stages.rows.layout import Layout, layout_of
 from stages.rows.rows import Row, find_rows
+from stages.rows.steps import bay_ends, bays_of
 from stages.rows.turns import Circle, find_circles
 from stages.shape.kit import Kit
 
@@ -22,7 +23,7 @@ class KitRow:
     """A row of an exemplar that can become longer or shorter.
 
     exemplar: name of the exemplar
-    labels: number of parts of each label in one period, most frequent first
+    labels: number of parts of each label in one period, most frequent first; of a bay, the labels of its ends
     count: parts of the row
     direction: `along x`, `along y`, `along z`, `along a slope`, or `about x`, `about y` or `about z`
     """
@@ -31,22 +32,28 @@ class KitRow:
     labels: tuple[tuple[str, int], ...]
     count: int
     direction: str
+    is_bay: bool = False
 
     @property
     def sentence(self) -> str:
-        """What the row is, such as `5 times board, along y`."""
+        """What the row is, such as `5 times board, along y`, or `bays between side, along x`."""
         names = [f"{count} {label}" if count > 1 else label for label, count in self.labels[:MAX_LABELS_SHOWN]]
         more = " and more" if len(self.labels) > MAX_LABELS_SHOWN else ""
+        if self.is_bay:
+            ends = ", ".join(label for label, _ in self.labels[:MAX_LABELS_SHOWN])
+            return f"bays between {ends}{more}, {self.direction}"
         return f"{self.count} times {', '.join(names)}{more}, {self.direction}"
 
 
 def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
-    """Return the rows of all exemplars of a kit: circles first, then along each direction the longest rows."""
+    """Return the rows of all exemplars of a kit: circles, then the longest rows along each direction, then bays."""
     found: list[KitRow] = []
     for exemplar in kit.exemplars:
         layout = layout_of(kit, exemplar)
         circles = [_turning(kit, exemplar.name, layout, circle) for circle in find_circles(layout)]
-        found += dict.fromkeys([*circles, *(_described(kit, exemplar.name, row) for row in _main_rows(layout))])
+        rows = [_described(kit, exemplar.name, row) for row in _main_rows(layout)]
+        bays = [_described_bay(kit, exemplar.name, layout, row) for row in find_rows(layout, bays_of(layout))]
+        found += dict.fromkeys([*circles, *rows, *bays])
     return tuple(found)
 
 
@@ -73,6 +80,15 @@ def _turning(kit: Kit, exemplar: str, layout: Layout, circle: Circle) -> KitRow:
 
 def _described(kit: Kit, exemplar: str, row: Row) -> KitRow:
     counts = Counter(kit.types[kind].label for kind in row.copied)
+    return KitRow(exemplar, tuple(counts.most_common()), row.count, _direction(row))
+
+
+def _described_bay(kit: Kit, exemplar: str, layout: Layout, row: Row) -> KitRow:
+    ends = bay_ends(layout, row.shift) & (layout.mates(row.shift) >= 0)
+    counts = Counter(kit.types[kind].label for kind in layout.types[ends].tolist())
+    return KitRow(exemplar, tuple(counts.most_common()), row.count, _direction(row), is_bay=True)
+
+
+def _direction(row: Row) -> str:
     axes = np.flatnonzero(row.shift)
-    direction = f"along {'xyz'[axes[0]]}" if len(axes) == 1 else "along a slope"
-    return KitRow(exemplar, tuple(counts.most_common()), row.count, direction)
+    return f"along {'xyz'[axes[0]]}" if len(axes) == 1 else "along a slope"

@@ -9,13 +9,15 @@ import numpy as np
 
 from stages.rows.layout import Layout
 from stages.rows.slabs import RowChange, Slab
-from stages.rows.steps import ROUNDING_DECIMALS, Step, longest_row, steps_of, with_long_rows
+from stages.rows.steps import ROUNDING_DECIMALS, Step, bay_ends, longest_row, steps_of, with_long_rows
 from stages.shape.arrays import FloatArray
 
 MIN_ROW = 2
 MIN_TORN_ROW = 3
 """Parts of a row from which no change of another row may tear it apart; two legs may stand further apart."""
 TORN_ROW = "a row with another step would be torn apart"
+MIN_BAYS_SHORTENED = 3
+"""Parts of a row from which a bay between two of them can be removed."""
 MAX_PLANES = 160
 """Ends of slabs that are tried for each step and normal."""
 
@@ -31,6 +33,7 @@ class Row:
     copied: the parts of the exemplar that a period holds, by their types, ascending
     insertions: ends of slabs that can be inserted, float64 (k,)
     removals: ends of slabs that can be removed, float64 (k,)
+    is_bay: whether a period is a bay: everything between two of the parts
     """
 
     step: int
@@ -40,14 +43,15 @@ class Row:
     copied: tuple[int, ...]
     insertions: FloatArray
     removals: FloatArray
+    is_bay: bool = False
 
     def insertion(self, index: int, times: int) -> RowChange:
         """Return the insertion of `times` periods at one of the places."""
-        return RowChange(self.normal, self.shift, float(self.insertions[index]), times)
+        return RowChange(self.normal, self.shift, float(self.insertions[index]), times, self.is_bay)
 
     def removal(self, index: int) -> RowChange:
         """Return the removal of the period at one of the places."""
-        return RowChange(self.normal, self.shift, float(self.removals[index]), -1)
+        return RowChange(self.normal, self.shift, float(self.removals[index]), -1, self.is_bay)
 
 
 def find_rows(
@@ -65,7 +69,11 @@ def find_rows(
         count = longest_row(mates)
         if count < 1:
             continue
-        others = [other for index, other in enumerate(long_rows) if index != number and (other >= 0).any()]
+        others = [
+            other
+            for index, other in enumerate(long_rows)
+            if index != number and not steps[index].is_bay and (other >= 0).any()
+        ]
         for normal in step.normals():
             rows += _rows_along(layout, number, step, count, normal, mates, others, refuse)
     return [row for row in rows if not any(_splits_units(layout, row, whole) for whole in rows)]
@@ -73,7 +81,7 @@ def find_rows(
 
 def _splits_units(layout: Layout, row: Row, whole: Row) -> bool:
     """Return whether a row of two takes only some parts of a unit of another row, such as the sides of a window."""
-    if row.count != MIN_ROW or row.step == whole.step:
+    if row.count != MIN_ROW or row.step == whole.step or row.is_bay or whole.is_bay:
         return False
     units = _units(layout, whole.shift)
     takes = (layout.mates(row.shift) >= 0) | (layout.mates(-row.shift) >= 0)
@@ -112,9 +120,14 @@ def _rows_along(
     low, high = layout.spans(normal)
     previous = layout.mates(-step.shift)
     found: dict[tuple[int, ...], list[tuple[float, bool, bool, bool]]] = {}
-    for at in _planes(layout, low, high, (mates >= 0) | (previous >= 0)).tolist():
-        slab = Slab(layout, normal, step.shift, at, mates, previous, low, high)
-        may_insert, may_remove = slab.insertion_fault() is None, slab.removal_fault() is None
+    if step.is_bay:
+        planes = np.unique(np.round(low[bay_ends(layout, step.shift) & (previous >= 0)], ROUNDING_DECIMALS))
+    else:
+        planes = _planes(layout, low, high, (mates >= 0) | (previous >= 0))
+    for at in planes.tolist():
+        slab = Slab(layout, normal, step.shift, at, mates, previous, low, high, step.is_bay)
+        may_insert = slab.insertion_fault() is None
+        may_remove = slab.removal_fault() is None and not (step.is_bay and count < MIN_BAYS_SHORTENED)
         if not (may_insert or may_remove) or not (slab.is_regular or slab.spanning_fault() is None):
             continue
         fits = may_insert, may_remove
@@ -130,7 +143,7 @@ def _rows_along(
         best = [place for place in places if place[3]] or places
         insertions = np.array([at for at, may_insert, _, _ in best if may_insert])
         removals = np.array([at for at, _, may_remove, _ in best if may_remove])
-        yield Row(number, normal, step.shift, count, copied, insertions, removals)
+        yield Row(number, normal, step.shift, count, copied, insertions, removals, step.is_bay)
 
 
 def _planes(layout: Layout, low: FloatArray, high: FloatArray, recurs: np.ndarray) -> FloatArray:

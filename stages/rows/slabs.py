@@ -4,6 +4,8 @@ A slab begins at `at - normal @ shift` along its normal and ends at `at`. Parts 
 shift, parts beyond it move, and parts that span it become longer or shorter. A slab is valid where each contact across
 its end recurs a period earlier, so that a new seam shows only what the exemplar shows. What occurs once stays where it
 is.
+
+The slab of a bay is whole: what occurs once in it is copied too, such as the door between the two sides of a cabinet.
 """
 
 from __future__ import annotations
@@ -18,6 +20,10 @@ from stages.rows.spanning import Span
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.kit import PartMesh
 
+MAX_REACH_SHARE = 0.25
+"""Maximum share of a bay by which its parts stand out of it."""
+MIN_OVERHANG_SHARE = 0.5
+"""Parts that reach out of a bay and are shorter than this share of it are copied with it."""
 HELD_ONCE = "a part that spans the slab holds a single part of the row"
 
 
@@ -33,12 +39,14 @@ class RowChange:
     shift: translation by one period, float64 (3,), with `normal @ shift > 0`
     at: where the slab ends along the normal
     times: number of periods inserted, or -1 for one that is removed
+    is_bay: whether a period holds everything in the slab, also what occurs once
     """
 
     normal: FloatArray
     shift: FloatArray
     at: float
     times: int
+    is_bay: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +55,7 @@ class Slab:
 
     mates, previous: int64 (n,), the part one step after and one step before each, or -1
     low, high: float64 (n,), where each part begins and ends along the normal
+    is_bay: whether a period holds everything in the slab, also what occurs once
     """
 
     layout: Layout
@@ -57,6 +66,7 @@ class Slab:
     previous: np.ndarray
     low: FloatArray
     high: FloatArray
+    is_bay: bool = False
 
     @property
     def start(self) -> float:
@@ -65,16 +75,60 @@ class Slab:
 
     @cached_property
     def within(self) -> BoolArray:
-        """Which parts begin in the slab, bool (n,)."""
+        """Which parts begin in the slab, bool (n,): of a bay also those that stand out, and none that overhang."""
+        inside: BoolArray = (self._begins & ~self._overhangs) | self._stands_out
+        return inside
+
+    @cached_property
+    def recurs(self) -> BoolArray:
+        """Which parts are in the slab and have a part one step before or after; all parts in a bay."""
+        recurring: BoolArray = self.within & (self._has_mate | self.is_bay)
+        return recurring
+
+    @cached_property
+    def _begins(self) -> BoolArray:
         tolerance = self.layout.tolerance
         begins: BoolArray = (self.low >= self.start - tolerance) & (self.low < self.at - tolerance)
         return begins
 
     @cached_property
-    def recurs(self) -> BoolArray:
-        """Which parts begin in the slab and have a part one step before or after."""
-        recurring: BoolArray = self.within & ((self.mates >= 0) | (self.previous >= 0))
-        return recurring
+    def _has_mate(self) -> BoolArray:
+        has_one: BoolArray = (self.mates >= 0) | (self.previous >= 0)
+        return has_one
+
+    @cached_property
+    def _reach(self) -> float:
+        """How far parts of a bay may stand out of it: the thickness of the parts at its ends."""
+        thickness = float((self.high - self.low)[self._begins & self._has_mate].max(initial=0.0))
+        return min(thickness, MAX_REACH_SHARE * (self.at - self.start)) + self.layout.tolerance
+
+    @cached_property
+    def _fills(self) -> BoolArray:
+        """Which parts occur once in a bay and reach across its end, or from its start to its end, bool (n,)."""
+        if not self.is_bay:
+            return np.zeros(len(self.low), dtype=bool)
+        tolerance = self.layout.tolerance
+        begins = (self.low >= self.start - self._reach) & (self.low < self.at - tolerance)
+        is_full = (self.low <= self.start + tolerance) & (self.high >= self.at - tolerance)
+        filling: BoolArray = begins & ~self._has_mate & (is_full | (self.high > self.at + tolerance))
+        return filling
+
+    @cached_property
+    def _overhangs(self) -> BoolArray:
+        """Which parts fill a bay and become longer with it, such as a table top: prisms between its ends, bool (n,)."""
+        long = self._fills & (self.high - self.low >= MIN_OVERHANG_SHARE * (self.at - self.start))
+        overhanging = np.zeros(len(self.low), dtype=bool)
+        for part in np.flatnonzero(long).tolist():
+            heights = self.layout.points[part] @ self.normal
+            begin = max(self.start, float(self.low[part])) + self._reach
+            overhanging[part] = not ((heights > begin) & (heights < self.at - 2.0 * self.layout.tolerance)).any()
+        return overhanging
+
+    @cached_property
+    def _stands_out(self) -> BoolArray:
+        """Which parts fill a bay and are copied with it, such as the door in front of a cabinet, bool (n,)."""
+        standing_out: BoolArray = self._fills & ~self._overhangs & (self.high <= self.at + self._reach)
+        return standing_out
 
     @cached_property
     def beyond(self) -> BoolArray:
@@ -84,9 +138,10 @@ class Slab:
 
     @cached_property
     def spanning(self) -> np.ndarray:
-        """Parts that begin before the slab and end after it, int64 (k,), ascending."""
+        """Parts that begin before the slab and end after it, or overhang a bay, int64 (k,), ascending."""
         begins = self.low < self.start - self.layout.tolerance
-        return np.flatnonzero(begins & (self.high > self.at + self.layout.tolerance))
+        spans = begins & (self.high > self.at + self.layout.tolerance) & ~self._stands_out
+        return np.flatnonzero(spans | self._overhangs)
 
     @cached_property
     def before(self) -> BoolArray:
@@ -99,9 +154,9 @@ class Slab:
         """Return why periods cannot be inserted as far as contacts tell, or None."""
         within, beyond, before, recurs = self.within, self.beyond, self.before, self.recurs
         tolerance = self.layout.tolerance
-        if not recurs.any():
+        if not (recurs & self._has_mate).any():
             return "nothing recurs in the slab"
-        crosses = self.high > self.at + tolerance
+        crosses = (self.high > self.at + tolerance) & ~self._stands_out
         if (crosses & within & ~recurs).any():
             return "a part that occurs once crosses the end of the slab"
         if (crosses & recurs & (self.previous < 0)).any():
@@ -109,13 +164,13 @@ class Slab:
         i, j = self._both_ways
         if (before[i] & beyond[j]).any():
             return "parts before and after the slab touch"
-        if self._is_held_once:
+        if not self.is_bay and self._is_held_once:
             return HELD_ONCE
         across = within[i] & beyond[j]
         behind = self.previous[j[across]]
         if (~recurs[i[across]]).any() or (behind < 0).any() or not recurs[behind].all():
             return "a contact across the end of the slab does not recur at its start"
-        back = recurs[i] & before[j] & (self.mates[i] < 0)
+        back = recurs[i] & before[j] & ((self.mates[i] < 0) | self.is_bay)
         if not self._leads_into(j[back], recurs):
             return "a contact at the start of the slab does not recur at its end"
         into = np.where(self.mates >= 0, recurs[self.mates], False)
@@ -143,6 +198,8 @@ class Slab:
             return "nothing recurs in the slab"
         if (within & ~recurs).any():
             return "a part that occurs once is in the slab"
+        if self.is_bay and not np.isin(self.layout.types[within], self.layout.types[~within]).all():
+            return "the last part of a type would be removed"
         if not (beyond | before).any() and not len(self.spanning):
             return "nothing would be left"
         crosses = before & (self.high > self.start + self.layout.tolerance)
@@ -151,7 +208,7 @@ class Slab:
         i, j = self._both_ways
         if (before[i] & beyond[j]).any():
             return "parts before and after the slab touch"
-        if self._is_held_once:
+        if not self.is_bay and self._is_held_once:
             return HELD_ONCE
         across = within[i] & beyond[j]
         behind = self.previous[j[across]]
@@ -237,7 +294,10 @@ class Slab:
         points = layout.points[part]
         heights = points @ self.normal
         mates, previous = layout.vertex_mates(part, self.shift), layout.vertex_mates(part, -self.shift)
-        slab = self.start, self.at, self.shift, layout.tolerance
+        start, end = self.start, self.at
+        if self._overhangs[part]:  # it may end with the slab, and is a prism just before that
+            start = end = self.at - 2.0 * layout.tolerance
+        slab = start, end, self.shift, layout.tolerance
         return Span(layout.meshes[part], layout.poses[part], points, mates, previous, heights, *slab)
 
 
@@ -245,7 +305,7 @@ def slab_of(layout: Layout, change: RowChange) -> Slab:
     """Return the slab of a change of a layout."""
     low, high = layout.spans(change.normal)
     mates, previous = layout.mates(change.shift), layout.mates(-change.shift)
-    return Slab(layout, change.normal, change.shift, change.at, mates, previous, low, high)
+    return Slab(layout, change.normal, change.shift, change.at, mates, previous, low, high, change.is_bay)
 
 
 def repeat(layout: Layout, change: RowChange) -> Layout:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.rows.layout import Layout
-from stages.shape.arrays import FloatArray
+from stages.shape.arrays import BoolArray, FloatArray
 
 MAX_STEP_SHARE = 0.75
 """Longest step, as a share of the box along its direction; a longer one joins the two ends of a shape, such as legs."""
@@ -19,6 +19,10 @@ MIN_PAIR_STEP_SHARE = 0.2
 rows.
 """
 MAX_STEPS = 24
+MIN_END_SHARE = 0.6
+"""Least size across a bay of the parts at its ends, as a share of the shape's size there."""
+MAX_BAYS = 8
+"""Steps between whose parts a bay is looked for."""
 MAX_NEIGHBOURS_PER_PART = 24
 """Nearest parts of its class that are considered for steps from a part."""
 ROUNDING_DECIMALS = 9
@@ -35,11 +39,13 @@ class Step:
     shift: float64 (3,)
     count: parts of the longest row with this step
     parts: number of parts that have a part at this step
+    is_bay: whether a period holds everything between two of these parts: a bay
     """
 
     shift: FloatArray
     count: int
     parts: int
+    is_bay: bool = False
 
     @property
     def is_along_axis(self) -> bool:
@@ -111,6 +117,30 @@ def steps_of(layout: Layout) -> list[Step]:
     return _without_multiples(layout, steps)[:MAX_STEPS]
 
 
+def bays_of(layout: Layout) -> list[Step]:
+    """Return steps along an axis between parts with a bay between them, those that most parts take first."""
+    shifts = _shifts(layout, max_share=1.0)
+    steps: list[Step] = []
+    for axis in range(3):
+        along = shifts[np.count_nonzero(shifts, axis=1) == 1][:, axis]
+        lengths = np.sort(along[along > MIN_PAIR_STEP_SHARE * layout.extent[axis]])
+        for group in np.split(lengths, np.flatnonzero(np.diff(lengths) > layout.mate_tolerance) + 1):
+            if len(group):
+                shift = np.round(np.median(group), ROUNDING_DECIMALS) * np.eye(3)[axis]
+                mates = np.where(bay_ends(layout, shift), layout.mates(shift), -1)
+                steps.append(Step(shift, longest_row(mates), int((mates >= 0).sum()), is_bay=True))
+    steps = [step for step in steps if step.count >= MIN_COUNT]
+    steps.sort(key=lambda step: (-step.parts, *step.shift.tolist()))
+    return steps[:MAX_BAYS]
+
+
+def bay_ends(layout: Layout, shift: FloatArray) -> BoolArray:
+    """Return which parts may be at the ends of a bay, such as legs: they are nearly as large as the shape across it."""
+    sides = (layout.boxes[:, 1] - layout.boxes[:, 0]) / np.maximum(layout.extent, 1e-12)
+    ends: BoolArray = np.count_nonzero(sides[:, shift == 0] >= MIN_END_SHARE, axis=1) > 0
+    return ends
+
+
 def _share(layout: Layout, shift: FloatArray) -> float:
     """Return the length of a step as a share of the box along its largest component."""
     axis = int(np.abs(shift).argmax())
@@ -137,8 +167,11 @@ def _without_multiples(layout: Layout, steps: list[Step]) -> list[Step]:
     return kept
 
 
-def _shifts(layout: Layout) -> FloatArray:
-    """Return the differences of the anchors of parts of one class, float64 (k, 3), of usable lengths."""
+def _shifts(layout: Layout, max_share: float = MAX_STEP_SHARE) -> FloatArray:
+    """Return the differences of the anchors of parts of one class, float64 (k, 3), of usable lengths.
+
+    max_share: longest of them, as a share of the box along its direction
+    """
     from scipy.spatial import cKDTree
 
     found = [np.empty((0, 3))]
@@ -153,6 +186,6 @@ def _shifts(layout: Layout) -> FloatArray:
     largest = np.abs(shifts).argmax(axis=1)
     is_positive = shifts[np.arange(len(shifts)), largest] > 0
     shares = np.abs(shifts) / np.maximum(layout.extent, 1e-12)
-    is_short = np.take_along_axis(shares, largest[:, None], axis=1)[:, 0] <= MAX_STEP_SHARE
+    is_short = np.take_along_axis(shares, largest[:, None], axis=1)[:, 0] <= max_share
     usable: FloatArray = shifts[is_positive & is_short & (lengths > MIN_STEP_TOLERANCES * layout.mate_tolerance)]
     return usable

@@ -56,6 +56,13 @@ def test_side_shares_are_those_of_the_box_around_a_shape() -> None:
 
 
 def test_resized_closed_box_is_reported_to_look_alike() -> None:
-    kit = kit_of(PANELS, [[*WITHOUT_FRONT, ("back", pose(0, 0, 0.45))]])
+    others = {"floor": box(2, 0.12, 1), "wall": box(0.12, 0.8, 1), "front": box(1.8, 0.8, 0.12)}
+    placed = [
+        *(WITHOUT_FRONT[number] for number in (0, 2, 4, 5)),
+        ("floor", pose(0, -0.46, 0)),
+        ("wall", pose(0.96, 0, 0)),
+        ("front", pose(0, 0, 0.46)),
+    ]
+    kit = kit_of(PANELS | others, [placed])  # no two sides are congruent, so it has no bays
     assert "look alike, since the exemplar is a closed box with plain sides" in estimate_resizing(kit, 2).sentence
     assert "alike" not in estimate_resizing(stools(), 2).sentence

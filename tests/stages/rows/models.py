@@ -37,6 +37,22 @@ def shelf(boards: int = SHELF_BOARDS, crates: Sequence[int] = (), cans: Sequence
     return layout(MESHES, [*sides, *held, *lying])
 
 
+def cabinet(stands_out: float = 0.0) -> tuple[Kit, Layout]:
+    """Two sides under a top, with a shelf and a framed door between them.
+
+    stands_out: how far the door reaches over the side at its right
+    """
+    xs = [0.0, 0.1, 0.75 + stands_out, 0.85 + stands_out]
+    solid = np.ones((3, 3), dtype=bool)
+    solid[1, 1] = False
+    door = plate(xs, [0.0, 0.1, 0.8, 0.9], 0.04, solid)
+    door.apply_translation([-xs[-1] / 2, -0.45, 0.0])
+    meshes = {"side": box(0.05, 1.0, 0.4), "top": box(1.1, 0.05, 0.44), "shelf": box(0.9, 0.04, 0.4), "door": door}
+    sides = [("side", pose(x, 0.5, 0.0)) for x in (-0.475, 0.475)]
+    inside = [("shelf", pose(0.0, 0.6, 0.0)), ("door", pose(-0.4 + xs[-1] / 2, 0.5, 0.22))]
+    return layout(meshes, [*sides, ("top", pose(0.0, 1.025, 0.0)), *inside])
+
+
 def rail(posts: int = 8) -> tuple[Kit, Layout]:
     """A bar on posts and pins that alternate."""
     meshes = MESHES | {"bar": box(posts * 0.5, 0.1, 0.1)}

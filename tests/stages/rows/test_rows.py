@@ -19,7 +19,7 @@ from stages.rows.layout import Layout, LengthenedMesh
 from stages.rows.rows import Row, find_rows
 from stages.rows.settings import RowsConfig
 from stages.rows.slabs import RowChange, SlabError, repeat
-from stages.rows.steps import steps_of
+from stages.rows.steps import bays_of, steps_of
 from stages.rows.turns import find_circles, turned
 from stages.shape.appearance import Appearance
 from stages.shape.geometry.contact import ContactTest
@@ -278,3 +278,43 @@ def test_no_front_gets_a_second_handle() -> None:
         held = counts(kit, changed)
         assert held["handle"] == held["tall"] + held["front"]
         check(kit, changed)
+
+
+@pytest.mark.parametrize("stands_out", [0.0, 0.02])
+def test_a_bay_is_inserted_with_what_occurs_once_in_it(stands_out: float) -> None:
+    kit, layout = models.cabinet(stands_out)
+    assert not find_rows(layout), "two sides alone are no row"
+    (bay,) = find_rows(layout, bays_of(layout))
+    np.testing.assert_allclose(bay.shift, [0.95, 0.0, 0.0])
+    longer = repeat(layout, bay.insertion(0, 2))
+    assert counts(kit, longer) == {"side": 4, "top": 1, "shelf": 3, "door": 3}
+    np.testing.assert_allclose(longer.extent, layout.extent + np.array([2 * 0.95, 0.0, 0.0]))
+    check(kit, longer)
+
+
+def test_a_bay_is_removed_while_every_type_stays() -> None:
+    _, layout = models.cabinet()
+    steps = bays_of(layout)
+    (bay,) = find_rows(layout, steps)
+    assert not len(bay.removals), "the two ends of a shape stay"
+    longer = repeat(layout, bay.insertion(0, 1))
+    removals = list(changes(find_rows(longer, steps), -1))
+    assert removals
+    for change in removals:
+        assert repeat(longer, change).key == layout.key
+    with pytest.raises(SlabError, match="last part of a type"):
+        repeat(layout, RowChange(bay.normal, bay.shift, float(bay.insertions[0]), -1, is_bay=True))
+
+
+def test_draws_have_bays_where_they_are_asked_for_and_json_keeps_them() -> None:
+    kit, layout = models.cabinet()
+    assert not LayoutDraws(layout, RowsConfig()).rows
+    draws = LayoutDraws(layout, RowsConfig(), bays=True)
+    drawn = [draws.draw(np.random.default_rng(seed)) for seed in range(20)]
+    found = [result for result in drawn if result is not None]
+    assert {counts(kit, longer)["side"] for _, longer in found} == {3, 4}
+    made, longer = found[0]
+    for change in made:
+        layout = changed_by(layout, read_change(change_json(change)))
+    assert layout.key == longer.key
+    assert [row.sentence for row in rows_of_kit(kit)] == ["bays between side, along x"]
