@@ -131,7 +131,7 @@ def _rows_along(
         if not (may_insert or may_remove) or not (slab.is_regular or slab.spanning_fault() is None):
             continue
         fits = may_insert, may_remove
-        may_insert = may_insert and not any(slab.tears(other, 1) for other in others)
+        may_insert = may_insert and not any(slab.tears(other, 1) or slab.leaves_gap(other) for other in others)
         may_remove = may_remove and not any(slab.tears(other, -1) for other in others)
         if fits != (may_insert, may_remove):
             refuse(TORN_ROW)

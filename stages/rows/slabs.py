@@ -20,11 +20,18 @@ from stages.rows.spanning import Span
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.kit import PartMesh
 
+MIN_PARALLEL_COSINE = 0.999
+"""Cosine of the angle of two steps from which they are parallel."""
 MAX_REACH_SHARE = 0.25
 """Maximum share of a bay by which its parts stand out of it."""
 MIN_OVERHANG_SHARE = 0.5
 """Parts that reach out of a bay and are shorter than this share of it are copied with it."""
 HELD_ONCE = "a part that spans the slab holds a single part of the row"
+
+
+MIN_FILLING_PARTS = 3
+MIN_FILLED_SHARE = 0.7
+"""Share of a part's length from which the row of at least MIN_FILLING_PARTS that it holds fills it."""
 
 
 class SlabError(ValueError):
@@ -261,6 +268,29 @@ class Slab:
         removed = second[self.within[second]]
         return not self._leads_into(removed, self.beyond)
 
+    def leaves_gap(self, mates: np.ndarray) -> bool:
+        """Return whether a part that another row fills would become longer where none of that row is copied.
+
+        A ladder whose handrail gets more brackets would have no rungs there.
+        mates: as for `tears`, of a row of at least three parts
+        """
+        first = np.flatnonzero(mates >= 0)
+        members = np.union1d(first, mates[first])
+        if not len(self.spanning) or self.recurs[members].any():
+            return False
+        steps = self.layout.anchors[mates[first]] - self.layout.anchors[first]
+        length = float(self.normal @ self.shift)
+        if abs(float(np.median(steps @ self.normal))) > length or not are_along(steps[:1], self.shift).all():
+            return False
+        for holder in self.spanning.tolist():
+            held = members[np.isin(members.astype(np.int64) * len(self.layout) + holder, self.layout.contact_keys)]
+            if len(held) < MIN_FILLING_PARTS:
+                continue
+            filled = float(self.high[held].max() - self.low[held].min())
+            if filled >= MIN_FILLED_SHARE * float(self.high[holder] - self.low[holder]):
+                return True
+        return False
+
     def _recurs_at(self, parts: np.ndarray) -> BoolArray:
         """Return which parts exist (not -1) and recur in the slab."""
         recurring: BoolArray = (parts >= 0) & self.recurs[parts]
@@ -299,6 +329,13 @@ class Slab:
             start = end = self.at - 2.0 * layout.tolerance
         slab = start, end, self.shift, layout.tolerance
         return Span(layout.meshes[part], layout.poses[part], points, mates, previous, heights, *slab)
+
+
+def are_along(steps: FloatArray, shift: FloatArray) -> BoolArray:
+    """Return which steps (k, 3) are parallel to a shift, bool (k,)."""
+    lengths = np.linalg.norm(steps, axis=1) * float(np.linalg.norm(shift))
+    parallel: BoolArray = np.abs(steps @ shift) >= MIN_PARALLEL_COSINE * lengths
+    return parallel
 
 
 def slab_of(layout: Layout, change: RowChange) -> Slab:
