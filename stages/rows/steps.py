@@ -118,7 +118,11 @@ def steps_of(layout: Layout) -> list[Step]:
 
 
 def bays_of(layout: Layout) -> list[Step]:
-    """Return steps along an axis between parts with a bay between them, those that most parts take first."""
+    """Return steps along an axis between parts with a bay between them, those that most parts take first.
+
+    A multiple of a step of a longer row is left out: its bay is several periods of that row.
+    """
+    rows = [step.shift for step in steps_of(layout) if step.count > MIN_COUNT and step.is_along_axis]
     shifts = _shifts(layout, max_share=1.0)
     steps: list[Step] = []
     for axis in range(3):
@@ -129,9 +133,19 @@ def bays_of(layout: Layout) -> list[Step]:
                 shift = np.round(np.median(group), ROUNDING_DECIMALS) * np.eye(3)[axis]
                 mates = np.where(bay_ends(layout, shift), layout.mates(shift), -1)
                 steps.append(Step(shift, longest_row(mates), int((mates >= 0).sum()), is_bay=True))
-    steps = [step for step in steps if step.count >= MIN_COUNT]
+    steps = [
+        step
+        for step in steps
+        if step.count >= MIN_COUNT and not any(_is_multiple(step.shift, row, layout.mate_tolerance) for row in rows)
+    ]
     steps.sort(key=lambda step: (-step.parts, *step.shift.tolist()))
     return steps[:MAX_BAYS]
+
+
+def _is_multiple(shift: FloatArray, other: FloatArray, tolerance: float) -> bool:
+    """Return whether a shift is another one several times; `tolerance` for each of these."""
+    times = round(float(np.linalg.norm(shift)) / float(np.linalg.norm(other)))
+    return times > 1 and float(np.linalg.norm(shift - times * other)) <= times * tolerance
 
 
 def bay_ends(layout: Layout, shift: FloatArray) -> BoolArray:
@@ -155,14 +169,11 @@ def _without_multiples(layout: Layout, steps: list[Step]) -> list[Step]:
     taking = [(layout.mates(step.shift) >= 0) | (layout.mates(-step.shift) >= 0) for step in steps]
     kept = []
     for step, parts in zip(steps, taking, strict=True):
-        length = float(np.linalg.norm(step.shift))
-        is_multiple = False
-        for other, other_parts in zip(steps, taking, strict=True):
-            times = round(length / float(np.linalg.norm(other.shift)))
-            gap = float(np.linalg.norm(step.shift - times * other.shift))
-            if times > 1 and gap <= times * layout.mate_tolerance and not (parts & ~other_parts).any():
-                is_multiple = True
-        if not is_multiple:
+        multiple_of = (
+            not (parts & ~other_parts).any() and _is_multiple(step.shift, other.shift, layout.mate_tolerance)
+            for other, other_parts in zip(steps, taking, strict=True)
+        )
+        if not any(multiple_of):
             kept.append(step)
     return kept
 

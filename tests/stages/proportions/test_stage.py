@@ -83,7 +83,7 @@ def write_shelf_config(folder: Path) -> Path:
             "splits": {"val": 0.2, "test": 0.2, "shards": 2},
         },
         "points": {"uniform": 64},
-        "sketches": {"size": 32, "views": [{"name": "front", "azimuth": 0.0, "elevation": 10.0}]},
+        "sketches": {"size": 96, "views": [{"name": "front", "azimuth": 0.0, "elevation": 10.0}]},
     }
     path.write_text(yaml.safe_dump(config), encoding="utf-8")
     return path

@@ -68,7 +68,7 @@ def leaning_frame(bars: int = 6) -> tuple[Kit, Layout]:
     return layout({"post": box(0.1, 3.0, 0.1), "bar": box(0.5, 0.06, 0.06)}, [*posts, *held])
 
 
-def ladder_with_knobs(knobs: Sequence[float]) -> tuple[Kit, Layout]:
+def frame_with_knobs(knobs: Sequence[float]) -> tuple[Kit, Layout]:
     """Two posts filled with bars half a unit apart, and knobs at other heights outside of one post."""
     posts = [("post", pose(x, 1.5, 0.0)) for x in (-0.3, 0.3)]
     bars = [("bar", pose(0.0, 0.25 + 0.5 * number, 0.0)) for number in range(6)]

@@ -321,6 +321,6 @@ def test_draws_have_bays_where_they_are_asked_for_and_json_keeps_them() -> None:
 
 
 def test_a_part_gets_no_longer_where_its_other_row_would_leave_a_gap() -> None:
-    _, layout = models.ladder_with_knobs([0.1, 1.0, 1.9, 2.85])
+    _, layout = models.frame_with_knobs([0.1, 1.0, 1.9, 2.85])
     heights = [float(row.shift[1]) for row in find_rows(layout) if len(row.insertions)]
     assert heights == pytest.approx([0.5] * len(heights)), "more knobs alone would need longer posts without bars"
