@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from pipeline.errors import ConfigError
 from stages.package.layout import MANIFEST
 from stages.package.locations import file_system
 from stages.publishing.publication import Publication, PublishedFile
@@ -23,9 +24,13 @@ class Store:
 
         destination: path or URL of the dataset's folder; the index goes to its sibling
 
-        Raises ConfigError where another dataset or foreign shards are there, and OSError from the store.
+        Raises ConfigError for a bucket without a folder and where shards of another dataset are there, and OSError.
         """
         self._files, root = file_system(destination)
+        if "://" in destination and "/" not in root:
+            raise ConfigError(
+                f"{destination}: must name a folder of the bucket, such as {destination}/{publication.name}"
+            )
         self._files.invalidate_cache()
         self._root = root
         self._targets = {f"{root}-index/{publication.index.path}": publication.index}

@@ -134,5 +134,7 @@ def test_dataset_in_s3_is_read_by_torch_workers(dataset: Path, bucket: str) -> N
 def test_missing_bucket_and_missing_dataset_are_named(dataset: Path, bucket: str) -> None:
     code, text = shapemill("publish", "s3://nobody/small", dataset)
     assert (code, "s3://nobody/small: " in text) == (3, True), text
+    code, text = shapemill("publish", bucket, dataset)
+    assert (code, "must name a folder of the bucket, such as s3://bucket/small" in text) == (2, True), text
     code, text = shapemill("publish", f"{bucket}/small", dataset / "data")
     assert (code, "is no finished dataset: it has no checksums.txt" in text) == (2, True), text
