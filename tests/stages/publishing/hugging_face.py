@@ -8,8 +8,9 @@ import json
 import re
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler
+from pathlib import PurePosixPath
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, unquote, urlsplit
 
 
 @dataclass
@@ -44,11 +45,18 @@ class HuggingFace(BaseHTTPRequestHandler):
         """Print nothing."""
 
     def do_GET(self) -> None:
-        name = self._repository(r"/api/datasets/(.+)/tree/main")
+        name, asked, place = self._repository(r"/(?:api/)?datasets/(\w+/[\w-]+)(/tree/main|/resolve/main|)/?(.*)")
         if name not in self.state.repositories:
             self._answer({"error": "Repository Not Found"}, 404, {"X-Error-Code": "RepoNotFound"})
             return
-        self._answer([self._entry(path, content) for path, content in self.state.repositories[name].items()])
+        files = self.state.repositories[name]
+        if asked == "/resolve/main":
+            self._send_range(files[place])
+        elif asked:
+            is_recursive = "recursive=true" in self.path.lower()
+            self._answer([self._entry(name, path) for path in self._paths_in(name, place, is_recursive)])
+        else:
+            self._answer({"id": name, "sha": "0" * 40, "siblings": []})
 
     def do_PUT(self) -> None:
         digest, content = self.path.rpartition("/")[2], self._body()
@@ -76,6 +84,11 @@ class HuggingFace(BaseHTTPRequestHandler):
             self._answer({"files": [{"path": p, "uploadMode": m, "shouldIgnore": False} for p, m in modes.items()]})
         elif path.endswith("/info/lfs/objects/batch"):
             self._answer({"transfer": "basic", "objects": [self._place(item) for item in json.loads(body)["objects"]]})
+        elif path.endswith("/paths-info/main"):
+            name = path.removeprefix("/api/datasets/").removesuffix("/paths-info/main")
+            asked = parse_qs(body.decode())["paths"]
+            known = self._paths_in(name, "", is_recursive=True)
+            self._answer([self._entry(name, entry) for entry in asked if entry in known])
         elif path == "/api/validate-yaml":
             self._answer({"errors": [], "warnings": []})
         else:
@@ -87,7 +100,7 @@ class HuggingFace(BaseHTTPRequestHandler):
         return item | {"actions": {"upload": {"href": f"{self._url}/blobs/{item['oid']}"}}}
 
     def _commit(self, lines: list[dict[str, Any]]) -> None:
-        name = self._repository(r"/api/datasets/(.+)/commit/main")
+        (name,) = self._repository(r"/api/datasets/(.+)/commit/main")
         files = self.state.repositories[name]
         for line in lines:
             kind, value = line["key"], line["value"]
@@ -100,7 +113,25 @@ class HuggingFace(BaseHTTPRequestHandler):
         self.state.commits.append(name)
         self._answer({"success": True, "commitOid": "0" * 40, "commitUrl": f"{self._url}/datasets/{name}/commit/0"})
 
-    def _entry(self, path: str, content: bytes) -> dict[str, Any]:
+    def _paths_in(self, name: str, folder: str, is_recursive: bool) -> list[str]:
+        """The files and folders in a folder."""
+        files = self.state.repositories[name]
+        folders = {str(parent) for path in files for parent in PurePosixPath(path).parents} - {"."}
+        inside = [path for path in [*files, *sorted(folders)] if not folder or path.startswith(f"{folder}/")]
+        return [path for path in inside if is_recursive or path.rpartition("/")[0] == folder]
+
+    def _send_range(self, content: bytes) -> None:
+        first, _, last = self.headers.get("Range", "bytes=0-").removeprefix("bytes=").partition("-")
+        asked = content[int(first) : int(last) + 1 if last else None]
+        self.send_response(206 if "Range" in self.headers else 200)
+        self.send_header("Content-Length", str(len(asked)))
+        self.end_headers()
+        self.wfile.write(asked)
+
+    def _entry(self, name: str, path: str) -> dict[str, Any]:
+        if path not in self.state.repositories[name]:
+            return {"type": "directory", "path": path, "size": 0, "oid": "0" * 40}
+        content = self.state.repositories[name][path]
         sha1 = hashlib.sha1(b"blob %d\0" % len(content) + content).hexdigest()
         entry = {"type": "file", "path": path, "size": len(content), "oid": sha1}
         large = {"oid": hashlib.sha256(content).hexdigest(), "size": len(content), "pointerSize": 130}
@@ -110,10 +141,10 @@ class HuggingFace(BaseHTTPRequestHandler):
     def _url(self) -> str:
         return f"http://{self.headers['Host']}"
 
-    def _repository(self, pattern: str) -> str:
-        match = re.fullmatch(pattern, urlsplit(self.path).path)
+    def _repository(self, pattern: str) -> tuple[str, ...]:
+        match = re.fullmatch(pattern, unquote(urlsplit(self.path).path))
         assert match, self.path
-        return match[1]
+        return match.groups()
 
     def _body(self) -> bytes:
         if "chunked" not in self.headers.get("Transfer-Encoding", ""):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from stages import api
 from tests.command import shapemill
 from tests.stages.publishing.conftest import make_dataset
 from tests.stages.publishing.hugging_face import HuggingFace, State
@@ -23,7 +24,9 @@ def hub(monkeypatch: pytest.MonkeyPatch) -> Iterator[State]:
     server = ThreadingHTTPServer(("127.0.0.1", 0), HuggingFace)
     thread = threading.Thread(target=server.serve_forever)
     thread.start()
-    monkeypatch.setattr(constants, "ENDPOINT", f"http://127.0.0.1:{server.server_port}")
+    url = f"http://127.0.0.1:{server.server_port}"
+    monkeypatch.setattr(constants, "ENDPOINT", url)
+    monkeypatch.setattr(constants, "HUGGINGFACE_CO_URL_TEMPLATE", url + "/{repo_id}/resolve/{revision}/{filename}")
     monkeypatch.setattr(constants, "HF_HUB_DISABLE_XET", True)
     monkeypatch.setenv("HF_TOKEN", "hf_secret")
     yield HuggingFace.state
@@ -46,6 +49,17 @@ def test_dataset_and_index_become_two_repositories_by_two_commits(dataset: Path,
     assert hub.commits == ["makers/shapes-index", "makers/shapes"]
     code, text = shapemill("publish", "hf://makers/shapes", dataset)
     assert (code, "sent 0 files of 0 bytes" in text, len(hub.commits)) == (0, True, 2), text
+
+
+def test_published_dataset_is_read_from_there(dataset: Path, hub: State) -> None:
+    from huggingface_hub import HfFileSystem
+
+    HfFileSystem.clear_instance_cache()
+    assert shapemill("publish", "hf://makers/shapes", dataset)[0] == 0
+    stored, local = api.open_dataset("hf://makers/shapes"), api.open_dataset(dataset)
+    assert list(stored.split("val")) == list(local.split("val"))
+    assert list(stored.samples("val")) == list(local.samples("val"))
+    HfFileSystem.clear_instance_cache()
 
 
 def test_stopped_publication_shows_nothing_and_sends_no_content_twice(dataset: Path, hub: State) -> None:
