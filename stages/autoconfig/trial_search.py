@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from stages.rows.settings import RowsConfig
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.histograms import histogram_metric
@@ -20,6 +21,7 @@ from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
 from stages.variations.requirements.hub_restoration import HUBS_NOT_RESTORED, HubRestorer
 from stages.variations.requirements.identity import share_bounds
 from stages.variations.requirements.required_labels import LABELS_MISSING, labels_test, spanning_labels
+from stages.variations.search.row_variants import RowVariants
 from stages.variations.search.search import Search
 from stages.variations.search.variant import Variant
 from stages.variations.selection.farthest_first import farthest_first
@@ -218,12 +220,23 @@ class TrialSearch:
             variants, used = search.run(self._rng, budget, missing, f"trial-{self._tries}", lambda _: None)
             self._tries += used
             left[number] = left[number] - used if used and variants else 0
-            kept = [variant for variant in variants if search.keeps_shares(variant.assembly)]
-            complete = [variant for variant in kept if self._is_complete(variant.assembly)]
-            hits = [variant for variant in complete if _copied_share(variant) <= self._max_copied_share]
+            hits = self._accepted(variants)
             keys = [search.maker.key(variant.assembly.types, variant.graph, variant.graph) for variant in hits]
             self.variants.extend(hit for hit, key in zip(hits, keys, strict=True) if key not in self._known_keys)
             self._known_keys.update(keys)
+
+    def _accepted(self, variants: Sequence[Variant]) -> list[Variant]:
+        kept = [variant for variant in variants if self._searches[0].keeps_shares(variant.assembly)]
+        complete = [variant for variant in kept if self._is_complete(variant.assembly)]
+        return [variant for variant in complete if _copied_share(variant) <= self._max_copied_share]
+
+    def other_rows(self, rng: np.random.Generator, wanted: int) -> list[Variant]:
+        """Return at most `wanted` exemplars with longer or shorter rows that a run accepts and that were not found yet.
+
+        The result of the search does not count them.
+        """
+        rows = RowVariants(self.kit, RowsConfig())
+        return self._accepted(self._searches[0].with_rows(rng, rows, wanted, "rows"))
 
     def _is_complete(self, assembly: Assembly) -> bool:
         """Return whether a variant has its required labels and hubs; count what it lacks."""

@@ -12,6 +12,7 @@ from stages.autoconfig.lost_support import lost_support
 from stages.autoconfig.setting_search import MIN_USEFUL_GRAPHS
 from stages.autoconfig.settings import RANDOM_STREAM
 from stages.autoconfig.trial_search import TrialResult, TrialSearch, has_low_diversity
+from stages.rows.settings import RowsConfig
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.patterns import observed_patterns, unique_pattern_share
 from stages.shape.kit import Kit
@@ -41,6 +42,7 @@ class YieldEstimate:
     sentence: what to expect, and the remedy.
     variants: the hits.
     lost_support: the labels whose parts lose what is close above or below them.
+    row_variants: exemplars with longer or shorter rows, with which a run begins its search; no hits of the trial.
     """
 
     trial: TrialResult
@@ -50,12 +52,18 @@ class YieldEstimate:
     sentence: str
     variants: Sequence[Variant]
     lost_support: tuple[str, ...] = ()
+    row_variants: Sequence[Variant] = ()
 
     @property
     def is_poor(self) -> bool:
         """Whether the layouts make no dataset: next to none, all alike, or broken."""
         few = not self.trial.graphs or (self.layouts is not None and self.layouts < MIN_USEFUL_GRAPHS)
         return few or has_low_diversity(self.trial) or bool(self.lost_support)
+
+    @property
+    def all_variants(self) -> list[Variant]:
+        """The hits and the exemplars with other rows."""
+        return [*self.variants, *self.row_variants]
 
     @property
     def most_different(self) -> list[Variant]:
@@ -89,7 +97,9 @@ def estimate_yield(
     once = unique_pattern_share(observed_patterns(kit, oracle.dockings, upright=True))
     unsupported = lost_support(kit, [search.with_hubs(index) for index in trial.most_different])
     sentence = _sentence(kit, trial, layouts, part_range, unsupported)
-    return YieldEstimate(trial, layouts, part_range, once, sentence, search.variants, unsupported)
+    wanted = round(RowsConfig().pool_share * min(len(search.variants), MAX_ESTIMATE_GRAPHS))
+    row_variants = search.other_rows(decision_rng(0, RANDOM_STREAM, "rows"), wanted) if wanted else []
+    return YieldEstimate(trial, layouts, part_range, once, sentence, search.variants, unsupported, row_variants)
 
 
 def _layouts(trial: TrialResult) -> int | None:

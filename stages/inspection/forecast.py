@@ -66,8 +66,8 @@ def forecast(kit: Kit, layouts: YieldEstimate | None, resizing: ResizeEstimate |
         return _of_resizing(resizing)
     if layouts is None or not layouts.variants:
         return Forecast({}, {}, {}, "")
-    kinds = [kind_of(variant) for variant in layouts.variants]
-    total = MAX_ESTIMATE_GRAPHS if layouts.layouts is None else layouts.layouts
+    kinds = [kind_of(variant) for variant in layouts.all_variants]
+    total = (MAX_ESTIMATE_GRAPHS if layouts.layouts is None else layouts.layouts) + len(layouts.row_variants)
     shares = {kind: kinds.count(kind) / len(kinds) for kind in TITLES if kind in kinds}
     numbers = {kind: max(1, round(share * total)) for kind, share in shares.items()}
     return Forecast(shares, numbers, dict.fromkeys(shares, True), _typical(kit, layouts))
@@ -90,11 +90,11 @@ def _of_resizing(resizing: ResizeEstimate) -> Forecast:
 
 def _typical(kit: Kit, layouts: YieldEstimate) -> str:
     """Return the usual size of the hits, how much of an exemplar is whole in them, and which labels they lack."""
-    counts = type_counts(kit, [variant.assembly.types for variant in layouts.variants]).astype(np.int64)
+    counts = type_counts(kit, [variant.assembly.types for variant in layouts.all_variants]).astype(np.int64)
     sizes = " and ".join(str(len(exemplar.assembly)) for exemplar in kit.exemplars)
     median = float(np.median(counts.sum(axis=1)))
     sentences = [f"half have {median:.0f} parts or more, the exemplar{'s' * (len(kit.exemplars) > 1)} {sizes}"]
-    whole = [variant.lineage["copied"]["exemplar_share"] > NEAR_COPY_SHARE for variant in layouts.variants]
+    whole = [variant.lineage["copied"]["exemplar_share"] > NEAR_COPY_SHARE for variant in layouts.all_variants]
     if any(whole):
         sentences.append(f"{np.mean(whole):.0%} hold nearly a whole exemplar in one piece")
     present: FloatArray = np.mean(label_counts(kit, counts) > 0, axis=0)
