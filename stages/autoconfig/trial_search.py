@@ -220,15 +220,18 @@ class TrialSearch:
             variants, used = search.run(self._rng, budget, missing, f"trial-{self._tries}", lambda _: None)
             self._tries += used
             left[number] = left[number] - used if used and variants else 0
-            hits = self._accepted(variants)
-            keys = [search.maker.key(variant.assembly.types, variant.graph, variant.graph) for variant in hits]
-            self.variants.extend(hit for hit, key in zip(hits, keys, strict=True) if key not in self._known_keys)
-            self._known_keys.update(keys)
+            self.variants.extend(self._new_hits(variants))
 
-    def _accepted(self, variants: Sequence[Variant]) -> list[Variant]:
-        kept = [variant for variant in variants if self._searches[0].keeps_shares(variant.assembly)]
+    def _new_hits(self, variants: Sequence[Variant]) -> list[Variant]:
+        """Return the variants that are accepted and that no method found before; count what the others lack."""
+        search = self._searches[0]
+        kept = [variant for variant in variants if search.keeps_shares(variant.assembly)]
         complete = [variant for variant in kept if self._is_complete(variant.assembly)]
-        return [variant for variant in complete if _copied_share(variant) <= self._max_copied_share]
+        hits = [variant for variant in complete if _copied_share(variant) <= self._max_copied_share]
+        keys = [search.maker.key(variant.assembly.types, variant.graph, variant.graph) for variant in hits]
+        new = [hit for hit, key in zip(hits, keys, strict=True) if key not in self._known_keys]
+        self._known_keys.update(keys)
+        return new
 
     def other_rows(self, rng: np.random.Generator, wanted: int) -> list[Variant]:
         """Return at most `wanted` exemplars with longer or shorter rows that a run accepts and that were not found yet.
@@ -236,7 +239,7 @@ class TrialSearch:
         The result of the search does not count them.
         """
         rows = RowVariants(self.kit, RowsConfig())
-        return self._accepted(self._searches[0].with_rows(rng, rows, wanted, "rows"))
+        return self._new_hits(self._searches[0].with_rows(rng, rows, wanted, "rows"))
 
     def _is_complete(self, assembly: Assembly) -> bool:
         """Return whether a variant has its required labels and hubs; count what it lacks."""

@@ -16,6 +16,7 @@ from stages.rows.settings import RowsConfig
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.patterns import observed_patterns, unique_pattern_share
 from stages.shape.kit import Kit
+from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
 from stages.variations.report.advice import another_model, what_keeps
 from stages.variations.search.variant import DUPLICATE, Variant
 
@@ -25,6 +26,8 @@ MAX_SAMPLES_REQUESTED = 200
 """Samples that an inspection's config requests, if there are enough."""
 MIN_PARTS_LISTS = 50
 """Parts lists below which a dataset of MAX_ESTIMATE_GRAPHS shapes has each of them many times."""
+MIN_WHOLE_SHARE = 0.5
+"""Share of the hits with nearly a whole exemplar in one piece from which a forecast says that they look like it."""
 LOOK_FIRST = "look at the sheet before you make many"
 MAX_LABELS_SHOWN = 2
 ESTIMATE_TRIES_FACTOR = 4
@@ -96,7 +99,8 @@ def estimate_yield(
     part_range = (min(sizes, default=0), max(sizes, default=0))
     once = unique_pattern_share(observed_patterns(kit, oracle.dockings, upright=True))
     unsupported = lost_support(kit, [search.with_hubs(index) for index in trial.most_different])
-    sentence = _sentence(kit, trial, layouts, part_range, unsupported)
+    whole = [variant.lineage["copied"]["exemplar_share"] > NEAR_COPY_SHARE for variant in search.variants]
+    sentence = _sentence(kit, trial, layouts, part_range, unsupported, float(np.mean(whole)) if whole else 0.0)
     wanted = round(RowsConfig().pool_share * min(len(search.variants), MAX_ESTIMATE_GRAPHS))
     row_variants = search.other_rows(decision_rng(0, RANDOM_STREAM, "rows"), wanted) if wanted else []
     return YieldEstimate(trial, layouts, part_range, once, sentence, search.variants, unsupported, row_variants)
@@ -121,8 +125,14 @@ def _layouts(trial: TrialResult) -> int | None:
 
 
 def _sentence(
-    kit: Kit, trial: TrialResult, layouts: int | None, part_range: tuple[int, int], unsupported: tuple[str, ...] = ()
+    kit: Kit,
+    trial: TrialResult,
+    layouts: int | None,
+    part_range: tuple[int, int],
+    unsupported: tuple[str, ...],
+    whole_share: float,
 ) -> str:
+    """Say what to expect. whole_share: share of the hits that hold nearly a whole exemplar in one piece."""
     if not trial.graphs:
         return f"nothing: {what_keeps(kit, trial.rejects, trial.tries)}"
     low, high = part_range
@@ -143,7 +153,10 @@ def _sentence(
     if trial.histograms < MIN_PARTS_LISTS and not trial.by_meaning:
         few = f"with only about {rounded_text(trial.histograms)} parts lists: many will look alike"
         return f"{count} of {size}, {few}; {LOOK_FIRST}, and bring {another_model(kit)}"
-    return f"{count} of {size}, {rounded_text(trial.histograms)} or more of them with different parts lists"
+    lists = f"{count} of {size}, {rounded_text(trial.histograms)} or more of them with different parts lists"
+    if whole_share >= MIN_WHOLE_SHARE and not trial.by_meaning:
+        return f"{lists}; {whole_share:.0%} hold nearly a whole exemplar in one piece and look like it with more parts"
+    return lists
 
 
 def rounded_text(number: int) -> str:

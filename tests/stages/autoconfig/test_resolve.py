@@ -287,6 +287,17 @@ class TestYieldEstimate:
         copied = [[hit.lineage["copied"]["share"] for hit in estimate.variants] for estimate in estimates]
         assert max(copied[0]) > 0.6 >= max(copied[1]) > 0.0
 
+    def test_hits_that_hold_a_whole_exemplar_are_foretold(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        kit = self.kit([chain(13), chain(15)], CHAIN)
+        monkeypatch.setattr("stages.autoconfig.yield_estimate.MIN_PARTS_LISTS", 0)
+        monkeypatch.setattr("stages.autoconfig.yield_estimate.MIN_WHOLE_SHARE", 0.1)
+        estimate = estimate_yield(kit, ContactOracle(kit), 2000)
+        whole = np.mean([hit.lineage["copied"]["exemplar_share"] > 0.9 for hit in estimate.variants])
+        assert whole >= 0.1, "a longer chain holds a shorter one"
+        assert estimate.sentence.endswith(
+            f"; {whole:.0%} hold nearly a whole exemplar in one piece and look like it with more parts"
+        )
+
     def test_kit_without_repeats_gets_the_mend(self) -> None:
         meshes = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}
         kit = self.kit([[("a", pose(0, 0, 0)), ("b", pose(1, 0, 0)), ("c", pose(2, 0, 0))]], meshes)
