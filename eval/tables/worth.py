@@ -23,7 +23,7 @@ from stages.package.reader import Dataset
 if TYPE_CHECKING:
     from eval.worth.labelled_clouds import LabelledClouds
 
-SECONDS_PER_STEP = 0.25
+SECONDS_PER_STEP = 0.12
 NETWORKS_OF_A_SEED = 5
 """Of random weights, the dataset, and real shapes without one category."""
 

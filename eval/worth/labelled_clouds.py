@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import transform_points
 from stages.shapeassembly.extraction.readers.child_process import read_grass_in_child
 from stages.shapeassembly.shape import shape_of_text
-from stages.shapeassembly.sources import listed_names, program_texts
+from stages.shapeassembly.sources import program_texts
 from stages.training.recovery.clouds import frame_of, subsample
 
 Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -77,11 +78,17 @@ def program_clouds(
 
     archive: folder or tar archive with `data/<category>/<id>.txt` and `data_splits/<category>/<split>.txt`.
     """
-    texts = dict(program_texts(archive, f"data/{category}"))
-    names = listed_names(archive, f"data_splits/{category}/{split}.txt")
+    texts = _texts(archive, f"data/{category}")
+    names = _texts(archive, f"data_splits/{category}")[f"data_splits/{category}/{split}.txt"].split()
     chosen = [names[index] for index in rng.permutation(len(names))[:shapes].tolist()]
     clouds = (sample_shape(shape_of_text(texts[f"data/{category}/{name}.txt"]), points, rng) for name in chosen)
     return _stacked(((cloud.points, cloud.instances) for cloud in clouds), points, rng)
+
+
+@cache
+def _texts(archive: Path, folder: str) -> dict[str, str]:
+    """Return the texts below a folder by name; a compressed archive takes seconds to read."""
+    return dict(program_texts(archive, folder))
 
 
 def grass_clouds(path: Path, shapes: int, points: int, rng: np.random.Generator) -> LabelledClouds:
@@ -134,7 +141,12 @@ def model_clouds(
             starts = np.cumsum([0, *map(len, placed[:-1])])
             faces = [part.faces + start for part, start in zip(model.parts, starts, strict=True)]
             part_of_face = np.repeat(np.arange(len(faces)), [len(corners) for corners in faces])
-            cloud, _, hit = sample_surface(np.concatenate(placed), np.concatenate(faces).astype(np.int32), points, rng)
+            mesh = np.concatenate(placed), np.concatenate(faces).astype(np.int32)
+            try:
+                cloud, _, hit = sample_surface(*mesh, points, rng)
+            except ValueError:  # it has no area
+                unreadable += 1
+                continue
             yield cloud @ Z_UP_TO_Y_UP.T if model.up == "z" else cloud, part_of_face[hit]
 
     return _stacked(clouds(), points, rng, shapes), SkippedModels(unreadable, without_parts)

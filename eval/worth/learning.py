@@ -23,8 +23,8 @@ POINTS_PER_CLOUD = 1024
 POINTS_IN_PAIRS = 256
 """Random points of each cloud whose pairs a step learns from."""
 TESTED_POINTS_IN_PAIRS = 512
-CLOUDS_PER_STEP = 8
-LEARNING_RATE = 1e-3
+CLOUDS_PER_STEP = 4
+LEARNING_RATE = 3e-3
 
 Batch = tuple[Tensor, Tensor, Tensor]
 """Points float (n, k, 3), parts int (n, k), and the points whose pairs count, int (m,)."""

@@ -20,8 +20,6 @@ EMBEDDING_WIDTH = 32
 NEIGHBORS_PER_POINT = 16
 MAX_PAIR_DISTANCE = 0.15
 """Largest distance of a near pair, in diagonals of the bounding box."""
-FAR_PAIRS_WEIGHT = 0.5
-"""Weight of the loss of all other pairs."""
 
 
 class PointEncoder(nn.Module):
@@ -70,15 +68,13 @@ def near_pairs(points: Tensor) -> Tensor:
 
 
 def same_part_loss(encoder: PointEncoder, points: Tensor, parts: Tensor, chosen: Tensor) -> Tensor:
-    """Return the cross entropy of "same part" over all pairs of the chosen points of clouds.
+    """Return the cross entropy of "same part" over the near pairs of the chosen points of clouds.
 
     points: float (n, k, 3); parts: int (n, k); chosen: indices of points, int (m,).
     """
     embeddings = encoder(points)[:, chosen]
     points, parts = points[:, chosen], parts[:, chosen]
-    logits = encoder.threshold - squared_distances(embeddings)
-    same = (parts[:, :, None] == parts[:, None, :]).float()
-    losses = binary_cross_entropy_with_logits(logits, same, reduction="none")
     near = near_pairs(points)
-    far = torch.ones_like(near).triu(1) & ~near
-    return losses[near].mean() + FAR_PAIRS_WEIGHT * losses[far].mean()
+    logits = encoder.threshold - squared_distances(embeddings)[near]
+    same = (parts[:, :, None] == parts[:, None, :])[near]
+    return binary_cross_entropy_with_logits(logits, same.float())

@@ -18,6 +18,7 @@ CATEGORIES = {"chair": "chairs", "table": "tables", "storage": "storage furnitur
 """Of the published programs, and what their shapes are called."""
 PROGRAMS, GRASS = Path("shapeassembly/programs.tar.xz"), Path("partgraphs/grass_chairs.npz")
 """Below the folder of shared material."""
+MIN_MODELS = 2
 TESTED_POINTS, LEARNT_POINTS = 1024, 2048
 """Points of a cloud; training draws from the latter at each step."""
 
@@ -88,7 +89,11 @@ def _grass_set(file: Path, test_shapes: int, labelled: int, seed: int) -> RealSe
 
 
 def _model_set(folder: Path, segmentation: Segmentation, test_shapes: int, labelled: int, seed: int) -> RealSet:
+    from stages.model_files.folder import model_files
+
     files = model_files(folder)
+    if len(files) < MIN_MODELS:
+        raise ConfigError(f"{folder} holds {len(files)} models to test on; name a folder of at least {MIN_MODELS}")
 
     def read() -> tuple[LabelledClouds, LabelledClouds, str]:
         from eval.worth.labelled_clouds import model_clouds
@@ -102,15 +107,3 @@ def _model_set(folder: Path, segmentation: Segmentation, test_shapes: int, label
         return (*clouds.divided(min(test_shapes, -(-len(clouds) // 2)), TESTED_POINTS), note)
 
     return RealSet(folder.name or str(folder), "", tuple(files), read)
-
-
-def model_files(folder: Path) -> list[Path]:
-    """Return the model files below a folder, by name. Raises ConfigError for fewer than two."""
-    from stages.model_files.scene_file import READERS
-    from stages.shape.input_file import without_sidecars
-
-    found = (file for file in folder.rglob("*") if file.suffix.lower() in READERS)
-    files, _ = without_sidecars([file for file in found if file.is_file() and not file.is_symlink()])
-    if len(files) < 2:
-        raise ConfigError(f"{folder} holds {len(files)} models; name a folder of at least 2, in {', '.join(READERS)}")
-    return sorted(files)

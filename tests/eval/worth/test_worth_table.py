@@ -11,9 +11,10 @@ import pytest
 import trimesh
 
 from eval.worth.labelled_clouds import model_clouds
-from eval.worth.real_sets import PROGRAMS, model_files, real_sets
+from eval.worth.real_sets import PROGRAMS, real_sets
 from pipeline.errors import ConfigError
 from pipeline.shards import ShardWriter, array_bytes
+from stages.model_files.folder import model_files
 from tests.command import shapemill
 
 SHARED = Path(__file__).resolve().parents[3].parent / "shared"
@@ -68,8 +69,8 @@ def test_models_without_parts_and_unreadable_ones_are_counted(models: Path) -> N
 
 
 def test_folder_without_models_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="holds 0 models; name a folder of at least 2"):
-        model_files(tmp_path)
+    with pytest.raises(ConfigError, match="holds 0 models to test on; name a folder of at least 2"):
+        real_sets(tmp_path, tmp_path, "auto", 3, 2, 1)
 
 
 def test_rows_are_made_kept_and_read_again(models: Path, tmp_path: Path) -> None:
