@@ -30,7 +30,7 @@ SEED    ?=
 STALL_TIMEOUT ?=
 ## CLUSTER  scheduler of a cluster whose workers make the shards, tcp://...; WORKERS of this machine if empty
 CLUSTER ?=
-## MESH     a model for `make inspect`, or several of one kit
+## MESH     a model, or several of one kit, for `make inspect`; these or a folder of them for `make dataset`
 MESH    ?=
 ## PROGRAM  shape program for `make inspect` and `recover`: a name, such as chair, or a module
 PROGRAM ?=
@@ -92,8 +92,9 @@ RUN        = @$(SHAPEMILL) run $@ $(OPTIONS) $(RUNNING)
 
 .PHONY: dataset autoconfig exemplars variations proportions programs grammars program_sampling shapeassembly
 .PHONY: string_sampling primitives mixture validity abstraction strings points sketches views surface captions package
-dataset: setup  ## Make the dataset of CONFIG in OUT: whatever is missing or outdated
-	@$(SHAPEMILL) run $(OPTIONS) $(RUNNING)
+dataset: setup  ## Make the dataset of CONFIG in OUT, with MESH in place of its kits: whatever is missing or outdated
+	@[ -z "$$MESH" ] || { CONFIG=$$($(SHAPEMILL) with-models $(DATASET) -- "$$MESH"); echo "config: $$CONFIG"; }; \
+	$(SHAPEMILL) run $(OPTIONS) $(RUNNING)
 
 autoconfig: setup  ## Choose the settings that the config leaves at auto: up axis, contacts, grammar, hubs
 	$(RUN)

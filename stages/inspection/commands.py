@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from pipeline.display import ticking
 from pipeline.errors import ConfigError
-from pipeline.options import INSPECTION
+from pipeline.options import DATASETS, DEFAULT_CONFIG, DEFAULT_OUT, INSPECTION, ConfigOption, OutOption
 from stages.autoconfig.settings import AutoconfigConfig
 
 if TYPE_CHECKING:
@@ -118,6 +118,22 @@ def inspect(
     _print_rows(write_report_files(folder, paths, report))
     if len(read) == 1 and may_have_grammar(read[0], parts):
         _print_rows(write_grammar_report(folder, name, paths[0], report.config.resolved().up, limits))
+
+
+@COMMANDS.command(rich_help_panel=DATASETS)
+def with_models(
+    models: Annotated[list[str], typer.Argument(metavar="MODEL", help="a folder of models, or models of one kit")],
+    config: ConfigOption = DEFAULT_CONFIG,
+    out: OutOption = DEFAULT_OUT,
+) -> None:
+    """Write a config with models in place of its kits, as OUT/<name>.yaml, and print its path."""
+    from pipeline.paths import write_file
+    from stages.inspection.files import model_paths
+    from stages.inspection.models_config import config_with_models
+
+    paths = [path for text in models for path in model_paths(text)]
+    name, content = config_with_models(config, paths)
+    print(write_file(out / f"{name}.yaml", content))
 
 
 def _print_rows(rows: Iterable[tuple[str, Path | str]]) -> None:
