@@ -31,8 +31,19 @@ DEFAULT_CONFIG = Path("configs/default.yaml")
 DEFAULT_OUT = Path("datasets")
 DEFAULT_WORKERS = os.cpu_count() or 1
 
+
+def _local_folder(out: Path) -> Path:
+    """Return an output folder. Raises ConfigError for a URL."""
+    if re.match(r"\w+:/", str(out)):
+        url = str(out).replace(":/", "://", 1)
+        raise ConfigError(
+            f"OUT={url}: datasets are made in a local folder; put the finished one there by `make publish`"
+        )
+    return out
+
+
 ConfigOption = Annotated[Path, typer.Option("--config", help="config of the dataset, a YAML file")]
-OutOption = Annotated[Path, typer.Option("--out", help="folder that datasets are written to")]
+OutOption = Annotated[Path, typer.Option("--out", callback=_local_folder, help="folder that datasets are written to")]
 WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="number of worker processes")]
 SeedOption = Annotated[int | None, typer.Option("--seed", min=0, help="seed in place of the config's")]
 OnlyOption = Annotated[str, typer.Option("--only", help="only the shards named so or so-..., and those they read")]
@@ -46,11 +57,6 @@ def load_dataset(
     context: typer.Context, config: Path, out: Path, seed: int | None = None
 ) -> tuple[dict[str, Stage], Config, DatasetPaths]:
     """Return the stages, the dataset's config, checked by every stage, and its folders. Raises ConfigError."""
-    if re.match(r"\w+:/", str(out)):
-        url = str(out).replace(":/", "://", 1)
-        raise ConfigError(
-            f"OUT={url}: datasets are made in a local folder; put the finished one there by `make publish`"
-        )
     stages = find_stages(context.obj)
     overrides = {} if seed is None else {"seed": seed}
     loaded = load_config(config, {name: stage.config for name, stage in stages.items()}, overrides)
