@@ -1,6 +1,6 @@
 """Do engines agree on what falls? The record's `falls` and `stable` against MuJoCo, on shapes of several producers.
 
-    python -m tests.bench.engine_falls --programs ../shared/shapeassembly --count 300 datasets/cabinets datasets/heaps
+    python -m tests.bench.engine_falls --generated --programs ../shared/shapeassembly --count 300 datasets/mixed
 
 A shape is dropped: its connected pieces are rigid bodies of convex parts. It rests for a second. Then gravity is
 tilted by a push of FALL_PUSH in each of eight directions for a second, and upright again until it rests. It falls if
@@ -129,6 +129,55 @@ def program_shapes(folder: Path, count: int) -> Iterator[tuple[str, Shape]]:
             yield f"{category} {Path(name).stem}", shape_of_text(text)
 
 
+def generated_shapes(count: int) -> Iterator[tuple[str, Iterator[tuple[str, Shape]]]]:
+    """Yield the shapes of producers that need no search, `count` of each, under the producer's name."""
+    yield "curve programs", _curve_shapes(count)
+    yield "compositions of solids", _solid_shapes(count)
+    yield "random ShapeAssembly programs", _random_program_shapes(count)
+    yield "variants of kits", _kit_shapes(count)
+
+
+def _curve_shapes(count: int) -> Iterator[tuple[str, Shape]]:
+    from stages.programs.files import random_shapes
+    from stages.programs.program import build_shape, find_program
+
+    for name in ("chair", "table", "cabinet", "vase"):
+        program = find_program(name)
+        for index, values in enumerate(random_shapes(program, count // 4, seed=49)):
+            yield f"{name} {index}", build_shape(program, values)
+
+
+def _solid_shapes(count: int) -> Iterator[tuple[str, Shape]]:
+    from stages.primitives.compose import compose
+    from stages.primitives.settings import PrimitivesConfig
+    from stages.primitives.text import shape_of_solids
+
+    config = PrimitivesConfig()
+    for index in range(count):
+        composition = config.compositions[index % len(config.compositions)]
+        yield f"{composition} {index}", shape_of_solids(compose(composition, config, np.random.default_rng(index)))
+
+
+def _random_program_shapes(count: int) -> Iterator[tuple[str, Shape]]:
+    from stages.shapeassembly.random_programs import random_program
+    from stages.shapeassembly.settings import RandomPrograms
+    from stages.shapeassembly.shape import shape_of_text
+    from stages.shapeassembly.syntax.printer import print_program
+
+    for index in range(count):
+        program = random_program(RandomPrograms(name="random", samples=1), np.random.default_rng(index))
+        yield f"random program {index}", shape_of_text(print_program(program))
+
+
+def _kit_shapes(count: int) -> Iterator[tuple[str, Shape]]:
+    from stages import api
+
+    for name in ("castle", "playground"):
+        kit = api.read_kit(f"datasets/exemplars/{name}/*.glb")
+        for index, shape in enumerate(api.vary(kit, count // 2, seed=49)):
+            yield f"{name} {index}", shape
+
+
 def dataset_shapes(folder: Path, count: int) -> Iterator[tuple[str, Shape]]:
     """Yield at most `count` samples of a finished dataset, evenly spread."""
     from stages.package.reader import Dataset
@@ -156,10 +205,13 @@ def main(arguments: Sequence[str]) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("datasets", nargs="*", type=Path)
     parser.add_argument("--programs", type=Path)
+    parser.add_argument("--generated", action="store_true")
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--disagreements", type=Path)
     asked = parser.parse_args(arguments)
     sources = {folder.name: dataset_shapes(folder, asked.count) for folder in asked.datasets}
+    if asked.generated:
+        sources = {**dict(generated_shapes(asked.count)), **sources}
     if asked.programs is not None:
         sources = {"published programs": program_shapes(asked.programs, asked.count), **sources}
     print("| shapes | number | fall in MuJoCo | `falls` agrees | caught | not `stable` agrees | caught |")
