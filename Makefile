@@ -91,7 +91,8 @@ RUN        = @$(SHAPEMILL) run $@ $(OPTIONS) $(RUNNING)
 # Making datasets ----------------------------------------------------------------------------------------------------
 
 .PHONY: dataset autoconfig exemplars variations proportions programs grammars program_sampling shapeassembly
-.PHONY: string_sampling primitives mixture validity abstraction strings points sketches views surface captions package
+.PHONY: string_sampling primitives mixture validity abstraction strings points sketches views surface structure
+.PHONY: captions package
 dataset: setup  ## Make the dataset of CONFIG in OUT, with MESH in place of its kits: whatever is missing or outdated
 	@[ -z "$$MESH" ] || { CONFIG=$$($(SHAPEMILL) with-models $(DATASET) -- "$$MESH"); echo "config: $$CONFIG"; }; \
 	$(SHAPEMILL) run $(OPTIONS) $(RUNNING)
@@ -133,9 +134,11 @@ views: mixture  ## Render images of each shape, if the config has cameras
 	$(RUN)
 surface: mixture  ## Find what is true of surfaces, unions, signed distances and occupancy, if the config asks
 	$(RUN)
+structure: mixture  ## Find hierarchies and symmetries of shapes, if the config asks
+	$(RUN)
 captions: validity  ## Describe each shape in words, if the config asks for it
 	$(RUN)
-package: validity abstraction strings points sketches views surface captions  ## Write the dataset's folder: shards, index, card, checksums
+package: validity abstraction strings points sketches views surface structure captions  ## Write the dataset's folder: shards, index, card, checksums
 	$(RUN)
 
 .PHONY: train recover export publish

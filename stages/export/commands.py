@@ -24,7 +24,7 @@ COMMANDS = typer.Typer()
 @COMMANDS.command(rich_help_panel=DATASETS)
 def export(
     context: typer.Context,
-    kind: Annotated[str, typer.Argument(metavar="FORMAT", help="urdf, mjcf, usd or obj")],
+    kind: Annotated[str, typer.Argument(metavar="FORMAT", help="urdf, mjcf, usd, obj or structurenet")],
     folder: Annotated[
         Path | None, typer.Argument(help="a dataset's folder; without, that of the config", show_default=False)
     ] = None,
@@ -75,9 +75,11 @@ def export(
             unitless += sample.record.get("unit") != "metre"
             show(done)
     print(f"wrote {done:,} samples to {target}")
-    if several and chosen != "obj":
+    if chosen in ("obj", "structurenet"):
+        return
+    if several:
         print(f"{several:,} of them have several pieces; each piece is a body of its own")
-    if unitless and chosen != "obj":
+    if unitless:
         print(f"{unitless:,} of them state no unit: {scale:g} m for a unit; --scale sets another")
 
 

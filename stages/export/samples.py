@@ -13,6 +13,7 @@ from stages.export.mjcf import mjcf_files
 from stages.export.model import SimulationModel, simulation_model
 from stages.export.obj import obj_files
 from stages.export.settings import ExportSettings
+from stages.export.structurenet import structurenet_files
 from stages.export.urdf import urdf_files
 from stages.export.usd import usd_files
 from stages.package.dataset_sample import DatasetSample
@@ -22,7 +23,7 @@ from stages.shape.collection.pairs import JOINTS, pairs_of
 from stages.shape.part_joint import PartJoint
 from stages.shape.shape import Shape
 
-ExportFormat = Literal["urdf", "mjcf", "usd", "obj"]
+ExportFormat = Literal["urdf", "mjcf", "usd", "obj", "structurenet"]
 FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
 
 _WRITERS: Mapping[ExportFormat, Callable[[SimulationModel], Mapping[str, bytes]]] = {
@@ -35,10 +36,13 @@ _WRITERS: Mapping[ExportFormat, Callable[[SimulationModel], Mapping[str, bytes]]
 def export_files(sample: DatasetSample, kind: ExportFormat, settings: ExportSettings) -> Mapping[str, bytes]:
     """Return the files of a sample in a format, by their paths below its folder.
 
-    Raises ValueError for a shape without weight, and ConfigError where its program has changed.
+    Raises ValueError for a shape without weight or, in StructureNet's format, without a hierarchy. Raises ConfigError
+    where its program has changed.
     """
     if kind == "obj":
         return obj_files(sample.key, sample_shape(sample))
+    if kind == "structurenet":
+        return structurenet_files(sample.key, sample_shape(sample), sample.contacts.T, sample.record)
     return _WRITERS[kind](sample_model(sample, settings))
 
 

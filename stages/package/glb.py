@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -55,8 +55,10 @@ class MeshChunk:
     primitives: tuple[Primitive, ...]
 
 
-def glb_bytes(shape: Shape) -> bytes:
+def glb_bytes(shape: Shape, hierarchy: Mapping[str, Any] | None = None) -> bytes:
     """Return the GLB of a shape: named nodes in the order of the parts, and the meshes in use.
+
+    hierarchy: groups of the parts, as in the record; several are nodes, after those of the parts and above them
 
     Vertices are float32 in each mesh's own coordinates; nodes have 4x4 pose matrices. A node's `extras` has `class` and
     `instance`, the labels and instances of points.
@@ -96,10 +98,14 @@ def glb_bytes(shape: Shape) -> bytes:
             zip(shape.part_names, assembly.types.tolist(), shape.part_classes.tolist(), columns, strict=True)
         )
     ]
+    tops = list(range(len(nodes)))
+    if hierarchy is not None and len(hierarchy["groups"]) > 1:
+        tops = [len(nodes)]
+        nodes += _group_nodes(hierarchy)
     header = {
         "asset": ASSET,
         "scene": 0,
-        "scenes": [{"nodes": list(range(len(nodes)))}],
+        "scenes": [{"nodes": tops}],
         "nodes": nodes,
         "meshes": meshes,
         **table.header(first_view=len(accessors)),
@@ -108,6 +114,20 @@ def glb_bytes(shape: Shape) -> bytes:
         "buffers": [{"byteLength": start}],
     }
     return _container(header, b"".join(content))
+
+
+def _group_nodes(hierarchy: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return a node for each group, without a place of its own, with its parts and then its groups."""
+    groups, part_groups = hierarchy["groups"], hierarchy["part_groups"]
+    children: list[list[int]] = [[] for _ in groups]
+    for part, group in enumerate(part_groups):
+        children[group].append(part)
+    for index, group in enumerate(groups[1:], 1):
+        children[group["parent"]].append(len(part_groups) + index)
+    return [
+        {"name": f"group {index} {group['name']}", "children": below}
+        for index, (group, below) in enumerate(zip(groups, children, strict=True))
+    ]
 
 
 @lru_cache(maxsize=16)

@@ -48,7 +48,7 @@ def merge_shard(task: Task) -> Outcome:
             for sample, added, fields in _samples(task, collection, task.shard.params["stages"]):
                 shape = collection.shape(sample)
                 shape = replace(shape, assembly=replace(shape.assembly, poses=rounded(shape.assembly.poses)))
-                members = {"glb": glb_bytes(shape)}
+                members = {"glb": glb_bytes(shape, fields.get("hierarchy"))}
                 if sample.text or TEXT in added or joined:
                     members[TEXT] = sample.text.encode() or NO_STRINGS
                 members |= added

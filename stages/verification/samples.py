@@ -89,7 +89,7 @@ def sample_faults(sample: PackagedSample) -> Iterator[str]:
     record, shape = sample.record, sample.shape
     yield from _part_faults(record, shape)
     yield from _count_faults(sample)
-    if not _same_mesh(sample.members["glb"], glb_bytes(shape), sample.size):
+    if not _same_mesh(sample.members["glb"], glb_bytes(shape, sample.record.get("hierarchy")), sample.size):
         yield _glb_fault(sample)
     if np.abs(np.array(record["bounds"]) - rounded(shape_bounds(shape))).max() > 1e-9 * sample.size:
         yield "its bounds are not those of its parts"

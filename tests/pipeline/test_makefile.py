@@ -87,7 +87,7 @@ def test_dataset_is_one_call_and_every_stage_runs_after_its_inputs() -> None:
     assert [run[3] for run in runs] == [
         "autoconfig", "exemplars", "variations", "proportions", "programs", "grammars", "program_sampling",
         "shapeassembly", "string_sampling", "primitives", "mixture", "validity", "abstraction", "strings", "points",
-        "sketches", "views", "surface", "captions", "package",
+        "sketches", "views", "surface", "structure", "captions", "package",
     ]  # fmt: skip
     assert all(run == ["-m", "pipeline", "run", run[3], *OPTIONS] for run in runs)
 
@@ -145,7 +145,7 @@ def test_every_target_gets_every_value_unchanged(tmp_path: Path) -> None:
     )  # fmt: skip
     arguments = [f"{name}={said}" for name in VARIABLES]
     reached = calls(*targets, *arguments)
-    assert len(reached) == 20 + len(targets[1:]) + 1, "20 stages; inspect looks at a program and a model"
+    assert len(reached) == 21 + len(targets[1:]) + 1, "21 stages; inspect looks at a program and a model"
     assert all(any(said in argument for argument in call) for call in reached)
     assert sum(call.count(said) for call in reached if call[2] == "run") == 20 * 6
     assert make("help", *arguments).stdout.count(said) == len(VARIABLES)

@@ -35,7 +35,7 @@ def test_every_sample_is_written_and_missing_units_are_named(toy_folder: Path, t
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["stl"], "there is no format 'stl' to export to; formats are urdf, mjcf, usd, obj"),
+        (["stl"], "there is no format 'stl' to export to; formats are urdf, mjcf, usd, obj, structurenet"),
         (["urdf", "--key", "nobody"], "has no sample nobody"),
         (["urdf", "--links", "all"], "must be parts or bodies"),
     ],

@@ -103,6 +103,7 @@ def enabled(config: Config) -> list[str]:
         "strings": config.sections["strings"].enabled,  # type: ignore[attr-defined]
         "captions": config.sections["captions"].lengths,  # type: ignore[attr-defined]
         "surface": config.sections["surface"].is_requested,  # type: ignore[attr-defined]
+        "structure": config.sections["structure"].is_requested,  # type: ignore[attr-defined]
     }
     return [stage for stage in members() if asked.get(stage)]
 

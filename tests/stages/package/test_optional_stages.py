@@ -18,6 +18,7 @@ from stages.package.reader import Dataset
 from stages.points.settings import PointsConfig
 from stages.sketches.settings import SketchesConfig
 from stages.strings.settings import StringsConfig
+from stages.structure.settings import StructureConfig
 from stages.surface.settings import SurfaceConfig
 from stages.verification.verify import verify_dataset
 from stages.views.settings import RingCameras, ViewsConfig
@@ -32,6 +33,7 @@ def images_alone() -> Config:
         "sketches": SketchesConfig(views=()),
         "surface": SurfaceConfig(),
         "captions": CaptionsConfig(),
+        "structure": StructureConfig(),
         "views": ViewsConfig(cameras=(RingCameras(count=2),), width=24, height=24, images=("color", "instances")),
     }
     return replace(config, sections={**config.sections, **off})

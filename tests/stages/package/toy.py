@@ -35,6 +35,8 @@ from stages.sketches.settings import SketchesConfig, SketchView
 from stages.sketches.stage import drawings
 from stages.sketches.stage import plan as plan_sketches
 from stages.strings.settings import StringsConfig
+from stages.structure.settings import StructureConfig
+from stages.structure.stage import STAGE as STRUCTURE
 from stages.surface.settings import DistanceConfig, SurfaceConfig
 from stages.surface.stage import STAGE as SURFACE
 from stages.validity.settings import ValidityConfig
@@ -201,6 +203,7 @@ TOY_STAGES: Mapping[str, Stage] = named_inputs(
         VIEWS,
         SURFACE,
         CAPTIONS,
+        STRUCTURE,
         replace(PACKAGE, check=lambda _: None),
     ]
 )
@@ -230,6 +233,7 @@ def toy_config(shards: int = 4) -> Config:
         ),
         "surface": SurfaceConfig(flags=True, union=True, distances=DistanceConfig(near=24, uniform=8), occupancy=8),
         "captions": CaptionsConfig(lengths=("short", "long")),
+        "structure": StructureConfig(hierarchy=True, symmetry=True),
         "package": PackageConfig(previewed=1),
     }
     return Config(
