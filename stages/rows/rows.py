@@ -75,8 +75,21 @@ def find_rows(
             if index != number and not steps[index].is_bay and (other >= 0).any()
         ]
         for normal in step.normals():
-            rows += _rows_along(layout, number, step, count, normal, mates, others, refuse)
+            ends = _bay_ends_along(layout, normal, steps, all_mates)
+            rows += _rows_along(layout, number, step, count, normal, mates, others, ends, refuse)
     return [row for row in rows if not any(_splits_units(layout, row, whole) for whole in rows)]
+
+
+def _bay_ends_along(
+    layout: Layout, normal: FloatArray, steps: Sequence[Step], all_mates: Sequence[np.ndarray]
+) -> np.ndarray:
+    """Return the parts at the ends of bays along a normal, int64 (k,), ascending; none where no step is a bay's."""
+    found = np.zeros(len(layout), dtype=bool)
+    for step, mates in zip(steps, all_mates, strict=True):
+        if step.is_bay and normal @ step.shift > 0:
+            ends = np.flatnonzero(bay_ends(layout, step.shift) & (mates >= 0))
+            found[ends] = found[mates[ends]] = True
+    return np.flatnonzero(found)
 
 
 def _splits_units(layout: Layout, row: Row, whole: Row) -> bool:
@@ -111,11 +124,13 @@ def _rows_along(
     normal: FloatArray,
     mates: np.ndarray,
     others: Sequence[np.ndarray],
+    ends: np.ndarray,
     refuse: Callable[[str], None],
 ) -> Iterator[Row]:
     """Yield the rows with one step and one normal, by what a period holds.
 
     mates, others: the part one step after each, of this step and of other long rows
+    ends: parts at the ends of bays along the normal, int64 (k,)
     """
     low, high = layout.spans(normal)
     previous = layout.mates(-step.shift)
@@ -132,6 +147,7 @@ def _rows_along(
             continue
         fits = may_insert, may_remove
         may_insert = may_insert and not any(slab.tears(other, 1) or slab.leaves_gap(other) for other in others)
+        may_insert = may_insert and not slab.leaves_end_behind(ends)
         may_remove = may_remove and not any(slab.tears(other, -1) for other in others)
         if fits != (may_insert, may_remove):
             refuse(TORN_ROW)

@@ -29,6 +29,8 @@ MIN_OVERHANG_SHARE = 0.5
 HELD_ONCE = "a part that spans the slab holds a single part of the row"
 
 
+END_MARGIN_SHARE = 0.1
+"""Parts are at an end of a shape up to this share of its length away from it."""
 MIN_FILLING_PARTS = 3
 MIN_FILLED_SHARE = 0.7
 """Share of a part's length from which the row of at least MIN_FILLING_PARTS that it holds fills it."""
@@ -290,6 +292,21 @@ class Slab:
             if filled >= MIN_FILLED_SHARE * float(self.high[holder] - self.low[holder]):
                 return True
         return False
+
+    def leaves_end_behind(self, ends: np.ndarray) -> bool:
+        """Return whether the shape would become longer beyond parts at its ends, such as beyond the legs of a table.
+
+        ends: parts at the ends of bays along the normal, int64 (k,)
+        """
+        if not len(ends):
+            return False
+        low, high = float(self.low.min()), float(self.high.max())
+        margin = END_MARGIN_SHARE * (high - low)
+        last = ends[self.high[ends] >= self.high[ends].max() - self.layout.tolerance]
+        if self.high[last].max() >= high - margin and not (self.beyond | self.recurs)[last].all():
+            return True
+        first = ends[self.low[ends] <= self.low[ends].min() + self.layout.tolerance]
+        return bool(self.low[first].min() <= low + margin and self.beyond[first].any())
 
     def _recurs_at(self, parts: np.ndarray) -> BoolArray:
         """Return which parts exist (not -1) and recur in the slab."""

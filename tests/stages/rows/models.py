@@ -53,6 +53,14 @@ def cabinet(stands_out: float = 0.0) -> tuple[Kit, Layout]:
     return layout(meshes, [*sides, ("top", pose(0.0, 1.025, 0.0)), *inside])
 
 
+def table_of_boxes() -> tuple[Kit, Layout]:
+    """A table with two boxes on it, each as long as half of it."""
+    meshes = {"leg": box(0.1, 1.0, 0.1), "top": box(2.0, 0.05, 0.8), "box": box(0.9, 0.2, 0.6)}
+    legs = [("leg", pose(x, 0.5, z)) for x in (-0.9, 0.9) for z in (-0.3, 0.3)]
+    boxes = [("box", pose(x, 1.15, 0.0)) for x in (-0.5, 0.5)]
+    return layout(meshes, [*legs, ("top", pose(0.0, 1.025, 0.0)), *boxes])
+
+
 def rail(posts: int = 8) -> tuple[Kit, Layout]:
     """A bar on posts and pins that alternate."""
     meshes = MESHES | {"bar": box(posts * 0.5, 0.1, 0.1)}

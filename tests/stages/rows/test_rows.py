@@ -324,3 +324,19 @@ def test_a_part_gets_no_longer_where_its_other_row_would_leave_a_gap() -> None:
     _, layout = models.frame_with_knobs([0.1, 1.0, 1.9, 2.85])
     heights = [float(row.shift[1]) for row in find_rows(layout) if len(row.insertions)]
     assert heights == pytest.approx([0.5] * len(heights)), "more knobs alone would need longer posts without bars"
+
+
+def test_a_table_becomes_no_longer_beyond_its_legs() -> None:
+    kit, layout = models.table_of_boxes()
+    (boxes,) = (row for row in find_rows(layout) if row.shift[0] == pytest.approx(1.0))
+    assert max(boxes.insertions) > 0.9, "more boxes alone would stand on a top that reaches beyond the legs"
+    found = find_rows(layout, [*steps_of(layout), *bays_of(layout)])
+    for row in found:
+        for change in changes([row], 1):
+            longer = repeat(layout, change)
+            legs = longer.boxes[[kit.types[kind].label == "leg" for kind in longer.types.tolist()]]
+            np.testing.assert_allclose(
+                legs[:, 1].max(axis=0)[[0, 2]] - longer.boxes[:, 1].max(axis=0)[[0, 2]],
+                layout.boxes[:4, 1].max(axis=0)[[0, 2]] - layout.boxes[:, 1].max(axis=0)[[0, 2]],
+            )
+    assert any(row.is_bay for row in found)
