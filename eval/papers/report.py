@@ -58,10 +58,11 @@ class PaperReport:
         if not steps:
             return _why_not_shown(results)
         problems = list(dict.fromkeys(step.problem for step in steps if step.problem))
-        if len(problems) == 0:
-            return "shown below"
-        shown = "shown in part; " if any(step.result for step in steps) else "not made: "
-        return shown + "; ".join(problems)
+        own = self.result(results)
+        is_shown = any((own.tables, own.charts, own.image_rows, own.figures, own.printed))
+        if is_shown:
+            return "; ".join(["shown in part" if problems else "shown below", *problems])
+        return "not made: " + ("; ".join(problems) or "the tables of this run have nothing of it")
 
     def seconds(self, results: Sequence[PaperResult]) -> float:
         """Return the seconds of the tables and commands that a number is shown by, without datasets and models."""

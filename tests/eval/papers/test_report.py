@@ -63,16 +63,23 @@ def test_report_has_every_number_with_its_state(tmp_path: Path) -> None:
             row("Figure 1", "reproduced", "absent"),
             row("Figure 2", "not here", remark="people"),
             row("Figure 3", "reproduced", command="pytest tests"),
+            PaperResult(
+                number="Figure 4",
+                subject="a part that this run does not have",
+                verdict="reproduced",
+                shown=(ResultSource(experiment="count", parts=("no such title",)),),
+            ),
         ),
     )
     steps = [step for item in experiments for step in make_experiment(item, "minutes", tmp_path, 1)]
     report = PaperReport("a", paper, "minutes", steps)
     states = {str(cells[0]): str(cells[3]) for cells in report.overview().rows}
-    assert list(states) == ["Table 1", "Figure 1", "Figure 2", "Figure 3"]
+    assert list(states) == ["Table 1", "Figure 1", "Figure 2", "Figure 3", "Figure 4"]
     assert states["Table 1"].startswith("shown in part; needs")
     assert states["Figure 1"].startswith("not made: needs")
     assert states["Figure 2"] == "cannot be made here: people"
     assert states["Figure 3"] == "measured by `pytest tests` alone"
+    assert states["Figure 4"] == "not made: the tables of this run have nothing of it"
     html, markdown = (path.read_text(encoding="utf-8") for path in write_report(report, tmp_path, datetime.now(UTC)))
     for text in (html, markdown):
         assert "smoke run" in text
