@@ -104,6 +104,7 @@ def _model_set(folder: Path, segmentation: Segmentation, test_shapes: int, label
             f"{folder}: {len(clouds)} of {len(files)} models were taken; {skipped.unreadable} others cannot be read, "
             f"and {skipped.without_parts} have no parts."
         )
-        return (*clouds.divided(min(test_shapes, -(-len(clouds) // 2)), TESTED_POINTS), note)
+        learnt = min(labelled, len(clouds) // 2)
+        return (*clouds.divided(min(test_shapes, len(clouds) - learnt), TESTED_POINTS), note)
 
     return RealSet(folder.name or str(folder), "", tuple(files), read)
