@@ -377,7 +377,7 @@ end_header
         (tmp_path / "m.dae").write_text(
             f"{head}<asset>{re.sub('<up_axis>.*</up_axis>', units, tail, count=1)}", encoding="utf-8"
         )
-        model = read_parts(tmp_path / "m.dae")
+        model = read_parts(tmp_path / "m.dae", "nodes")
         (part,) = model.parts
         world = part.vertices @ part.pose[:3, :3].T + part.pose[:3, 3]
         assert model.up == up
