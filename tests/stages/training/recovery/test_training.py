@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.config import Config
 from pipeline.errors import ConfigError
 from stages.training.stage import STAGE
 from tests.pipeline.conftest import made
@@ -16,25 +17,30 @@ from tests.stages.training.recovery.toy import config, train
 FOLDER = "stools-models/small-tests_stages_programs_stool-0"
 
 
+@pytest.fixture(scope="module", params=["points", "sketch"])
+def trained(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Config, Path]:
+    """Return a config and the output folder of its training with one worker."""
+    wanted, out = config(input=request.param), tmp_path_factory.mktemp(request.param)
+    assert train(wanted, out).made == 6
+    return wanted, out
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["points", "sketch"])
-def test_model_of_a_program_is_published_deterministically(kind: str, tmp_path: Path) -> None:
-    wanted = config(input=kind)
-    assert train(wanted, tmp_path / "one").made == 6
-    card = (tmp_path / "one" / FOLDER / "README.md").read_text(encoding="utf-8")
+def test_model_of_a_program_is_published_deterministically(trained: tuple[Config, Path], tmp_path: Path) -> None:
+    wanted, out = trained
+    card = (out / FOLDER / "README.md").read_text(encoding="utf-8")
     assert "A `recovery` of program `tests.stages.programs.stool`" in card
-    rows = list(csv.DictReader((tmp_path / "one" / FOLDER / "curves.csv").read_text(encoding="utf-8").splitlines()))
+    rows = list(csv.DictReader((out / FOLDER / "curves.csv").read_text(encoding="utf-8").splitlines()))
     assert [int(row["step"]) for row in rows] == [6, 12]
-    assert train(wanted, tmp_path / "two", workers=2).made == 6
-    assert made(tmp_path / "one/stools-models") == made(tmp_path / "two/stools-models")
+    assert train(wanted, tmp_path, workers=2).made == 6
+    assert made(out / "stools-models") == made(tmp_path / "stools-models")
 
 
 @pytest.mark.slow
-def test_rounds_learn_from_their_shapes_and_earlier_ones(tmp_path: Path) -> None:
-    train(config(), tmp_path)
+def test_rounds_learn_from_their_shapes_and_earlier_ones(trained: tuple[Config, Path]) -> None:
     records = {
         path.stem: json.loads(path.read_text(encoding="utf-8"))
-        for path in tmp_path.glob(".work/stools/training/records/*.json")
+        for path in trained[1].glob(".work/stools/training/records/*.json")
     }
     name = "small-tests_stages_programs_stool-"
     inputs = [sorted(records[f"{name}0-r000{number}"]["inputs"]) for number in (0, 1)]
