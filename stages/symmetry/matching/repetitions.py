@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -87,7 +87,7 @@ def find_repetitions(grid: SurfaceGrid) -> list[Repetition]:
     for cells, ahead in (seeds[number] for number in order.tolist() if promise[number] > 0):
         if not any(_is_known(grid, cells, ahead, repetition) for repetition in known):
             repetition = _repetition(grid, cells, ahead, both)
-            known += [repetition] if repetition is not None and _continues(grid, repetition) else []
+            known += [] if repetition is None else [repetition]
     return sorted(known, key=lambda repetition: -repetition.saved_area)
 
 
@@ -111,7 +111,7 @@ def _is_known(grid: SurfaceGrid, cells: IntArray, ahead: FloatArray | None, know
         if min(float(np.abs(transform_points(pose, corners) - moved).max()) for pose in known.poses) > grid.cell_size:
             return False
     points = grid.points[items_in(grid, known.cells)]
-    keys = np.unique(np.concatenate([keys_at(grid, pose, points) for pose in known.poses]))
+    keys = np.sort(np.concatenate([keys_at(grid, pose, points) for pose in known.poses]))
     return bool(is_among(keys, grid.keys[cells]).mean() > KNOWN_SHARE)
 
 
@@ -137,18 +137,18 @@ def _promised_area(grid: SurfaceGrid, cells: IntArray, ahead: FloatArray | None,
     return float((len(poses) - 1) * grid.area[cells].sum())
 
 
-def _continues(grid: SurfaceGrid, repetition: Repetition) -> bool:
-    """Return whether a copy is translated without a turn, or a row has two steps.
+def _continues(grid: SurfaceGrid, cells: IntArray, copy_poses: Sequence[FloatArray], ahead: FloatArray | None) -> bool:
+    """Return whether a copy of a region is translated without a turn, or a row has two steps.
 
     The corners of a box are equal under turns alone; nothing could be put between such copies.
     """
-    others = np.array(repetition.poses[1:])
+    others = np.array(copy_poses)
     if (rotation_angle(others) < NO_TURN_RADIANS).any():
         return True
-    if repetition.ahead is None:
+    if ahead is None:
         return False
-    ahead, back = repetition.ahead, invert(repetition.ahead)
-    middle = grid.points[items_in(grid, repetition.cells)].mean(axis=0)
+    back = invert(ahead)
+    middle = grid.points[items_in(grid, cells)].mean(axis=0)
     middles = others[:, :3, :3] @ middle + others[:, :3, 3]
 
     def has_copy(pose: FloatArray) -> bool:
@@ -171,7 +171,10 @@ def _evenly(items: np.ndarray) -> np.ndarray:
 def _repetition(
     grid: SurfaceGrid, cells: IntArray, ahead: FloatArray | None, transforms: FloatArray
 ) -> Repetition | None:
-    """Return the copies of a region, without what some of them lack; a copy counts if that saves surface."""
+    """Return the copies of a region, without what some of them lack; a copy counts if that saves surface.
+
+    None for a region without copies, and for copies between which nothing could be put.
+    """
     kept, poses = np.ones(len(cells), dtype=bool), [np.eye(4)]
     inside = _inside(grid, cells)
     points, keys = grid.points[_evenly(items_in(grid, inside))], grid.keys[inside]
@@ -189,6 +192,8 @@ def _repetition(
     if len(poses) < 2 or not whole:
         return None
     cells = np.sort(np.concatenate(whole)).astype(np.int32)
+    if not _continues(grid, cells, poses[1:], ahead):
+        return None
     return Repetition(cells, float(grid.area[cells].sum()), tuple(poses), ahead, _band(grid, cells, ahead))
 
 
@@ -217,7 +222,7 @@ def _copies(
         if matched_items(grid, pose, sample).mean() <= MIN_COPY_SHARE:
             continue
         same = _same_cells(grid, cells, items, pose)
-        if grid.area[cells[same]].sum() <= MIN_COPY_SHARE * grid.area[cells].sum():
+        if same is None:
             continue
         if len(tried) > 1:
             copies.append((pose, same))
@@ -247,16 +252,22 @@ def _overlaps(
     return any(share > MAX_OVERLAP_SHARE for share in inside)
 
 
-def _same_cells(grid: SurfaceGrid, cells: IntArray, items: np.ndarray, pose: FloatArray) -> BoolArray:
-    """Return which of ascending `cells` with these `items` the surface has at a pose (4, 4) exactly, bool (n,)."""
+def _same_cells(grid: SurfaceGrid, cells: IntArray, items: np.ndarray, pose: FloatArray) -> BoolArray | None:
+    """Return which of ascending `cells` with these `items` the surface has at a pose (4, 4) exactly, bool (n,).
+
+    None if they are at most MIN_COPY_SHARE of the region.
+    """
+    area = grid.area[cells]
     same = np.ones(len(cells), dtype=bool)
     missed = items[~matched_items(grid, pose, items)]
     same[np.searchsorted(cells, grid.item_cell[missed])] = False
+    if area[same].sum() <= MIN_COPY_SHARE * area.sum():
+        return None  # before the slower half: what else lies there
     back = invert(pose)
     present = items_moved_into(grid, cells, pose)
     more = present[~matched_items(grid, back, present)]
     same[np.searchsorted(grid.keys[cells], keys_at(grid, back, grid.points[more]))] = False
-    return same
+    return same if area[same].sum() > MIN_COPY_SHARE * area.sum() else None
 
 
 def _inside(grid: SurfaceGrid, cells: IntArray) -> IntArray:
@@ -286,8 +297,10 @@ def _band(grid: SurfaceGrid, cells: IntArray, ahead: FloatArray | None) -> IntAr
     for step in (ahead, invert(ahead)):
         row[grid.item_cell[items_moved_into(grid, cells, step)]] = True
     inner = cells[row[grid.neighbours[cells]].all(axis=1)]
-    taken = np.union1d(cells, grid.item_cell[items_moved_into(grid, inner, ahead)])
-    band = cells
+    taken, band = np.zeros((2, len(row)), dtype=bool)
+    taken[grid.item_cell[items_moved_into(grid, inner, ahead)]] = True
+    taken[cells] = band[cells] = True
     for _ in range(BAND_CELLS):
-        band = np.intersect1d(np.r_[band, grid.neighbours[band].ravel()], taken).astype(np.int32)
-    return band
+        band[grid.neighbours[np.flatnonzero(band)]] = True
+        band &= taken  # which has no empty neighbour
+    return np.flatnonzero(band).astype(np.int32)
