@@ -8,14 +8,29 @@ import os
 # imported; torch heeds OMP.
 os.environ.update(dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"))
 
+from collections.abc import Iterator
+from contextlib import nullcontext
 from functools import cache
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.warm_workers import warm_workers
+
 # A busy machine must not fail a test, and a failure must come back when the tests are run again.
 settings.register_profile("shapemill", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("shapemill")
+
+_WITH_WARM_WORKERS = {Path(__file__).with_name(folder) for folder in ("stages", "eval")}
+"""Folders of tests that run stages and do not test how workers start and end."""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    # Around fixtures, too: most of them make a dataset for all tests of a file.
+    with warm_workers() if _WITH_WARM_WORKERS & set(item.path.parents) else nullcontext():
+        return (yield)
 
 
 @cache

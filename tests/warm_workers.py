@@ -1,6 +1,6 @@
 """Workers that stay, with imports and kernels, for the next run of this process: tests of stages start a few.
 
-Tests of the engine itself start workers of their own, as runs do.
+A start costs 3 to 9 seconds of imports. Tests of the engine itself start workers of their own, as runs do.
 """
 
 from __future__ import annotations
@@ -10,12 +10,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from joblib.externals.loky import process_executor
+
 import pipeline.workers
 from pipeline.compilation_note import RECORD_VARIABLE
 from pipeline.workers import Workers, _Worker
 
 _waiting: list[_Worker] = []
 """Workers without a run."""
+
+_MAX_GROWTH_BYTES = 2_000_000_000
+"""A worker that has grown by more is replaced. loky's 300 MB are less than the libraries of all stages."""
 
 
 class WarmWorkers(Workers):
@@ -25,8 +30,8 @@ class WarmWorkers(Workers):
         super().__init__(count, output)
         self._idle = [_waiting.pop() if _waiting else worker for worker in self._idle]
         for worker in self._idle:
-            worker._output = output
-            if worker._executor is not None and worker.submit(_print_into, output).exception() is not None:
+            worker._output, worker._made = output, 0
+            if worker._executor is not None and worker.submit(_take_over, output).exception() is not None:
                 worker.stop(kill=True)  # it died since; another process replaces it
 
     def stop(self, kill: bool) -> None:
@@ -37,7 +42,8 @@ class WarmWorkers(Workers):
         super().stop(kill)
 
 
-def _print_into(output: Path) -> None:
+def _take_over(output: Path) -> None:
+    process_executor._MAX_MEMORY_LEAK_SIZE = _MAX_GROWTH_BYTES
     descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     os.dup2(descriptor, 1)
     os.dup2(descriptor, 2)
@@ -47,9 +53,10 @@ def _print_into(output: Path) -> None:
 @contextmanager
 def warm_workers() -> Iterator[None]:
     """Within the context, runs of this process use warm workers, unless they record what workers load."""
+    before = pipeline.workers.Workers
     if RECORD_VARIABLE not in os.environ:
         pipeline.workers.Workers = WarmWorkers  # type: ignore[misc]
     try:
         yield
     finally:
-        pipeline.workers.Workers = Workers  # type: ignore[misc]
+        pipeline.workers.Workers = before  # type: ignore[misc]

@@ -28,7 +28,6 @@ from stages.training.settings import TrainingConfig
 from stages.training.stage import STAGE
 from tests.stages.shape.collection.absent import named_inputs
 from tests.stages.strings.graphs import arrays
-from tests.warm_workers import warm_workers
 
 LABELS = ("joint", "leaf", "link")
 ALPHABET: Alphabet = make_alphabet(LABELS)
@@ -140,7 +139,6 @@ def config(*models: Mapping[str, Any]) -> Config:
 
 def train(wanted: Config, out: Path, workers: int = 1, only: str = "") -> RunResult:
     """Run all three stages."""
-    with warm_workers():
-        for name in ("exemplars", "strings"):
-            run_stage(name, STAGES, wanted, DatasetPaths(out, wanted.name), 1)
-        return run_stage("training", STAGES, wanted, DatasetPaths(out, wanted.name), workers, only=only)
+    for name in ("exemplars", "strings"):
+        run_stage(name, STAGES, wanted, DatasetPaths(out, wanted.name), 1)
+    return run_stage("training", STAGES, wanted, DatasetPaths(out, wanted.name), workers, only=only)
