@@ -82,7 +82,5 @@ class _DerivationParser:
 
     def _error(self, why: str) -> DerivationError:
         begin = max(0, self._at - 30)
-        excerpt = self._text[begin : self._at + 30]
-        return DerivationError(
-            f"at {self._at} of a derivation of {self._grammar.name}: {why}\n{excerpt}\n{'^':>{self._at - begin + 1}}"
-        )
+        excerpt, caret = self._text[begin : self._at + 30], " " * (self._at - begin) + "^"
+        return DerivationError(f"at {self._at} of a derivation of {self._grammar.name}: {why}\n{excerpt}\n{caret}")
