@@ -30,7 +30,7 @@ def string_faults(sample: PackagedSample) -> Iterator[str]:
     if graph_digest(types, sample.contacts) != sample.record["graph"]:
         yield "its parts and contacts are another graph than its json names"
         return
-    if TEXT not in sample.members:
+    if not _has_strings(sample):
         return
     edges, alphabet = _edges(sample), make_alphabet(sample.shape.labels)
     lines = sample.members["txt"].decode().splitlines()
@@ -58,7 +58,7 @@ def _contact_mismatches(sample: PackagedSample, places: DatasetPaths) -> Iterato
     """Check face contacts with the kit; it does not know those of stretched parts."""
     if not languages()[sample.record["language"]].graphs or _edges(sample) != "faces" or sample.shape.is_stretched:
         return
-    if TEXT not in sample.members:
+    if not _has_strings(sample):
         return
     path = places.stage("exemplars").root / f"{sample.record['kit']}.json"
     kit = KitStrings(load_kit(path, path.with_suffix(".tar")), "faces")
@@ -68,9 +68,18 @@ def _contact_mismatches(sample: PackagedSample, places: DatasetPaths) -> Iterato
         yield "its txt does not contain its face contacts"
 
 
+def _has_strings(sample: PackagedSample) -> bool:
+    """Return whether the text of a shape graph is its strings: a mixture without strings has another text."""
+    return TEXT in sample.members and _settings(sample).enabled
+
+
 def _edges(sample: PackagedSample) -> Edges:
     """Return which contacts the strings of the dataset contain."""
-    return StringsConfig.model_validate(sample.sections.get("strings", {})).edges
+    return _settings(sample).edges
+
+
+def _settings(sample: PackagedSample) -> StringsConfig:
+    return StringsConfig.model_validate(sample.sections.get("strings", {}))
 
 
 def _can_encode(decoded: Decoded, types: TypeArray, contacts: IntArray, edges: Edges) -> bool:

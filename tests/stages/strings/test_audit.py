@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,14 @@ def test_strings_of_the_configured_edges_pass_the_audit(edges: Edges, said: Edge
     found = sample(written(edges), said)
     assert list(string_faults(found)) == []
     assert list(AUDIT.recheck(found, places)) == []
+
+
+def test_another_text_is_no_fault_where_strings_are_turned_off(places: DatasetPaths) -> None:
+    """In a mixture every sample has a text, and that of a shape graph says that it has no strings."""
+    found = sample(["no text: strings are turned off"], None)
+    assert "is no string" in next(string_faults(found))
+    off = replace(found, sections={"strings": {"enabled": False}})
+    assert [*string_faults(off), *AUDIT.recheck(off, places)] == []
 
 
 @pytest.mark.parametrize(("edges", "said"), [("all", "tree"), ("tree", "all"), ("faces", "all"), ("faces", "tree")])
