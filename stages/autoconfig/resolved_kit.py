@@ -16,6 +16,7 @@ from stages.exemplars.read import read_parts
 from stages.exemplars.segmentation import NOT_CUT
 from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.model_files.limits import ReadLimits
+from stages.rows.kit_rows import rows_of_kit
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.resolved_settings import KEEP_TYPES_KEY, MAX_COPIED_SHARE_KEY
 from stages.variations.requirements.hub_restoration import auto_min_hubs
@@ -75,7 +76,7 @@ def resolve_models(
 
 def use_sections_if_empty(first: ResolvedKit, limits: ReadLimits, tries: int, require: Sequence[str]) -> ResolvedKit:
     """Cut the models into sections if `auto` took pieces of meshes for parts, or failed to cut one by its symmetries,
-    and a trial search found nothing in them.
+    and a trial search found nothing in them. Pieces that have rows or bays stay, since these become longer and shorter.
 
     Sections are taken if they yield enough under the strictest rules, or under other rules what a longer search makes
     a dataset of: the first hit of slabs is rare, since all that crosses a section must fit at the same time. Otherwise
@@ -85,7 +86,7 @@ def use_sections_if_empty(first: ResolvedKit, limits: ReadLimits, tries: int, re
     by_author = any(
         model.segmentation in ("nodes", "objects") and not model.why.endswith(NOT_CUT) for model in first.models
     )
-    if first.config.parts != "auto" or by_author or (trial is not None and trial.graphs):
+    if first.config.parts != "auto" or by_author or (trial is not None and trial.graphs) or _has_rows(first):
         return first
     config = first.config.model_copy(update={"parts": "sections"})
     try:
@@ -109,6 +110,13 @@ def use_sections_if_empty(first: ResolvedKit, limits: ReadLimits, tries: int, re
     reason = f"cut across: nothing comes of {len(first.models[0].parts)} {first.models[0].segmentation}"
     values, reasons = {PARTS_KEY: config.parts, **values}, {PARTS_KEY: reason, **reasons}
     return ResolvedKit(config, models, identified, replace(resolution, values=values, reasons=reasons))
+
+
+def _has_rows(resolved: ResolvedKit) -> bool:
+    """Return whether rows or bays of the exemplars can become longer or shorter."""
+    strictest = {key: STRICTEST[key] for key in resolved.config.auto_keys()}
+    built = resolved.observe({**strictest, **resolved.resolution.values})
+    return not built.refusals and not built.kit.one_surface and bool(rows_of_kit(built.kit))
 
 
 def _is_dataset(resolved: ResolvedKit, tries: int) -> bool:
