@@ -33,18 +33,23 @@ Row = dict[str, Any]
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """Plan the listings of all producers' shards, then the assignment and, once that is made, the collection."""
+    """Plan the listings of all producers' shards, then the assignment and, once that is made, the collection.
+
+    After a change of code a producer may be back at its first shards, while listings of the others still count.
+    """
     if not plan.config.section(MixtureConfig).enabled:
         return []
     makers = [name for name, declared in producers().items() if not declared.joins and plan.shards(name)]
     listings = [shard for maker in makers for shard in _listing_shards(plan, maker)]
     known = all(plan.summary("mixture", shard.name) is not None for shard in listings)
-    if not listings or not known:
+    reads = LANGUAGE.reads(plan)
+    planned = all(name in plan.shards(stage) for stage, _, name in (source.partition("/") for source in reads))
+    if not listings or not known or not planned:
         return listings
     assignment = Shard(
         f"{plan.config.name}-assignment",
         {"job": "assignment", "listings": [shard.name for shard in listings], "joined": makers},
-        (*LANGUAGE.reads(plan), *(f"mixture/{shard.name}" for shard in listings)),
+        (*reads, *(f"mixture/{shard.name}" for shard in listings)),
     )
     summary = plan.summary("mixture", assignment.name)
     if summary is None:
