@@ -110,7 +110,8 @@ def check_shapemill(arguments: list[str]) -> None:
 
 @pytest.mark.parametrize("scale", SCALES)
 def test_every_experiment_can_be_planned_at_every_scale(paper: Paper, scale: str, tmp_path: Path) -> None:
-    sections = {name: stage.config for name, stage in find_stages().items()}
+    stages = find_stages()
+    sections = {name: stage.config for name, stage in stages.items()}
     for experiment in paper.experiments:
         scaled = experiment.scales.get(scale, ScaledExperiment())  # type: ignore[call-overload]
         for step in planned_steps(experiment, scale, tmp_path, 2):  # type: ignore[arg-type]
@@ -123,4 +124,6 @@ def test_every_experiment_can_be_planned_at_every_scale(paper: Paper, scale: str
                 table_options(step.table, table.options, scaled.options.get(step.table, {}))
                 assert not experiment.files or table.compute_from_files
         if experiment.config and all(path.exists() for path in experiment.needs):
-            load_config(write_scaled_config(experiment, experiment.config, scale, tmp_path), sections)
+            config = load_config(write_scaled_config(experiment, experiment.config, scale, tmp_path), sections)
+            for stage in stages.values():
+                stage.check(config)
