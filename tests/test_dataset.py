@@ -139,6 +139,7 @@ def test_every_table_about_kits_is_in_the_report(made: tuple[Path, Path], tmp_pa
     assert all(row[header.index("exact %")] == "100.0" for row in rows)
     report = (results / "report.html").read_text(encoding="utf-8")
     assert all(f'<section id="{name}">' in report for name in about_kits)
+    assert "made alone: make eval TABLE=worth" in report, "it takes longer than the others together"
     assert "say something else now" not in report, "the config is the one that the dataset was made with"
 
 

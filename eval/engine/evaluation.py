@@ -79,6 +79,8 @@ class Evaluation:
     compute_from_files: Callable[[Sequence[Path], Any], TableResult] | None = None
     """From files instead of a dataset."""
     options: type[StrictModel] = NoOptions
+    in_report: bool = True
+    """Whether the report of all tables has it; a table that takes longer than the others together is made alone."""
 
     def missing(self, run: DatasetRun) -> str:
         """Return the first missing requirement, or an empty text."""

@@ -120,4 +120,5 @@ TABLE = Evaluation(
     estimate_seconds=_estimate_seconds,
     compute=cached_sections(_sections),
     options=WorthOptions,
+    in_report=False,
 )
