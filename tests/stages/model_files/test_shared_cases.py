@@ -93,6 +93,16 @@ def test_tabs_in_a_material_library(tmp_path: Path) -> None:
     assert [part.colors for part in measured(read_scene(tmp_path / "m.obj"))] == [[(255, 0, 0)], [(0, 0, 255)]]
 
 
+@pytest.mark.parametrize("kind", ["", "-split", "-same-start"])
+def test_two_sided_boxes_are_equal_parts_of_volume_one(kind: str) -> None:
+    kit = read_kit(CASES / f"obj-two-sided{kind}.obj")
+    (box,) = kit.types
+    corners = box.vertices[box.faces]
+    volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
+    assert (len(box.faces), volume) == (12, pytest.approx(1))
+    assert kit.exemplars[0].assembly.types.tolist() == [0, 0]
+
+
 def test_balance_of_a_two_sided_arm_is_that_of_its_control() -> None:
     plain, two_sided = (read_kit(CASES / f"obj-balance-{name}.obj") for name in ("plain", "two-sided"))
     verdicts = [
