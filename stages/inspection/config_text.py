@@ -116,17 +116,19 @@ def variations_section(
     ]
 
 
-def proportions_section(different: int, stable: bool, why: str, layouts: str) -> list[str]:
+def proportions_section(different: int, stable: bool, why: str, layouts: str, has_rows: bool) -> list[str]:
     """Return the lines of a dataset of resized exemplars.
 
     different: number of different shapes that can be found.
     stable: whether shapes must be stable; `why` is the reason.
     layouts: the yield estimate of new layouts, a sentence.
+    has_rows: whether rows of the exemplars become longer and shorter.
     """
     more = "raise it for more" if different >= MAX_SAMPLES_REQUESTED else "that differ by proportions.min_difference"
     return [
         "variations:",
         _line(1, "samples_per_kit", 0, f"other layouts: {layouts}"),
+        *(["  rows:", _line(2, "use", True, "resized exemplars get longer and shorter rows")] if has_rows else []),
         "proportions:",
         _line(1, "samples_per_kit", min(different, MAX_SAMPLES_REQUESTED), f"the same parts resized; {more}"),
         "  require:",

@@ -35,7 +35,7 @@ def write_report_files(folder: Path, paths: Sequence[Path], report: InspectionRe
     if resizing is not None:
         reason = resolution.reasons[FALLBACK_STABLE_KEY]
         others = report.layouts.sentence if report.layouts else "nothing"
-        section = proportions_section(resizing.different, resizing.stable, reason, others)
+        section = proportions_section(resizing.different, resizing.stable, reason, others, resizing.has_rows)
     else:
         require = {key: resolution.values[key] for key in REQUIREMENT_KEYS}
         layouts = report.layouts.layouts if report.layouts is not None else 0

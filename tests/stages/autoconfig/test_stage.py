@@ -124,13 +124,14 @@ def test_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path) -> 
     assert code == 0, text
     written = yaml.safe_load((tmp_path / "ring0.yaml").read_text(encoding="utf-8"))
     written["name"] = "toy"
-    assert written["variations"] == {"samples_per_kit": 0}
+    assert written["variations"] == {"samples_per_kit": 0, "rows": {"use": True}}
     written["proportions"] |= {"samples_per_kit": 8}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(written), encoding="utf-8")
     run(tmp_path, ("autoconfig", "exemplars", "proportions"))
     work = tmp_path / "out" / ".work" / "toy"
     assert not list((work / "autoconfig").glob("*.json"))
-    assert list((work / "proportions").glob("toy-train-*.tar"))
+    made_shapes = [sample for shard in (work / "proportions").glob("toy-*.tar") for sample in read_samples(shard)]
+    assert "rows" in {sample.lineage["method"] for sample in made_shapes}, "what the forecast promises is made"
     del written["proportions"]
     written["variations"] = {
         "samples_per_kit": 8,

@@ -31,11 +31,12 @@ def test_names_that_yaml_could_misread_survive() -> None:
     assert kit["label_map"] == {name: list(patterns) for name, patterns in label_map.items()}
 
 
-def test_config_of_resized_exemplars_asks_for_no_layouts_and_says_why() -> None:
+@pytest.mark.parametrize("has_rows", [False, True])
+def test_config_of_resized_exemplars_asks_for_no_layouts_and_says_why(has_rows: bool) -> None:
     shapes = [ring(1, 1)]
-    lines = proportions_section(90, True, "it does", "nothing: every part is its own type")
+    lines = proportions_section(90, True, "it does", "nothing: every part is its own type", has_rows)
     text = config_text("toy", config_of(shapes), models_of(ROAD, shapes), {}, lines, "hundreds")
     written = yaml.safe_load(text)
-    assert written["variations"] == {"samples_per_kit": 0}
+    assert written["variations"] == {"samples_per_kit": 0, **({"rows": {"use": True}} if has_rows else {})}
     assert written["proportions"] == {"samples_per_kit": 90, "require": {"stable": True}}
     assert "samples_per_kit: 0   # other layouts: nothing: every part is its own type" in text
