@@ -20,7 +20,7 @@ from stages.shape.shape import Shape
 
 MAX_ROTATION_ORDER = 12
 MIRROR_STEP_DEGREES = 7.5
-"""Mirrors are tried at multiples of this angle, and between the directions of parts."""
+"""Mirrors are tried at multiples of this angle, and where they map one part onto itself or another one."""
 GAP_SHARE = 1e-3
 """Largest distance of vertices that are mapped onto each other, as a share of the diagonal of the shape."""
 AREA_TOLERANCE = 1e-3
@@ -140,13 +140,22 @@ def _rotation_angles() -> list[float]:
 
 
 def _mirror_angles(parts: _Parts) -> Iterator[float]:
-    """Yield azimuths of normals, in degrees below 180: multiples of a step, and those that exchange two parts."""
+    """Yield azimuths of normals, in degrees below 180: multiples of a step, and those of all mirrors of one part.
+
+    Each mirror maps a part away from the axis onto itself or onto one that is alike. So the part with the fewest of
+    these is enough, and a shape of n parts has at most n angles besides the multiples.
+    """
     angles = set(np.arange(0.0, 180.0, MIRROR_STEP_DEGREES).tolist())
-    first, second = np.nonzero(np.triu(parts.alike, 1))
-    apart = parts.middles[first] - parts.middles[second]
-    level = (np.abs(apart[:, 1]) <= parts.near) & (np.hypot(apart[:, 0], apart[:, 2]) > parts.near)
-    found = np.degrees(np.arctan2(-apart[level, 2], apart[level, 0])) % 180.0
-    angles |= set((np.round(found, ANGLE_DECIMALS) % 180.0).tolist())
+    away = parts.middles - parts.centre
+    off_axis = np.flatnonzero(np.hypot(away[:, 0], away[:, 2]) > parts.near)
+    if len(off_axis):
+        part = off_axis[parts.alike[off_axis].sum(axis=1).argmin()]
+        apart = parts.middles[part] - parts.middles[parts.alike[part]]
+        level = (np.abs(apart[:, 1]) <= parts.near) & (np.hypot(apart[:, 0], apart[:, 2]) > parts.near)
+        across = np.array([[-away[part, 2], 0.0, away[part, 0]]])
+        normals = np.concatenate([apart[level], across])
+        found = np.degrees(np.arctan2(-normals[:, 2], normals[:, 0])) % 180.0
+        angles |= set((np.round(found, ANGLE_DECIMALS) % 180.0).tolist())
     kept: list[float] = []
     for angle in sorted(angles):
         if not kept or angle - kept[-1] > 10 ** (1 - ANGLE_DECIMALS):
