@@ -6,20 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from pipeline.config import Config
-from stages.shape.collection.members import Members, RecordField
+from stages.shape.collection.members import Members, RecordField, object_schema
 from stages.structure.settings import StructureConfig
 
 HIERARCHY, SYMMETRY = "hierarchy", "symmetry"
-
-
-def _object(description: str, properties: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        "description": description,
-        "type": "object",
-        "properties": dict(properties),
-        "required": list(properties),
-        "additionalProperties": False,
-    }
 
 
 def _list_of(item: Mapping[str, Any], description: str) -> dict[str, Any]:
@@ -27,7 +17,7 @@ def _list_of(item: Mapping[str, Any], description: str) -> dict[str, Any]:
 
 
 def _hierarchy() -> dict[str, Any]:
-    group = _object(
+    group = object_schema(
         "a group",
         {
             "name": {"type": "string", "minLength": 1},
@@ -35,7 +25,7 @@ def _hierarchy() -> dict[str, Any]:
         },
     )
     numbers = {"type": "integer", "minimum": 0}
-    return _object(
+    return object_schema(
         "groups of parts: assemblies of a ShapeAssembly program, or parts of a program that move together; one group "
         "where nothing names groups; several are nodes of the GLB, above those of their parts",
         {
@@ -47,7 +37,7 @@ def _hierarchy() -> dict[str, Any]:
 
 def _symmetry() -> dict[str, Any]:
     part = {"type": "integer", "minimum": 0}
-    operation = _object(
+    operation = object_schema(
         "a symmetry",
         {
             "kind": {
@@ -62,7 +52,7 @@ def _symmetry() -> dict[str, Any]:
         },
     )
     axis = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
-    return _object(
+    return object_schema(
         "rotations about the vertical, of an order of at most 12, and upright mirrors that map the parts onto parts of "
         "the same label, area and vertices, within a thousandth of the diagonal",
         {

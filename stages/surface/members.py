@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from pipeline.config import Config
-from stages.shape.collection.members import Member, Members, RecordField
+from stages.shape.collection.members import Member, Members, RecordField, object_schema
 from stages.surface.settings import SurfaceConfig
 
 UNION_VERTICES, UNION_FACES, UNION_INSTANCES = "union_vertices.npy", "union_faces.npy", "union_instances.npy"
@@ -54,22 +53,12 @@ def _members(config: Config) -> tuple[Member, ...]:
     return tuple(found)
 
 
-def _object(description: str, properties: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        "description": description,
-        "type": "object",
-        "properties": dict(properties),
-        "required": list(properties),
-        "additionalProperties": False,
-    }
-
-
 def _fields(config: Config) -> Mapping[str, RecordField]:
     section = config.section(SurfaceConfig)
     fields: dict[str, RecordField] = {}
     flags = {name: {"type": "boolean", "description": text} for name, text in FLAGS.items()}
     if section.flags:
-        parts = {"type": "array", "items": _object("facts about one part", flags), "minItems": 1}
+        parts = {"type": "array", "items": object_schema("facts about one part", flags), "minItems": 1}
         whole = {
             "closed": {"type": "boolean", "description": "every part is closed"},
             "manifold": {"type": "boolean", "description": "every part is a manifold"},
@@ -77,7 +66,7 @@ def _fields(config: Config) -> Mapping[str, RecordField]:
             "parts": {**parts, "description": "the facts about each part, in the order of `parts`"},
         }
         text = "exact facts about the surfaces of the parts, as the GLB has them; vertices at one place count as one"
-        fields["surface"] = RecordField(_object(text, whole))
+        fields["surface"] = RecordField(object_schema(text, whole))
     if section.needs_union:
         positive = {"type": "number", "exclusiveMinimum": 0}
         corner = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
@@ -88,7 +77,7 @@ def _fields(config: Config) -> Mapping[str, RecordField]:
             "cube_low": {**corner, "description": "lowest corner of the cube of uniform points and the grid"},
             "cube_side": {**positive, "description": "length of the sides of the cube"},
         }
-        fields["union"] = RecordField(_object("the union of all parts as one solid", facts))
+        fields["union"] = RecordField(object_schema("the union of all parts as one solid", facts))
     return fields
 
 

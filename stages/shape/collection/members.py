@@ -108,3 +108,14 @@ class Members:
     coordinates: Callable[[Config], Sequence[str]] = _nothing_of
     checks: tuple[str, ...] = ()
     tasks: Callable[[Config], Sequence[str]] = _nothing_of
+
+
+def object_schema(description: str, properties: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the JSON schema of an object that has these properties and no others."""
+    return {
+        "description": description,
+        "type": "object",
+        "properties": dict(properties),
+        "required": list(properties),
+        "additionalProperties": False,
+    }
