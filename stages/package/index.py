@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -33,16 +33,27 @@ LOCATION_COLUMNS = {"shard": "string", "offset": "int64", "bytes": "int64"}
 ROWS_PER_GROUP = 65_536
 
 
-def columns(fields: Container[str]) -> dict[str, IndexColumn]:
-    """Return the columns that come from records with these fields, by name."""
+def columns(record: Mapping[str, Any]) -> dict[str, IndexColumn]:
+    """Return the columns that come from a record, by name. In place of a record, a mapping of its form will do."""
     declared = (added.columns for added in members().values())
     known = RECORD_COLUMNS | {name: column for own in declared for name, column in own.items()}
-    return {name: column for name, column in known.items() if column.place[0] in fields}
+    return {name: column for name, column in known.items() if _holds(record, column.place)}
 
 
-def column_kinds(fields: Container[str]) -> dict[str, str]:
-    """Return the Arrow type of every column of the index of records with these fields, by name."""
-    return {name: column.kind for name, column in columns(fields).items()} | LOCATION_COLUMNS
+def column_kinds(properties: Mapping[str, Any]) -> dict[str, str]:
+    """Return the Arrow type of every column of the index, by name. properties: schemas of the fields of its records"""
+    return {name: column.kind for name, column in columns(_form(properties)).items()} | LOCATION_COLUMNS
+
+
+def _form(properties: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of records with this schema, and the fields of those that are objects."""
+    return {name: _form(schema.get("properties", {})) for name, schema in properties.items()}
+
+
+def _holds(record: Mapping[str, Any], place: Sequence[str]) -> bool:
+    """Return whether a record has a value at a place."""
+    first, *rest = place
+    return first in record and (not rest or _holds(record[first], rest))
 
 
 def index_row(record: Mapping[str, Any], path: str, offset: int, size: int) -> dict[str, Any]:

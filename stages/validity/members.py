@@ -114,5 +114,7 @@ MEMBERS = Members(
         "rooted": IndexColumn("bool", ("physics", "rooted")),
         "stable": IndexColumn("bool", ("physics", "stable")),
         "margin": IndexColumn("float64", ("physics", "margin")),
+        "falls": IndexColumn("bool", ("physics", "falls")),
+        "fall_degrees": IndexColumn("float64", ("physics", "fall_degrees")),
     },
 )

@@ -9,10 +9,15 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
-from stages.package.index import ROWS_PER_GROUP, column_kinds, write_index
+from stages.package.index import ROWS_PER_GROUP, column_kinds, index_row, write_index
 from stages.package.sources import SourceTally
 
-KINDS = column_kinds({"key", "split", "kit", "graph", "producer", "counts", "text", "physics"})
+FIELDS: dict[str, Any] = {
+    **{name: {} for name in ("key", "split", "kit", "graph", "producer", "text")},
+    "counts": {"properties": {name: {} for name in ("parts", "contacts", "cycles")}},
+    "physics": {"properties": {name: {} for name in ("rooted", "stable")}},
+}
+KINDS = column_kinds(FIELDS)
 
 
 class Row(dict[str, Any]):
@@ -55,3 +60,11 @@ def test_the_index_holds_a_group_of_rows_at_a_time() -> None:
     assert read.read(["key"])["key"].to_pylist() == [f"k{number}" for number in range(2 * ROWS_PER_GROUP + 2)]
     ((_, tally),) = tallies.items()
     assert tally.samples == 2 * ROWS_PER_GROUP + 2
+
+
+def test_a_column_is_in_the_index_where_all_records_have_its_value() -> None:
+    assert {"rooted", "stable", "cycles"} <= set(KINDS)
+    assert not {"falls", "margin", "pieces"} & set(KINDS)
+    record = {"key": "k", "counts": {"parts": 3}, "physics": {"falls": True, "fall_degrees": 2.5}}
+    found = {"key": "k", "parts": 3, "falls": True, "fall_degrees": 2.5}
+    assert index_row(record, "data/a.tar", 512, 1024) == found | {"shard": "data/a.tar", "offset": 512, "bytes": 1024}

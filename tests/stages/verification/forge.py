@@ -23,7 +23,7 @@ import numpy as np
 
 from pipeline.paths import file_digest
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes
-from stages.package.index import index_row, tar_bytes, write_index
+from stages.package.index import column_kinds, index_row, tar_bytes, write_index
 from stages.package.layout import INDEX
 from stages.package.manifest import checksums
 from stages.shape.collection.pairs import CONTACTS, pair_bytes, pairs_of
@@ -370,15 +370,16 @@ def reseal(folder: Path) -> None:
     read."""
     try:
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        kinds = column_kinds(json.loads((folder / "schema.json").read_bytes())["properties"])
         rows = []
         for shard in manifest["shards"]:
             path = folder / shard["path"]
             shard["sha256"], shard["bytes"] = file_digest(path), path.stat().st_size
             for key, offset, members in shard_samples(path):
-                rows.append(_row(key, shard, offset, members))
+                rows.append({**dict.fromkeys(kinds), **_row(key, shard, offset, members)})
         index = folder.parent / f"{folder.name}-index" / f"{folder.name}.parquet"
         stream = io.BytesIO()
-        write_index(rows, stream)
+        write_index(rows, kinds, stream)
         index.write_bytes(stream.getvalue())
         manifest["index"] |= {"sha256": file_digest(index), "bytes": index.stat().st_size}
         croissant = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
@@ -429,18 +430,10 @@ def forge(folder: Path, name: str, rng: np.random.Generator) -> str:
 def _row(key: str, shard: Mapping[str, Any], offset: int, members: Members) -> dict[str, Any]:
     record: Any = json.loads(members["json"])
     try:
-        row = index_row(record, shard["path"], offset, tar_bytes(members))
-        return {**dict.fromkeys(_columns()), **row}
+        return index_row(record, shard["path"], offset, tar_bytes(members))
     except (KeyError, TypeError):
         blank = {"key": key, "split": shard["split"], "shard": shard["path"], "offset": offset}
-        return {**dict.fromkeys(_columns()), **blank, "bytes": tar_bytes(members)}
-
-
-def _columns() -> list[str]:
-    from stages.package.index import columns
-
-    fields = {"key", "split", "kit", "graph", "producer", "counts", "unit", "text", "physics"}
-    return [*columns(fields), "shard", "offset", "bytes"]
+        return {**blank, "bytes": tar_bytes(members)}
 
 
 def _shards(folder: Path) -> dict[str, dict[str, Members]]:
