@@ -1,4 +1,7 @@
-"""The language of a mixture: each sample is in the language of the producer that made it."""
+"""The language of a mixture: each sample is in the language of the producer that made it.
+
+The mixture's own samples, which are edited, have a text that holds the edit and the text of what was edited.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,19 @@ from dataclasses import replace
 from itertools import chain, zip_longest
 from typing import Any
 
+import numpy as np
+
 from pipeline.errors import ConfigError
 from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan, Task
+from stages.mixture.contrast import edited, original_record, original_sample
 from stages.mixture.settings import MixtureConfig
 from stages.shape.arrays import IntArray
 from stages.shape.collection.discovery import language_of, languages
 from stages.shape.collection.language import Language, RebuildShape, ShapeDecoder, Source
 from stages.shape.collection.shards import sample_producers
 from stages.shape.sample import Sample
-from stages.shape.shape import Shape
+from stages.shape.shape import Shape, upright
 
 NAME = "mixture"
 
@@ -30,6 +36,9 @@ class MixtureDecoder:
 
     def shape(self, sample: Sample) -> Shape:
         """Return the shape of a sample. Raises what the decoder of its producer raises."""
+        if sample.producer == NAME:
+            original, edit = original_sample(sample)
+            return edited(upright(self.shape(original)), edit)
         return self._decoders[sample.producer].shape(sample)
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
@@ -56,20 +65,32 @@ def joined_sources(decoders: Mapping[str, ShapeDecoder], share_classes: bool) ->
 
 
 def _reads(plan: Plan) -> tuple[str, ...]:
-    read = (language_of(producer).reads(plan) for producer in sample_producers(plan))
+    read = (language_of(producer).reads(plan) for producer in sample_producers(plan) if producer != NAME)
     return tuple(dict.fromkeys(chain.from_iterable(read)))
 
 
 def _decoder(task: Task) -> MixtureDecoder:
-    decoders = {producer: language_of(producer).decoder(task) for producer in task.shard.params["joined"]}
+    makers = [producer for producer in task.shard.params["joined"] if producer != NAME]
+    decoders = {producer: language_of(producer).decoder(task) for producer in makers}
     return MixtureDecoder(decoders, task.config.section(MixtureConfig).classes == "label")
 
 
 def _rebuild(paths: DatasetPaths) -> RebuildShape:
-    def shape(record: Mapping[str, Any], contacts: IntArray) -> Shape:
-        return languages()[record["language"]].rebuild(paths)(record, contacts)
+    known = {name: language.rebuild(paths) for name, language in languages().items() if name != NAME}
+
+    def shape(record: Mapping[str, Any], _: IntArray) -> Shape:
+        original, edit = original_record(record)
+        return edited(known[original["language"]](original, np.empty((0, 2), dtype=np.int32)), edit)
 
     return shape
 
 
-LANGUAGE = Language(name=NAME, reads=_reads, decoder=_decoder, graphs=False, text="", rebuild=_rebuild)
+LANGUAGE = Language(
+    name=NAME,
+    reads=_reads,
+    decoder=_decoder,
+    graphs=False,
+    text="The edit of its partner as JSON, with the partner's own text.",
+    rebuild=_rebuild,
+    coordinates="Those of the sample that was edited.",
+)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -32,6 +32,12 @@ class MixtureConfig(StrictModel):
         True,
         description="Whether a shard holds samples of all producers in random order, or those of one after another's.",
     )
+    contrast: bool = Field(
+        False,
+        description="Whether each sample that stands gets a partner with one part removed, shortened or moved, so that "
+        "it falls, if such a part is found. Both are in one split, and `lineage.contrast` names partner, edit and "
+        "cause. It needs `validity.falls: true`. The dataset of one producer can have it, too.",
+    )
     shards: ShardConfig = Field(
         default_factory=ShardConfig, description="How the samples of a split are divided into shards."
     )
@@ -40,3 +46,9 @@ class MixtureConfig(StrictModel):
     @classmethod
     def _true_turns_it_on(cls, given: Any) -> Any:
         return {"enabled": given} if isinstance(given, bool) else given
+
+    @model_validator(mode="after")
+    def _contrast_needs_a_mixture(self) -> Self:
+        if self.contrast and not self.enabled:
+            raise ValueError("contrast adds samples to a mixture, also to one of a single producer: say enabled: true")
+        return self

@@ -19,12 +19,17 @@ from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.mixture.contrast import NO_CONTRAST, contrast_fields, falling_partner, find_contrast
 from stages.mixture.language import LANGUAGE
 from stages.mixture.settings import MixtureConfig
 from stages.shape.collection.assignment import SPLITS, SplitConfig, planned_collection, write_listings
 from stages.shape.collection.discovery import language_of, producers
+from stages.shape.collection.language import ShapeDecoder
 from stages.shape.collection.shards import PRODUCERS
+from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample, read_samples, write_sample
+from stages.shape.shape import upright
+from stages.validity.settings import ValidityConfig
 
 BYTES_PER_SAMPLE = 70_000
 """Its two clouds, and the sample again."""
@@ -55,8 +60,17 @@ def plan(plan: Plan) -> list[Shard]:
     if summary is None:
         return [*listings, assignment]
     sources = tuple(source for shard in listings for source in shard.inputs[:1])
-    collection = planned_collection(plan, summary["shards"], (*sources, f"mixture/{assignment.name}"))
-    return [*listings, assignment, *collection]
+    pairs = _contrast_params(plan.config, makers)
+    inputs = (*sources, f"mixture/{assignment.name}", *(reads if pairs else ()))
+    collection = planned_collection(plan, summary["shards"], tuple(dict.fromkeys(inputs)))
+    return [*listings, assignment, *(replace(shard, params={**shard.params, **pairs}) for shard in collection)]
+
+
+def _contrast_params(config: Config, makers: Sequence[str]) -> dict[str, Any]:
+    """Return what a shard of the collection needs to make pairs; nothing if the config asks for none."""
+    if not config.section(MixtureConfig).contrast:
+        return {}
+    return {"joined": list(makers), "physics": config.section(ValidityConfig).model_dump(exclude={"falls"})}
 
 
 def _listing_shards(plan: Plan, maker: str) -> list[Shard]:
@@ -221,7 +235,10 @@ def _named_parents(rows: Sequence[Row], kept: Iterable[int]) -> dict[int, list[s
 
 
 def run_collection(task: Task) -> Outcome:
-    """Write the samples of one shard, with the lineage of their producers as a text that all samples have."""
+    """Write the samples of one shard, with the lineage of their producers as a text that all samples have.
+
+    If the config asks for pairs, the partner of a sample follows it.
+    """
     params = task.shard.params
     listing = task.input("mixture", f"{task.config.name}-assignment.{params['split']}-{params['number']:06d}.jsonl")
     rows = [json.loads(line) for line in listing.read_text(encoding="utf-8").splitlines()]
@@ -231,12 +248,40 @@ def run_collection(task: Task) -> Outcome:
         for sample in read_samples(task.input(producer, f"{shard}.tar")):
             if (producer, shard, sample.key) in wanted:
                 samples[producer, sample.key] = sample
-    counts: Counter[str] = Counter()
+    counts, pairs = Counter[str](), Counter[str]()
+    decoder = LANGUAGE.decoder(task) if "physics" in params else None
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for row in rows:
-            write_sample(writer, _mixed(samples[row["producer"], row["key"]], row["mixed_key"], row["parents"]))
-            counts[row["producer"]] += 1
-    return Outcome(writer.samples, {"split": params["split"], "samples": writer.samples, "producers": dict(counts)})
+            mixed = [_mixed(samples[row["producer"], row["key"]], row["mixed_key"], row["parents"])]
+            if decoder is not None:
+                mixed = _with_partner(task, decoder, mixed[0], pairs)
+            for sample in mixed:
+                write_sample(writer, sample)
+                counts[sample.producer] += 1
+            task.progress(writer.samples, len(rows))
+    made = {"pairs": dict(pairs)} if decoder is not None else {}
+    summary = {"split": params["split"], "samples": writer.samples, "producers": dict(counts), **made}
+    return Outcome(writer.samples, summary)
+
+
+def _with_partner(task: Task, decoder: ShapeDecoder, sample: Sample, pairs: Counter[str]) -> list[Sample]:
+    """Return a sample, and its partner that falls if there is one, with the field `contrast` of their lineages.
+
+    pairs: number of pairs by edit and cause, which is counted up
+    """
+    physics = PhysicsConfig.model_validate(task.shard.params["physics"])
+    shape = upright(decoder.shape(sample))
+    contrast = find_contrast(shape, physics, task.rng("contrast", sample.key))
+    if contrast is None:
+        return [replace(sample, lineage={**sample.lineage, "contrast": dict(NO_CONTRAST)})]
+    pairs[f"a part is {contrast.edit.kind}: {contrast.cause}"] += 1
+    falling = falling_partner(sample, shape, language_of(sample.producer).name, contrast)
+    fields = contrast_fields(shape, contrast, (sample.key, falling.key))
+    lineage = {"method": "contrast", "parents": [sample.key], "details": "{}", "contrast": fields[1]}
+    return [
+        replace(sample, lineage={**sample.lineage, "contrast": fields[0]}),
+        replace(falling, producer=LANGUAGE.name, lineage=lineage),
+    ]
 
 
 def _mixed(sample: Sample, key: str, parents: Sequence[str]) -> Sample:
@@ -259,11 +304,26 @@ def report(plan: Plan) -> Sequence[str]:
         for source, counts in summary["samples"].items()
     ]
     out = ", ".join(f"{count:,} {reason}" for reason, count in sorted(summary["left_out"].items()))
-    return [*lines, f"left out: {out or 'none'}"]
+    lines.append(f"left out: {out or 'none'}")
+    if plan.config.section(MixtureConfig).contrast:
+        made = (plan.summary("mixture", shard) or {} for shard in plan.shards("mixture"))
+        lines.append(f"pairs: {sum(sum(of_shard.get('pairs', {}).values()) for of_shard in made):,}")
+    return lines
+
+
+def check_contrast(config: Config) -> None:
+    """Raise ConfigError for a config that asks for pairs whose records would not say which of the two falls."""
+    if config.section(MixtureConfig).contrast and not config.section(ValidityConfig).falls:
+        raise ConfigError(
+            f"{config.path}: mixture.contrast needs records that say what falls: add validity.falls: true"
+        )
 
 
 def requested_samples(config: Config) -> Sequence[int]:
-    """Return the samples of each shard if every producer makes what is asked of it and none is left out."""
+    """Return the samples of each shard if every producer makes what is asked of it and none is left out.
+
+    With pairs, this is as if each sample got a partner.
+    """
     from pipeline.registry import find_stages
 
     section = config.section(MixtureConfig)
@@ -272,7 +332,7 @@ def requested_samples(config: Config) -> Sequence[int]:
     makers = [stage for name, stage in find_stages().items() if name in producers() and name != "mixture"]
     total = sum(count for maker in makers for count in maker.requested_samples(config))
     sizes: list[int] = SplitConfig(**section.shards.model_dump()).shard_sizes(total)
-    return sizes
+    return [size * (1 + section.contrast) for size in sizes]
 
 
 def trial_config(config: Config) -> MixtureConfig:
@@ -299,4 +359,6 @@ STAGE = Stage(
     report=report,
     requested_samples=requested_samples,
     trial_config=trial_config,
+    check=check_contrast,
+    sections=("validity",),
 )

@@ -24,6 +24,8 @@ RECORD_COLUMNS = {
     "types": IndexColumn("int32", ("counts", "types")),
     "unit": IndexColumn("string", ("unit",)),
     "text": IndexColumn("string", ("text",)),
+    "contrast": IndexColumn("string", ("lineage", "contrast", "role")),
+    "partner": IndexColumn("string", ("lineage", "contrast", "partner")),
 }
 """Columns from a record, besides those that stages declare."""
 

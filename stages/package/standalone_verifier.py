@@ -193,14 +193,62 @@ def check_shard(job: ShardJob) -> DatasetFindings:
     """Return the findings of a shard, whatever its files hold."""
     findings = DatasetFindings()
     rng = np.random.default_rng(job.seed)
+    before: dict[str, Any] = {}
     for place, (key, members) in enumerate(read_shard(job.folder / job.path, job.path, findings)):
         try:
             for text in sample_faults(job, key, members, findings, rng if place in job.places else None):
                 findings.faults.append(f"{job.path}: {key}: {text}")
+            record = json.loads(members["json"])
+            findings.faults += (f"{job.path}: {key}: {text}" for text in contrast_faults(before, record))
+            before = record
         except Exception as error:
             findings.faults.append(f"{job.path}: {key}: cannot be read: {type(error).__name__}: {error}")
         findings.checked.update(["samples", job.path])
+    findings.faults += (f"{job.path}: {text}" for text in contrast_faults(before, {}))
     return findings
+
+
+def contrast_faults(before: dict[str, Any], record: dict[str, Any]) -> Iterator[str]:
+    """Yield what is wrong with the pair that a sample makes with the one before it, or that either lacks.
+
+    before: record of the sample before; {} for the first
+    record: record of the sample; {} after the last
+    """
+    first, second = (of.get("lineage", {}).get("contrast", {"role": "alone"}) for of in (before, record))
+    if (first["role"] == "stands") != (second["role"] == "falls"):
+        yield f"{before.get('key', 'nothing')} and {record.get('key', 'nothing')}: one is in a pair without the other"
+    if second["role"] != "falls" or first["role"] != "stands":
+        return
+    if (first["partner"], second["partner"]) != (record["key"], before["key"]):
+        yield "it and the sample before it do not name each other as partners"
+    if any(first[fact] != second[fact] for fact in ("edit", "part_name", "cause")):
+        yield "its partner names another edit or cause"
+    if before["physics"]["falls"] or not record["physics"]["falls"]:
+        yield "of it and its partner, not exactly the edited one falls"
+    if (second["cause"] == "unsupported") == record["physics"]["rooted"]:
+        yield f"it falls because it is {second['cause']}; rooted: {record['physics']['rooted']}"
+    if second["gives_way"] != record["physics"]["fallen"]:
+        yield f"part {second['gives_way']} gives way, and part {record['physics']['fallen']} is the first to fall"
+    poses, edited = ({part["name"]: np.array(part["pose"]) for part in of["parts"]} for of in (before, record))
+    name = second["part_name"]
+    places = [list(of).index(name) if name in of else -1 for of in (poses, edited)]
+    if places != [first["part"], second["part"]] or places[0] < 0:
+        yield f"{name} is not the edited part that it and its partner name"
+        return
+    ways = [of["parts"][facts["gives_way"]]["name"] for of, facts in ((before, first), (record, second))]
+    if ways[0] != ways[1]:
+        yield f"{ways[1]} gives way, and in its partner {ways[0]}"
+    others = [{part: pose for part, pose in of.items() if part != name} for of in (poses, edited)]
+    if list(others[0]) != list(others[1]) or any((others[0][part] != others[1][part]).any() for part in others[0]):
+        yield f"it differs from its partner in more than {name}"
+    if second["edit"] == "removed":
+        is_so = name not in edited
+    else:
+        change = edited[name] @ np.linalg.inv(poses[name]) if name in edited else np.eye(4)
+        is_turned = np.abs(change[:3, :3] - np.eye(3)).max() > 1e-6
+        is_so = name in edited and is_turned == (second["edit"] == "shortened") and np.abs(change - np.eye(4)).max() > 0
+    if not is_so:
+        yield f"{name} is not {second['edit']}"
 
 
 def read_shard(path: Path, name: str, findings: DatasetFindings) -> Iterator[tuple[str, dict[str, bytes]]]:
@@ -362,7 +410,7 @@ def geometry_faults(
         # trimesh makes the primitives of a part with several materials nodes below its node
         below = scene.graph.transforms.children.get(name, []) if geometry is None else [name]
         primitives = [scene.geometry[scene.graph.get(node)[1]].triangles for node in below]
-        if "pose" in part and np.abs(matrix - np.array(part["pose"])).max() > POSE_TOLERANCE_SHARE * max(diagonal, 1):
+        if "pose" in part and not is_placed_by(matrix, np.array(part["pose"]), POSE_TOLERANCE_SHARE * max(diagonal, 1)):
             yield f"{name}: its pose in the GLB is not that of the record"
         triangles.append(np.concatenate(primitives) @ matrix[:3, :3].T + matrix[:3, 3])
     if len(extras) != len(record["parts"]):
@@ -381,6 +429,19 @@ def geometry_faults(
         yield from rooted_faults(record, triangles, arrays["joints.npy"], diagonal)
     for index, camera in enumerate(record.get("sketches", ())):
         yield from drawing_faults(f"sketch{index}.png", members[f"sketch{index}.png"], camera, corners)
+
+
+def is_placed_by(matrix: np.ndarray, pose: np.ndarray, tolerance: float) -> bool:
+    """Return whether a node's matrix is a record's pose, up to a stretch, which the GLB has in the mesh of the part.
+
+    A stretch is a symmetric positive map before the matrix, which is rigid.
+    """
+    if np.abs(matrix - pose).max() <= tolerance:
+        return True
+    stretch = np.linalg.inv(matrix)[:3, :3] @ pose[:3, :3]
+    is_symmetric = np.abs(stretch - stretch.T).max() <= POSE_TOLERANCE_SHARE
+    is_stretch = is_symmetric and np.linalg.eigvalsh(stretch).min() > POSE_TOLERANCE_SHARE
+    return bool(is_stretch and np.abs(matrix[:3, 3] - pose[:3, 3]).max() <= tolerance)
 
 
 def point_faults(

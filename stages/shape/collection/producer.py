@@ -41,6 +41,7 @@ class Producer:
 
     language: name of the language of its samples
     joins: whether its samples are those of all other producers that a config asks for
+    adds_samples: of one that joins, whether a config asks for samples of its own among them
     keys: config keys that ask for them, for messages
     is_requested: whether a config asks for them
     sentence: how its samples are made, for the card of a config
@@ -63,6 +64,7 @@ class Producer:
     splits: Callable[[Config], str]
     graphs_share_split: Callable[[Config], bool]
     joins: bool = False
+    adds_samples: Callable[[Config], bool] = lambda _: False
     limits: Callable[[Config], Sequence[str]] = _no_limits
     lineage: Callable[[Config], Mapping[str, RecordField]] = _no_lineage
     origins: Callable[[Plan], Sequence[Origin]] = _no_origins

@@ -50,11 +50,12 @@ def planned_producer(plan: Plan) -> str | None:
 
 
 def sample_producers(plan: Plan) -> tuple[str, ...]:
-    """Return the stages that made the samples: one, or all whose samples are joined."""
+    """Return the stages that made the samples: one, or all whose samples are joined, last the one that adds some."""
     producer = planned_producer(plan)
     if producer is None or not producers()[producer].joins:
         return () if producer is None else (producer,)
-    return tuple(name for name, declared in producers().items() if not declared.joins and plan.shards(name))
+    makers = [name for name, declared in producers().items() if not declared.joins and plan.shards(name)]
+    return (*makers, producer) if producers()[producer].adds_samples(plan.config) else tuple(makers)
 
 
 def check_producers(config: Config) -> None:

@@ -7,16 +7,19 @@ import re
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet
 import pytest
 import yaml
 
 from pipeline.paths import DatasetPaths
 from pipeline.shards import bytes_array, read_shard
-from stages.package.standalone_verifier import DatasetFindings, ShardJob, record_faults
+from stages.mixture.contrast import TIPS_OVER, UNSUPPORTED
+from stages.package.standalone_verifier import DatasetFindings, ShardJob, contrast_faults, record_faults
 from stages.shape.collection.classes import labels_of_kits
 from stages.shape.collection.discovery import languages
 from stages.verification.samples import read_packaged, sample_faults
@@ -26,7 +29,8 @@ from tests.stated import stated
 STOOL, RACK = "tests.stages.programs.stool", "tests.stages.programs.rack"
 FORT = stated({"name": "fort", "shapes": ["datasets/exemplars/playground/fort.glb"]})
 SECTIONS: dict[str, Any] = {
-    "mixture": {"enabled": True, "shards": {"shards": 2}, "max_samples": {"furniture": 9}},
+    "mixture": {"enabled": True, "shards": {"shards": 2}, "max_samples": {"furniture": 9}, "contrast": True},
+    "validity": {"falls": True},
     "exemplars": {"kits": [FORT]},
     "variations": {"samples_per_kit": 6, "splits": {"by": "graph", "shards": 1, "val": 0.2, "test": 0.2}},
     "proportions": {"samples_per_kit": 6, "parallel_searches": 1, "splits": {"shards": 1, "val": 0.2, "test": 0.2}},
@@ -73,7 +77,7 @@ def test_samples_of_all_producers_are_mixed_and_counted(made: tuple[Path, tuple[
     assert counts == manifest["producers"]
     assert counts["programs"] == 16
     assert 0 < counts["shapeassembly"] <= 9
-    assert set(counts) == {"variations", "proportions", "programs", "shapeassembly"}
+    assert set(counts) == {"variations", "proportions", "programs", "shapeassembly", "mixture"}
     train = [set(shard["kits"]) for shard in manifest["shards"] if shard["split"] == "train"]
     assert all(len(kits) > 2 for kits in train)
     card = (made[0] / "mix" / "README.md").read_text(encoding="utf-8")
@@ -81,7 +85,7 @@ def test_samples_of_all_producers_are_mixed_and_counted(made: tuple[Path, tuple[
     assert code == 0
     for (producer, kit), count in Counter((record["producer"], record["kit"]) for record in records).items():
         assert re.search(rf"\| {re.escape(kit)} by {producer}[^|]*\| {count} \|", card)
-        assert f"{producer}: {kit}: {count} samples" in status
+        assert producer == "mixture" or f"{producer}: {kit}: {count} samples" in status
 
 
 def test_a_part_has_the_class_of_its_dataset_and_of_its_kit(made: tuple[Path, tuple[str, ...]]) -> None:
@@ -117,6 +121,59 @@ def test_both_verifiers_find_no_fault(made: tuple[Path, tuple[str, ...]]) -> Non
     assert done.returncode == 0, done.stdout
 
 
+def test_pairs_are_in_one_split_and_the_index_names_them(made: tuple[Path, tuple[str, ...]]) -> None:
+    records = {record["key"]: record for record, _ in records_of(made[0])}
+    rows = pyarrow.parquet.read_table(made[0] / "mix-index/mix.parquet").to_pylist()
+    assert {row["key"] for row in rows} == set(records)
+    pairs = 0
+    for row in rows:
+        record = records[row["key"]]
+        contrast = record["lineage"]["contrast"]
+        assert (row["contrast"], row["partner"]) == (contrast["role"], contrast["partner"])
+        assert contrast["role"] == "alone" or row["falls"] == (contrast["role"] == "falls")
+        if contrast["role"] == "falls":
+            partner = records[contrast["partner"]]
+            assert partner["split"] == record["split"]
+            assert record["lineage"]["parents"] == [partner["key"]]
+            assert (record["producer"], record["lineage"]["method"]) == ("mixture", "contrast")
+            pairs += 1
+    assert pairs >= 20
+    card = (made[0] / "mix" / "README.md").read_text(encoding="utf-8")
+    assert sum(int(line.split("|")[2]) for line in card.splitlines() if line.startswith("| a part is ")) == pairs
+
+
+def test_the_standalone_verifier_sees_what_is_no_pair(made: tuple[Path, tuple[str, ...]]) -> None:
+    records = [record for record, _ in records_of(made[0])]
+    place = next(
+        place
+        for place, record in enumerate(records)
+        if record["lineage"]["contrast"]["role"] == "stands" and record["lineage"]["contrast"]["edit"] != "removed"
+    )
+    first, second = records[place : place + 2]
+    assert list(contrast_faults(first, second)) == []
+    assert any("without the other" in fault for fault in contrast_faults(first, {}))
+    assert any("without the other" in fault for fault in contrast_faults({}, second))
+
+    def forged(change: Callable[[dict[str, Any], dict[str, Any]], None]) -> list[str]:
+        pair = json.loads(json.dumps([first, second]))
+        change(*pair)
+        return list(contrast_faults(*pair))
+
+    other = next(part for part in range(len(first["parts"])) if part != first["lineage"]["contrast"]["part"])
+    turned = {UNSUPPORTED: TIPS_OVER, TIPS_OVER: UNSUPPORTED}
+    own = first["lineage"]["contrast"]
+    assert forged(lambda a, b: b["physics"].update(falls=False))
+    assert forged(lambda a, b: a["physics"].update(falls=True))
+    assert forged(lambda a, b: a["lineage"]["contrast"].update(partner="other"))
+    assert forged(lambda a, b: [of["lineage"]["contrast"].update(edit="removed") for of in (a, b)])
+    assert forged(lambda a, b: [of["lineage"]["contrast"].update(cause=turned[own["cause"]]) for of in (a, b)])
+    assert forged(lambda a, b: b["physics"].update(fallen=b["physics"]["fallen"] + 1))
+    assert forged(lambda a, b: b["parts"][other]["pose"][0].__setitem__(3, 7.0))
+    assert forged(
+        lambda a, b: b["parts"][b["lineage"]["contrast"]["part"]].update(pose=a["parts"][own["part"]]["pose"])
+    )
+
+
 def test_both_verifiers_see_a_class_that_is_not_that_of_the_kit(made: tuple[Path, tuple[str, ...]]) -> None:
     folder = made[0] / "mix"
     rows = json.loads((folder / "classes.json").read_text(encoding="utf-8"))
@@ -137,7 +194,7 @@ def test_both_verifiers_see_a_class_that_is_not_that_of_the_kit(made: tuple[Path
             sample = read_packaged(said["key"], said, members, rebuild, sections, labels_of_kits(rows))
             assert any("classes.json" in fault for fault in alone) == wrong
             assert any("in its kit" in fault for fault in sample_faults(sample)) == wrong
-    assert seen == {"variations", "proportions", "programs", "shapeassembly"}
+    assert seen == {"variations", "proportions", "programs", "shapeassembly", "mixture"}
 
 
 def test_several_producers_without_a_mixture_are_refused(tmp_path: Path) -> None:

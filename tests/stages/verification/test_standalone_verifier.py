@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 
 from stages.package import standalone_verifier
-from stages.package.standalone_verifier import drawing_faults, grey_png, verify
+from stages.package.standalone_verifier import drawing_faults, grey_png, is_placed_by, verify
 from tests.stages.verification.forge import FOLDER_FORGERIES, FORGERIES, copy_dataset, forge
 
 LEFT_OPEN = {
@@ -125,3 +126,15 @@ def test_png_lines_are_read_as_another_library_reads_them(level: int) -> None:
     pixels = np.uint8((x + 3 * y) % 256) if level == 2 else images[level]
     Image.fromarray(pixels).save(stream, "png")
     assert np.array_equal(grey_png(stream.getvalue()), pixels)
+
+
+def test_a_stretched_part_is_placed_by_its_node_and_a_turned_one_is_not() -> None:
+    turn = trimesh.transformations.rotation_matrix(0.3, [1, 2, 3])
+    turn[:3, 3] = 1, 2, 3
+    longer = np.diag([1.0, 0.5, 1.0, 1.0])
+    assert is_placed_by(turn, turn @ longer, 1e-5)
+    assert not is_placed_by(turn, longer @ turn, 1e-5)
+    assert not is_placed_by(turn, turn @ trimesh.transformations.rotation_matrix(np.pi, [0, 0, 1]), 1e-5)
+    moved = turn.copy()
+    moved[0, 3] += 0.1
+    assert not is_placed_by(turn, moved @ longer, 1e-5)
