@@ -49,19 +49,19 @@ def short_config(config: Config, stages: Mapping[str, Stage]) -> Config:
 
 
 def run_trial(config: Config, stages: Mapping[str, Stage], paths: DatasetPaths) -> dict[str, Costs]:
-    """Measure the cost of each stage of a short config, in one worker each, below `paths`.
+    """Measure the cost of each stage of a short config below `paths`, in one worker, which stays as that of a run does.
 
     Makes the first shard of a stage twice: the difference is the warm-up. Raises ConfigError where a shard fails.
     """
     inventory = Inventory(config, stages, paths)
     costs: dict[str, Costs] = {}
-    for name in stages:
-        paths.stage(name).make()
-        workers = Workers(1, paths.worker_output)
-        try:
+    workers = Workers(1, paths.worker_output)
+    try:
+        for name in stages:
+            paths.stage(name).make()
             costs[name] = _measured(inventory, inventory.stage(name), workers)
-        finally:
-            workers.stop(kill=True)
+    finally:
+        workers.stop(kill=True)
     return costs
 
 
