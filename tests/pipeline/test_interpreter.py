@@ -41,7 +41,9 @@ def test_help_plan_and_run_work_in_every_locale(tmp_path: Path, variables: dict[
         "title": "Stühle → 椅子",
         "license": "MIT",
         "shapeassembly": {"programs": programs, "splits": {"val": 0.0, "test": 0.0, "shards": 1}},
-        "sketches": {"renderer": "raster"},
+        "points": {"uniform": 64, "farthest": 16, "pool": 1000},
+        "sketches": {"renderer": "raster", "size": 64},
+        "package": {"previewed": 1},
     }
     config.write_text(yaml.safe_dump(sections, allow_unicode=True), encoding="utf-8")
     options = ["--config", str(config), "--out", str(tmp_path / "größe")]
