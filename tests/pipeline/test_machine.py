@@ -93,8 +93,8 @@ def test_doctor_finds_a_library_that_does_not_load_and_names_the_package(tmp_pat
     (tmp_path / "fcl.py").write_text(
         "raise ImportError('libGL.so.1: cannot open shared object file')\n", encoding="utf-8"
     )
-    (tmp_path / "igraph.py").write_text("import os\nos.abort()\n", encoding="utf-8")
-    (tmp_path / "pymeshlab.py").touch()
+    (tmp_path / "open3d.py").write_text("import os\nos.abort()\n", encoding="utf-8")
+    (tmp_path / "torch.py").touch()
     done = subprocess.run(
         [sys.executable, "-c", "from pipeline.cli import main; main()", "doctor", "--out", str(tmp_path / "out")],
         cwd=ROOT,
@@ -107,9 +107,9 @@ def test_doctor_finds_a_library_that_does_not_load_and_names_the_package(tmp_pat
     assert done.returncode == 1
     at = next(index for index, line in enumerate(lines) if line.startswith("python-fcl FAILED"))
     assert lines[at + 1] == "remedy: apt-get install libgl1"
-    assert "igraph FAILED killed by signal 6" in lines
-    at = next(index for index, line in enumerate(lines) if line.startswith("pymeshlab FAILED"))
-    assert f"imported from {tmp_path / 'pymeshlab.py'}" in lines[at]
+    assert "open3d FAILED killed by signal 6" in lines
+    at = next(index for index, line in enumerate(lines) if line.startswith("torch FAILED"))
+    assert f"imported from {tmp_path / 'torch.py'}" in lines[at]
     assert lines[at + 1].startswith("remedy: unset PYTHONPATH")
     assert any(line.startswith("numpy ok") for line in lines)
     assert any(line.startswith("draw: raster ok") for line in lines)
