@@ -24,15 +24,15 @@ WORK = Path(".work/toys")
 
 
 class Cluster:
-    """A scheduler and two workers, as `make cluster WORKERS=2` starts them."""
+    """A scheduler and its workers, as `make cluster WORKERS=2` starts them."""
 
-    def __init__(self) -> None:
+    def __init__(self, workers: int = 2) -> None:
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             port = free.getsockname()[1]
         self.address = f"tcp://127.0.0.1:{port}"
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "pipeline", "cluster", "--workers", "2", "--port", str(port)],
+            [sys.executable, "-m", "pipeline", "cluster", "--workers", str(workers), "--port", str(port)],
             cwd=ROOT,
             stdout=subprocess.PIPE,
         )
@@ -104,7 +104,7 @@ def test_lost_scheduler_is_reported_and_the_run_continues_here(
     tmp_path: Path, write_config: WriteConfig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("pipeline.cluster._ANSWER_SECONDS", 3.0)
-    out, mine = tmp_path / "out", Cluster()
+    out, mine = tmp_path / "out", Cluster(workers=1)
     config = write_config(flour={"seconds": 0.1})
     run_toy_stages(config, out, "salt", "grain")
     with subprocess.Popen(
