@@ -9,7 +9,7 @@ import numpy as np
 from stages.shape.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 from stages.symmetry.surface.grid import SurfaceGrid
-from stages.symmetry.surface.lattice import cell_keys
+from stages.symmetry.surface.lattice import BITS_PER_AXIS, cell_keys
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +66,13 @@ def items_moved_into(grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> np
     width of a cell.
     """
     centres = transform_points(pose, grid.centres(cells))
-    home = (centres - grid.origin) / grid.cell_size
-    low, high = np.floor(home.min(axis=0)) - 1, np.floor(home.max(axis=0)) + 1
-    items = items_in(grid, np.flatnonzero(((grid.cells >= low) & (grid.cells <= high)).all(axis=1)))
+    home = np.ascontiguousarray(((centres - grid.origin) / grid.cell_size).T)
+    low, high = np.floor(home.min(axis=1)) - 1, np.floor(home.max(axis=1)) + 1
+    first, last = np.searchsorted(
+        grid.keys, [max(int(low[0]), 0) << 2 * BITS_PER_AXIS, (int(high[0]) + 1) << 2 * BITS_PER_AXIS]
+    )
+    y, z = grid.cells[first:last, 1], grid.cells[first:last, 2]
+    in_box = (y >= low[1]) & (y <= high[1]) & (z >= low[2]) & (z <= high[2])
+    items = items_in(grid, first + np.flatnonzero(in_box))
     inside: np.ndarray = items[is_among(grid.keys[cells], keys_at(grid, invert(pose), grid.points[items]))]
     return inside

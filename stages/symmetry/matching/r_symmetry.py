@@ -9,7 +9,7 @@ from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert
 from stages.symmetry.matching.cell_lookup import keys_at
 from stages.symmetry.surface.grid import SurfaceGrid
-from stages.symmetry.surface.lattice import cell_index, cell_of
+from stages.symmetry.surface.lattice import cell_index, cell_key, cell_of, cells_around, first_not_below_near
 
 ROUNDING_CELLS = 1e-9
 MAX_HOLE_CELLS = 50
@@ -131,6 +131,7 @@ def _matched(queried, transform, items):
     matched = np.zeros(len(queried), dtype=np.bool_)
     at, along = np.empty(3), np.empty(3)
     low, high = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
+    n = 0
     for place in range(len(queried)):
         item = queried[place]
         for d in range(3):
@@ -139,13 +140,15 @@ def _matched(queried, transform, items):
             for e in range(3):
                 at[d] += transform[d, e] * points[item, e]
                 along[d] += transform[d, e] * directions[item, e]
-        cell_of(at - tolerance, origin, size, low)
-        cell_of(at + tolerance, origin, size, high)
+        cells_around(at, tolerance, origin, size, low, high)
         for i in range(low[0], high[0] + 1):
             for j in range(low[1], high[1] + 1):
                 for k in range(low[2], high[2] + 1):
-                    n = cell_index(keys, i, j, k)
-                    if n < 0 or matched[place]:
+                    if matched[place]:
+                        break
+                    key = cell_key(i, j, k)
+                    n = first_not_below_near(keys, key, n)  # neighbors mostly remain neighbors
+                    if n == len(keys) or keys[n] != key:
                         continue
                     for other in range(starts[n], starts[n + 1]):
                         if is_line[other] != is_line[item]:
@@ -220,18 +223,19 @@ def _filled(symmetric, differs, neighbours, max_cells, max_differing):
 def _clear_cells_at(cells, points, transform, items):
     """Set `cells`, bool (n,), to False where a transform takes points."""
     at, low, high = np.empty(3), np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
+    n, keys = 0, items.keys
     for place in range(len(points)):
         for d in range(3):
             at[d] = transform[d, 3]
             for e in range(3):
                 at[d] += transform[d, e] * points[place, e]
-        cell_of(at - items.tolerance, items.origin, items.size, low)
-        cell_of(at + items.tolerance, items.origin, items.size, high)
+        cells_around(at, items.tolerance, items.origin, items.size, low, high)
         for i in range(low[0], high[0] + 1):
             for j in range(low[1], high[1] + 1):
                 for k in range(low[2], high[2] + 1):
-                    n = cell_index(items.keys, i, j, k)
-                    if n >= 0:
+                    key = cell_key(i, j, k)
+                    n = first_not_below_near(keys, key, n)
+                    if n < len(keys) and keys[n] == key:
                         cells[n] = False
 
 

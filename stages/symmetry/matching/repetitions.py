@@ -130,11 +130,13 @@ def _promised_area(grid: SurfaceGrid, cells: IntArray, ahead: FloatArray | None,
     items = _sample(grid, items_in(grid, cells))
     inside = _inside(grid, cells)
     points, keys = grid.points[_evenly(items_in(grid, inside))], grid.keys[inside]
-    poses: list[FloatArray] = [np.eye(4)]
+    inverses: list[FloatArray] = [np.eye(4)]
     for pose in [*_row(grid, grid.points[items], ahead), *transforms]:
-        if matched_items(grid, pose, items).mean() > SURE_COPY_SHARE and not _overlaps(grid, keys, points, pose, poses):
-            poses.append(pose)
-    return float((len(poses) - 1) * grid.area[cells].sum())
+        if _share(matched_items(grid, pose, items)) > SURE_COPY_SHARE and not _overlaps(
+            grid, keys, points, pose, inverses
+        ):
+            inverses.append(invert(pose))
+    return float((len(inverses) - 1) * grid.area[cells].sum())
 
 
 def _continues(grid: SurfaceGrid, cells: IntArray, copy_poses: Sequence[FloatArray], ahead: FloatArray | None) -> bool:
@@ -175,7 +177,7 @@ def _repetition(
 
     None for a region without copies, and for copies between which nothing could be put.
     """
-    kept, poses = np.ones(len(cells), dtype=bool), [np.eye(4)]
+    kept, poses, inverses = np.ones(len(cells), dtype=bool), [np.eye(4)], [np.eye(4)]
     inside = _inside(grid, cells)
     points, keys = grid.points[_evenly(items_in(grid, inside))], grid.keys[inside]
     copies = sorted(_copies(grid, cells, ahead, transforms), key=lambda copy: -grid.area[cells[copy[1]]].sum())
@@ -183,10 +185,11 @@ def _repetition(
         with_copy = grid.area[cells[kept & same]].sum() * len(poses)
         if with_copy <= grid.area[cells[kept]].sum() * (len(poses) - 1):
             continue
-        if _overlaps(grid, keys, points, pose, poses):
+        if _overlaps(grid, keys, points, pose, inverses):
             continue
         kept &= same
         poses.append(pose)
+        inverses.append(invert(pose))
     regions = [cells[kept][region] for region in _regions_among(grid, cells[kept])]
     whole = [region for region in regions if _is_part_sized(grid, region)]
     if len(poses) < 2 or not whole:
@@ -219,7 +222,7 @@ def _copies(
         if len(tried) and np.abs(tried - at).max(axis=1).min() < grid.cell_size:
             continue
         tried = np.concatenate([tried, at])
-        if matched_items(grid, pose, sample).mean() <= MIN_COPY_SHARE:
+        if _share(matched_items(grid, pose, sample)) <= MIN_COPY_SHARE:
             continue
         same = _same_cells(grid, cells, items, pose)
         if same is None:
@@ -233,7 +236,7 @@ def _copies(
 
 def _row(grid: SurfaceGrid, points: FloatArray, ahead: FloatArray | None) -> Iterator[FloatArray]:
     """Yield the powers (4, 4) of a transform and of its inverse that keep points (n, 3) in the model's box."""
-    low, high = grid.points.min(axis=0) - grid.cell_size, grid.points.max(axis=0) + grid.cell_size
+    low, high = grid.bounds[0] - grid.cell_size, grid.bounds[1] + grid.cell_size
     for step in () if ahead is None else (ahead, invert(ahead)):
         pose = step
         for _ in range(MAX_COPIES // 2):
@@ -245,11 +248,18 @@ def _row(grid: SurfaceGrid, points: FloatArray, ahead: FloatArray | None) -> Ite
 
 
 def _overlaps(
-    grid: SurfaceGrid, keys: np.ndarray, points: FloatArray, pose: FloatArray, poses: list[FloatArray]
+    grid: SurfaceGrid, keys: np.ndarray, points: FloatArray, pose: FloatArray, inverses: list[FloatArray]
 ) -> bool:
-    """Return whether points (n, 3) of a region at `pose` lie in its cells, with these keys, at one of `poses`."""
-    inside = (is_among(keys, keys_at(grid, invert(other) @ pose, points)).mean() for other in poses)
-    return any(share > MAX_OVERLAP_SHARE for share in inside)
+    """Return whether points (n, 3) of a region at `pose` lie in its cells, with these keys, at another pose.
+
+    inverses: float64 (4, 4) each, of the other poses
+    """
+    inside = (is_among(keys, keys_at(grid, back @ pose, points)) for back in inverses)
+    return any(_share(among) > MAX_OVERLAP_SHARE for among in inside)
+
+
+def _share(chosen: BoolArray) -> float:
+    return np.count_nonzero(chosen) / len(chosen)
 
 
 def _same_cells(grid: SurfaceGrid, cells: IntArray, items: np.ndarray, pose: FloatArray) -> BoolArray | None:

@@ -107,6 +107,11 @@ class SurfaceGrid:
             self.same_angle,
         )
 
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """Lowest and highest corner of the box around the points of all items, float64 (2, 3)."""
+        return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
+
     @property
     def slack(self) -> float:
         """Allowed difference of shares on equal surfaces: 0 for exact ones."""

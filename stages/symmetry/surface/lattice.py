@@ -5,8 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.arrays import BoolArray
-
 BITS_PER_AXIS = 21
 """Bits of a packed key for the position along one axis."""
 
@@ -25,9 +23,9 @@ def unpack(keys: np.ndarray) -> np.ndarray:
 
 def cell_keys(cells: np.ndarray) -> np.ndarray:
     """Return packed keys of any cells int64 (n, 3); -1 for cells with a negative index."""
-    keys = np.full(len(cells), -1, dtype=np.int64)
-    valid: BoolArray = cells.min(axis=1, initial=0) >= 0
-    keys[valid] = pack(cells[valid])
+    negative = (cells[:, 0] | cells[:, 1] | cells[:, 2]) < 0  # the sign is the highest bit
+    keys = pack(cells)
+    keys[negative] = -1
     return keys
 
 
@@ -39,19 +37,51 @@ def cell_of(point, origin, size, cell):
 
 
 @numba.njit(cache=True)
+def cells_around(point, reach, origin, size, low, high):
+    """Write the lowest and highest lattice cells within `reach` of a point, along each axis, into `low` and `high`."""
+    for axis in range(3):
+        low[axis] = int(np.floor((point[axis] - reach - origin[axis]) / size))
+        high[axis] = int(np.floor((point[axis] + reach - origin[axis]) / size))
+
+
+@numba.njit(cache=True)
 def cell_index(keys, i, j, k):
     """Return the index of cell (i, j, k) among ascending `keys`, or -1 if the cell is empty."""
-    if min(i, j, k) < 0:
-        return -1
-    key = (i << 2 * BITS_PER_AXIS) | (j << BITS_PER_AXIS) | k
-    low, high = 0, len(keys)
+    place = first_not_below(keys, cell_key(i, j, k), 0, len(keys))
+    return place if place < len(keys) and keys[place] == cell_key(i, j, k) else -1
+
+
+@numba.njit(cache=True)
+def cell_key(i, j, k):
+    """Return the packed key of cell (i, j, k); -1 for a cell with a negative index."""
+    return -1 if min(i, j, k) < 0 else (i << 2 * BITS_PER_AXIS) | (j << BITS_PER_AXIS) | k
+
+
+@numba.njit(cache=True)
+def first_not_below(keys, key, low, high):
+    """Return the first index from `low` to `high` at which ascending `keys` are at least `key`; `high` for none."""
     while low < high:
         middle = (low + high) // 2
         if keys[middle] < key:
             low = middle + 1
         else:
             high = middle
-    return low if low < len(keys) and keys[low] == key else -1
+    return low
+
+
+@numba.njit(cache=True)
+def first_not_below_near(keys, key, near):
+    """Return the first index at which ascending `keys` are at least `key`, len(keys) for none; fast close to `near`."""
+    low, high, step = near, near, 1
+    if near < len(keys) and keys[near] < key:
+        while high < len(keys) and keys[high] < key:
+            low, high, step = high + 1, high + step, 2 * step
+        high = min(high, len(keys))
+    else:
+        while low > 0 and keys[low - 1] >= key:
+            low, high, step = low - step, low - 1, 2 * step
+        low = max(low, 0)
+    return first_not_below(keys, key, low, high)
 
 
 @numba.njit(cache=True)
