@@ -95,7 +95,12 @@ def r_similarity(
     Transforms align corners of one kind, where two planes meet. A transform that matches one probe is tried on all
     others, so there is one search per piece of a shape. Raises ValueError for a surface without area.
     """
-    exemplar_surface, surface = _Surface(exemplar, radius, rng), _Surface(shape, radius, rng)
+    return similarity_to(SampledSurface(exemplar, radius, rng), shape, probes, rng)
+
+
+def similarity_to(exemplar: SampledSurface, shape: FloatArray, probes: int, rng: np.random.Generator) -> Similarity:
+    """Test a shape, triangles (t, 3, 3), like `r_similarity`, against an exemplar that is sampled once for several."""
+    surface = SampledSurface(shape, exemplar.radius, rng)
     samples = np.sort(rng.choice(len(surface.points), min(probes, len(surface.points)), replace=False))
     balls = surface.balls(samples)
     matched, shares = np.zeros(len(samples), dtype=bool), np.zeros(len(samples))
@@ -103,13 +108,13 @@ def r_similarity(
     for probe in range(len(samples)):
         if matched[probe]:
             continue
-        transform, shares[probe] = _search(exemplar_surface, surface, samples[probe], balls[probe], rng)
+        transform, shares[probe] = _search(exemplar, surface, samples[probe], balls[probe], rng)
         if transform is None:
             continue
         transforms.append(transform)
         left = np.flatnonzero(~matched)
         of_left = [balls[number] for number in left.tolist()]
-        same = _matches(exemplar_surface, surface, transform, samples[left], of_left)
+        same = _matches(exemplar, surface, transform, samples[left], of_left)
         matched[left[same >= 1.0]] = True
         matched[probe], shares[probe] = True, 1.0
     shares[matched] = 1.0
@@ -164,7 +169,7 @@ def similarity_table(rows: Sequence[tuple[Cell, ...]]) -> Table:
     return Table("r-similarity of shapes to their exemplars", COLUMNS, tuple(rows), NOTES)
 
 
-class _Surface:
+class SampledSurface:
     """A surface with samples, distances between them, corner frames, and nearest points."""
 
     def __init__(self, corners: FloatArray, radius: float, rng: np.random.Generator) -> None:
@@ -223,11 +228,12 @@ class _Surface:
 
     @cached_property
     def _links(self) -> tuple[np.ndarray, np.ndarray, FloatArray]:
-        pairs = self.tree.query_pairs(MAX_LINK_SPACINGS * self.spacing, output_type="ndarray")
-        ends = np.concatenate([pairs, pairs[:, ::-1]])
-        ends = ends[np.argsort(ends[:, 0], kind="stable")]
-        lengths: FloatArray = np.linalg.norm(self.points[ends[:, 0]] - self.points[ends[:, 1]], axis=1)
-        return np.searchsorted(ends[:, 0], np.arange(len(self.points) + 1)), ends[:, 1], lengths
+        """Links between samples: where those of each begin, int64 (n + 1,), their ends, int64, and lengths."""
+        first, second = self.tree.query_pairs(MAX_LINK_SPACINGS * self.spacing, output_type="ndarray").T
+        x, y, z = (self.points[first] - self.points[second]).T
+        lengths = np.sqrt(x * x + y * y + z * z)
+        starts, order = _grouped(np.concatenate([first, second]), len(self.points))
+        return starts, np.concatenate([second, first])[order], np.concatenate([lengths, lengths])[order]
 
     def balls(self, samples: np.ndarray, offsets: FloatArray | None = None) -> list[np.ndarray]:
         """Return the samples within the radius, less `offsets` (n,), along the surface around each sample, int64."""
@@ -265,6 +271,11 @@ class _Surface:
         convex = ((middles[b] - self._vertices[vertices[a]]) * planes[a]).sum(axis=1) < 0
         kinds = np.column_stack([np.round(100 * cosine), convex, 2 * ends[a] + ends[b]]).astype(np.int64)
         return frames, kinds, np.repeat(full, count**2)[bent]
+
+    @cached_property
+    def inverse_frames(self) -> FloatArray:
+        """The inverses of the corner frames, float64 (m, 4, 4)."""
+        return np.asarray(np.linalg.inv(self.frames[0]), dtype=np.float64)
 
     @cached_property
     def _welded(self) -> tuple[FloatArray, np.ndarray]:
@@ -317,7 +328,7 @@ class _Surface:
 
 
 def _search(
-    exemplar: _Surface, shape: _Surface, probe: int, around: np.ndarray, rng: np.random.Generator
+    exemplar: SampledSurface, shape: SampledSurface, probe: int, around: np.ndarray, rng: np.random.Generator
 ) -> tuple[FloatArray | None, float]:
     """Return a transform that maps a neighbourhood of the exemplar to that of a sample of the shape, or None.
 
@@ -346,20 +357,20 @@ def _search(
     return None, best
 
 
-def _by_corners(exemplar: _Surface, shape: _Surface, point: FloatArray, full: bool) -> FloatArray:
+def _by_corners(exemplar: SampledSurface, shape: SampledSurface, point: FloatArray, full: bool) -> FloatArray:
     """Return transforms (m, 4, 4) that map corner frames of the exemplar to those of the shape near a point.
 
     full: frames of the shape at full corners; else those on creases.
     """
     frames, kinds, is_full = shape.frames
-    exemplar_frames, exemplar_kinds, _ = exemplar.frames
-    usable = np.flatnonzero(np.isin(_packed(kinds), _packed(exemplar_kinds)) & (is_full == full))
+    packed, exemplar_packed = _packed(kinds), _packed(exemplar.frames[1])
+    usable = np.flatnonzero(np.isin(packed, exemplar_packed) & (is_full == full))
     order = np.argsort(np.linalg.norm(frames[usable, :3, 3] - point, axis=1), kind="stable")
     transforms = []
     for frame in usable[order[:CORNER_FRAMES_TRIED]].tolist():
-        same_kind = np.flatnonzero((exemplar_kinds == kinds[frame]).all(axis=1))
-        origin = exemplar_frames[same_kind[:: 1 + len(same_kind) // MAX_EXEMPLAR_FRAMES]]
-        transforms.append(frames[frame] @ np.linalg.inv(origin))
+        same_kind = np.flatnonzero(exemplar_packed == packed[frame])
+        origin = same_kind[:: 1 + len(same_kind) // MAX_EXEMPLAR_FRAMES]
+        transforms.append(frames[frame] @ exemplar.inverse_frames[origin])
     return np.concatenate(transforms) if transforms else np.empty((0, 4, 4))
 
 
@@ -368,7 +379,7 @@ def _packed(kinds: np.ndarray) -> np.ndarray:
     return packed
 
 
-def _by_normals(exemplar: _Surface, shape: _Surface, probe: int, rng: np.random.Generator) -> FloatArray:
+def _by_normals(exemplar: SampledSurface, shape: SampledSurface, probe: int, rng: np.random.Generator) -> FloatArray:
     """Return transforms (m, 4, 4) that map samples of the exemplar to one of the shape, turned about its normal."""
     samples = rng.integers(len(exemplar.points), size=FALLBACK_SAMPLES)
     source = _normal_frames(exemplar.points[samples], exemplar.normals[samples])
@@ -394,7 +405,7 @@ def _normal_frames(points: FloatArray, normals: FloatArray) -> FloatArray:
 
 
 def _matches(
-    exemplar: _Surface, shape: _Surface, transform: FloatArray, probes: np.ndarray, around: list[np.ndarray]
+    exemplar: SampledSurface, shape: SampledSurface, transform: FloatArray, probes: np.ndarray, around: list[np.ndarray]
 ) -> FloatArray:
     """Return the shares of neighbourhoods of the shape that a transform of the exemplar matches, float64 (n,).
 
@@ -412,7 +423,9 @@ def _matches(
     return shares
 
 
-def _share(target: _Surface, transform: FloatArray, source: _Surface, around: list[np.ndarray]) -> FloatArray:
+def _share(
+    target: SampledSurface, transform: FloatArray, source: SampledSurface, around: list[np.ndarray]
+) -> FloatArray:
     """Return the shares of neighbourhoods of `source` that a transform maps onto `target`; 1 for empty ones."""
     sizes = np.array([len(ball) for ball in around])
     members = np.concatenate(around)
@@ -421,6 +434,20 @@ def _share(target: _Surface, transform: FloatArray, source: _Surface, around: li
     total = np.bincount(np.repeat(np.arange(len(sizes)), sizes), weights=is_on, minlength=len(sizes))
     shares: FloatArray = np.where(sizes > 0, total / np.maximum(sizes, 1), 1.0)
     return shares
+
+
+@numba.njit(cache=True)
+def _grouped(owners, count):
+    """Return where the things of each of `count` owners begin, and the things by owner, in their order, int64."""
+    starts = np.zeros(count + 1, dtype=np.int64)
+    for owner in owners:
+        starts[owner + 1] += 1
+    starts = np.cumsum(starts)
+    next_place, order = starts[:-1].copy(), np.empty(len(owners), dtype=np.int64)
+    for thing in range(len(owners)):
+        order[next_place[owners[thing]]] = thing
+        next_place[owners[thing]] += 1
+    return starts, order
 
 
 @numba.njit(cache=True)
