@@ -38,8 +38,8 @@ def cloud_similarity(
     probes: int,
     rng: np.random.Generator,
     only: BoolArray | None = None,
-) -> FloatArray:
-    """Return the matched shares of the neighbourhoods of `probes` random points of a shape (n, 3), float64 (probes,).
+) -> BoolArray:
+    """Return whether the neighbourhoods of `probes` random points of a shape (n, 3) match, bool (probes,).
 
     only: points that may be probes, bool (n,). A neighbourhood is one of the exemplar (m, 3) from MATCHED_SHARE on.
     Points match within a distance of `near`, at which an exemplar that is sampled twice matches itself. Transforms are
@@ -53,17 +53,17 @@ def cloud_similarity(
     descriptors = np.array(
         [_descriptor(exemplar[item] - at, radius, up) for at, item in zip(anchors, inside, strict=True)]
     )
-    shares = np.zeros(probes)
+    matched = np.zeros(probes, dtype=bool)
     candidates = np.arange(len(shape)) if only is None else np.flatnonzero(only)
     for index, probe in enumerate(shape[rng.choice(candidates, probes, replace=False)]):
         around = shape[shape_tree.query_ball_point(probe, radius)] - probe
         difference = np.abs(descriptors - _descriptor(around, radius, up)).sum(axis=1)
         nearest = anchors[np.argsort(difference, kind="stable")[:MAX_ANCHORS]]
-        shares[index] = max(
-            _share(tree, exemplar, around @ turn.T, at, radius, near)
+        matched[index] = any(
+            _share(tree, exemplar, around @ turn.T, at, radius, near) >= MATCHED_SHARE
             for turn, at in _ranked(tree, around[:: 1 + len(around) // RANKING_POINTS], nearest, up)
         )
-    return shares
+    return matched
 
 
 def _thinned(points: FloatArray, size: float) -> np.ndarray:
@@ -85,7 +85,8 @@ def _descriptor(around: FloatArray, radius: float, up: int) -> FloatArray:
 def _ranked(tree: Any, around: FloatArray, anchors: FloatArray, up: int) -> list[tuple[FloatArray, FloatArray]]:
     """Return the best transforms of a neighbourhood: turns (3, 3) and positions (3,)."""
     transforms = [(turn, at) for turn in _turns(up) for at in anchors]
-    errors = [float(np.minimum(tree.query(around @ turn.T + at)[0], 1e300).mean()) for turn, at in transforms]
+    moved = np.array([around @ turn.T + at for turn, at in transforms])
+    errors = np.minimum(tree.query(moved)[0], 1e300).mean(axis=1)
     return [transforms[item] for item in np.argsort(errors, kind="stable")[:MAX_REFINED]]
 
 
