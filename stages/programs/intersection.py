@@ -45,9 +45,11 @@ def _surfaces_intersect(
 
 def _faces_in_box(mesh: QuadMesh, low: FloatArray, high: FloatArray) -> np.ndarray:
     """The triangles whose bounding boxes overlap the box from `low` to `high`, int32 (k, 3)."""
-    corners = mesh.vertices[mesh.triangles]
-    overlapping = (corners.min(axis=1) <= high) & (corners.max(axis=1) >= low)
-    faces: np.ndarray = mesh.triangles[overlapping.all(axis=1)]
+    lowest, highest = mesh.triangle_bounds
+    overlapping = np.ones(len(lowest), dtype=bool)
+    for axis in range(3):
+        overlapping &= (lowest[:, axis] <= high[axis]) & (highest[:, axis] >= low[axis])
+    faces: np.ndarray = mesh.triangles[overlapping]
     return faces
 
 

@@ -38,6 +38,12 @@ class QuadMesh:
         """Lowest and highest corner of the bounding box, float64 (2, 3)."""
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
+    @cached_property
+    def triangle_bounds(self) -> FloatArray:
+        """Lowest and highest corners of the bounding boxes of the triangles, float64 (2, f, 3)."""
+        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
+        return np.stack([np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)])
+
     @property
     def volume(self) -> float:
         """Enclosed volume; negative where a closed mesh is inside out."""

@@ -272,7 +272,8 @@ def first_contact(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> bool:
 
 def near_pairs(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> np.ndarray:
     """Return all pairs of triangles within `tolerance`, int64 (p, 2), in tree order of `a` and `b`."""
-    pairs = np.empty((4096, 2), dtype=np.int64)
+    # a surface and itself: each triangle and the dozen around it; only what is written takes memory
+    pairs = np.empty((max(4096, 16 * min(len(a[0]), len(b[0]))), 2), dtype=np.int64)
     count = _walk(*a, *b, pose, tolerance, False, pairs)
     if count > len(pairs):
         pairs = np.empty((count, 2), dtype=np.int64)
