@@ -147,11 +147,13 @@ def _fragments(screen, chosen, width, height, bits, solid):
 def _sample(triangles, screen, projection, face_of, colors, look):
     height, width = triangles.shape
     out = np.zeros((height, width, 4), dtype=np.float32)
+    flat = out.reshape(-1, 4)
     for row in range(height):
         for column in range(width):
             t = triangles[row, column]
             if t >= 0:
-                _color(out[row, column], t, column + 0.5, row + 0.5, screen, projection, face_of[t], colors, look)
+                n = row * width + column
+                _color(flat, n, t, column + 0.5, row + 0.5, screen, projection, face_of[t], colors, look)
     return out
 
 
@@ -160,80 +162,108 @@ def _sample_list(pixels, owners, width, screen, projection, face_of, colors, loo
     out = np.zeros((len(pixels), 4), dtype=np.float32)
     for n in range(len(pixels)):
         t, x, y = owners[n], pixels[n] % width + 0.5, pixels[n] // width + 0.5
-        _color(out[n], t, x, y, screen, projection, face_of[t], colors, look)
+        _color(out, n, t, x, y, screen, projection, face_of[t], colors, look)
     return out
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _color(out, t, x, y, screen, projection, face, colors, look):
-    """Write linear colour and alpha of triangle t at a point of the screen."""
+# What takes a sample's color is inlined and reads numbers, not rows: passing arrays and taking views of them cost more
+# than the arithmetic.
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def _color(out, n, t, x, y, screen, projection, face, colors, look):
+    """Write linear colour and alpha of triangle t at a point of the screen as row n."""
     material = look.face_material[face]
     if material < 0:
-        out[0], out[1], out[2], out[3] = colors[face, 0], colors[face, 1], colors[face, 2], 1.0
-        return
-    base = look.base[material]
-    red, green, blue, alpha = base[0], base[1], base[2], base[3]
-    number = look.texture[material]
-    if number >= 0:
-        first = look.level_first[number]
-        wide, high = look.levels[first, 1], look.levels[first, 2]
-        u, v = _uv_at(screen, t, x, y, projection, look.uv[face], True)
-        here_u, here_v = _uv_at(screen, t, x, y, projection, look.uv[face], False)
-        right_u, right_v = _uv_at(screen, t, x + 1.0, y, projection, look.uv[face], False)
-        down_u, down_v = _uv_at(screen, t, x, y + 1.0, projection, look.uv[face], False)
-        across = ((right_u - here_u) * wide) ** 2 + ((right_v - here_v) * high) ** 2
-        along = ((down_u - here_u) * wide) ** 2 + ((down_v - here_v) * high) ** 2
-        step = np.sqrt(max(across, along))
-        level, share, last = first, 0.0, look.level_first[number + 1] - 1
-        if step > 1.0:
-            size = 1.0
-            while step >= 2.0 * size and level < last:
-                size *= 2.0
-                level += 1
-            share = min(step / size - 1.0, 1.0)
-        square = look.nearest[number] and step <= 1.0
-        r, g, b, a = _texel(look.texels, look.levels[level], look.wraps[number], u, v, square)
-        if share > 0.0 and level < last:
-            r2, g2, b2, a2 = _texel(look.texels, look.levels[level + 1], look.wraps[number], u, v, False)
-            r, g, b, a = r + share * (r2 - r), g + share * (g2 - g), b + share * (b2 - b), a + share * (a2 - a)
-        if a > 0.0:
-            red, green, blue = red * r / a, green * g / a, blue * b / a
-        alpha *= a
-    if look.mode[material] == MASK_MODE:
-        alpha = 1.0 if alpha >= look.cutoff[material] else 0.0
-    elif look.mode[material] != BLEND_MODE:
-        alpha = 1.0
-    out[0], out[1], out[2], out[3] = red, green, blue, alpha
+        red, green, blue, alpha = colors[face, 0] * 1.0, colors[face, 1] * 1.0, colors[face, 2] * 1.0, 1.0
+    else:
+        red, green, blue = look.base[material, 0], look.base[material, 1], look.base[material, 2]
+        alpha = look.base[material, 3]
+        number = look.texture[material]
+        if number >= 0:
+            r, g, b, a = _texture_color(number, t, x, y, screen, projection, face, look)
+            if a > 0.0:
+                red, green, blue = red * r / a, green * g / a, blue * b / a
+            alpha *= a
+        if look.mode[material] == MASK_MODE:
+            alpha = 1.0 if alpha >= look.cutoff[material] else 0.0
+        elif look.mode[material] != BLEND_MODE:
+            alpha = 1.0
+    out[n, 0], out[n, 1], out[n, 2], out[n, 3] = red, green, blue, alpha
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _uv_at(screen, t, x, y, projection, corners, clamped):
-    """Return perspective-correct texture coordinates of a point of the screen, inside the triangle if clamped."""
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def _texture_color(number, t, x, y, screen, projection, face, look):
+    """Return linear colour times alpha, and alpha, of a texture where a point of the screen shows it."""
+    first, last = look.level_first[number], look.level_first[number + 1] - 1
+    wide, high = look.levels[first, 1], look.levels[first, 2]
     ax, ay = screen[t, 1, 0] - screen[t, 0, 0], screen[t, 1, 1] - screen[t, 0, 1]
     bx, by = screen[t, 2, 0] - screen[t, 0, 0], screen[t, 2, 1] - screen[t, 0, 1]
     px, py = x - screen[t, 0, 0], y - screen[t, 0, 1]
     area = ax * by - ay * bx
+    d1, d2, d3 = 1.0, 1.0, 1.0
+    if projection[3, 3] == 0.0:
+        d1, d2 = eye_depth(screen[t, 0, 2], projection), eye_depth(screen[t, 1, 2], projection)
+        d3 = eye_depth(screen[t, 2, 2], projection)
+    corners = look.uv
+    uv = (
+        corners[face, 0, 0] * 1.0,
+        corners[face, 0, 1] * 1.0,
+        corners[face, 1, 0] * 1.0,
+        corners[face, 1, 1] * 1.0,
+        corners[face, 2, 0] * 1.0,
+        corners[face, 2, 1] * 1.0,
+    )
+    plane, depths = (ax, ay, bx, by, area), (d1, d2, d3)
+    u, v = _uv_at(px, py, plane, depths, uv, True)
+    here_u, here_v = _uv_at(px, py, plane, depths, uv, False)
+    right_u, right_v = _uv_at(x + 1.0 - screen[t, 0, 0], py, plane, depths, uv, False)
+    down_u, down_v = _uv_at(px, y + 1.0 - screen[t, 0, 1], plane, depths, uv, False)
+    across = ((right_u - here_u) * wide) ** 2 + ((right_v - here_v) * high) ** 2
+    along = ((down_u - here_u) * wide) ** 2 + ((down_v - here_v) * high) ** 2
+    step = np.sqrt(max(across, along))
+    level, share = first, 0.0
+    if step > 1.0:
+        size = 1.0
+        while step >= 2.0 * size and level < last:
+            size *= 2.0
+            level += 1
+        share = min(step / size - 1.0, 1.0)
+    square = look.nearest[number] and step <= 1.0
+    r, g, b, a = _texel(look, level, number, u, v, square)
+    if share > 0.0 and level < last:
+        r2, g2, b2, a2 = _texel(look, level + 1, number, u, v, False)
+        r, g, b, a = r + share * (r2 - r), g + share * (g2 - g), b + share * (b2 - b), a + share * (a2 - a)
+    return r, g, b, a
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def _uv_at(px, py, plane, depths, uv, clamped):
+    """Return perspective-correct texture coordinates of a point of the screen, inside the triangle if clamped.
+
+    px, py: the point, seen from the first corner of the triangle
+    plane: the two other corners, seen from the first, and twice the area
+    depths: of the corners
+    uv: u and v of each corner
+    """
+    ax, ay, bx, by, area = plane
     if area == 0.0:
-        return corners[0, 0] * 1.0, corners[0, 1] * 1.0
+        return uv[0], uv[1]
     two, three = (px * by - py * bx) / area, (ax * py - ay * px) / area
     if clamped:
         two = min(max(two, 0.0), 1.0)
         three = min(max(three, 0.0), 1.0 - two)
-    one = 1.0 - two - three
-    if projection[3, 3] == 0.0:
-        one /= eye_depth(screen[t, 0, 2], projection)
-        two /= eye_depth(screen[t, 1, 2], projection)
-        three /= eye_depth(screen[t, 2, 2], projection)
+    one = (1.0 - two - three) / depths[0]
+    two /= depths[1]
+    three /= depths[2]
     total = one + two + three
     if total == 0.0:
-        return corners[0, 0] * 1.0, corners[0, 1] * 1.0
-    u = (one * corners[0, 0] + two * corners[1, 0] + three * corners[2, 0]) / total
-    v = (one * corners[0, 1] + two * corners[1, 1] + three * corners[2, 1]) / total
-    return u, v
+        return uv[0], uv[1]
+    return (one * uv[0] + two * uv[2] + three * uv[4]) / total, (one * uv[1] + two * uv[3] + three * uv[5]) / total
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", inline="always")
 def _wrapped(index, size, wrap):
+    if 0 <= index < size:
+        return index
     if wrap == 2:
         return min(max(index, 0), size - 1)
     if wrap == 0:
@@ -242,27 +272,30 @@ def _wrapped(index, size, wrap):
     return at if at < size else 2 * size - 1 - at
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _texel(texels, level, wrap, u, v, square):
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def _texel(look, level, number, u, v, square):
     """Return the texel of a level at texture coordinates, or the mean of four by distance."""
-    first, wide, high = level[0], level[1], level[2]
+    first, wide, high = look.levels[level, 0], look.levels[level, 1], look.levels[level, 2]
+    wrap_u, wrap_v = look.wraps[number, 0], look.wraps[number, 1]
+    texels = look.texels
     across, down = min(max(u, -1e6), 1e6) * wide, min(max(v, -1e6), 1e6) * high
     if square:
-        column, row = (
-            _wrapped(np.int64(np.floor(across)), wide, wrap[0]),
-            _wrapped(np.int64(np.floor(down)), high, wrap[1]),
-        )
-        texel = texels[first + row * wide + column]
-        return texel[0] * 1.0, texel[1] * 1.0, texel[2] * 1.0, texel[3] * 1.0
+        column = _wrapped(np.int64(np.floor(across)), wide, wrap_u)
+        n = first + _wrapped(np.int64(np.floor(down)), high, wrap_v) * wide + column
+        return texels[n, 0] * 1.0, texels[n, 1] * 1.0, texels[n, 2] * 1.0, texels[n, 3] * 1.0
     across, down = across - 0.5, down - 0.5
     left, top = np.int64(np.floor(across)), np.int64(np.floor(down))
     share_x, share_y = across - left, down - top
     r, g, b, a = 0.0, 0.0, 0.0, 0.0
     for dy in range(2):
-        row = _wrapped(top + dy, high, wrap[1])
+        row = _wrapped(top + dy, high, wrap_v)
         for dx in range(2):
-            column = _wrapped(left + dx, wide, wrap[0])
+            n = first + row * wide + _wrapped(left + dx, wide, wrap_u)
             weight = (share_x if dx else 1.0 - share_x) * (share_y if dy else 1.0 - share_y)
-            texel = texels[first + row * wide + column]
-            r, g, b, a = r + weight * texel[0], g + weight * texel[1], b + weight * texel[2], a + weight * texel[3]
+            r, g, b, a = (
+                r + weight * texels[n, 0],
+                g + weight * texels[n, 1],
+                b + weight * texels[n, 2],
+                a + weight * texels[n, 3],
+            )
     return r, g, b, a
