@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.kit import Assembly, Grammar, Kit, PartType
-from stages.shape.shape import kit_shape
+from stages.shape.shape import Shape, kit_shape
 from stages.shape.views.buffers import RendererName, render_buffers
 from stages.shape.views.camera import Camera
 from stages.shape.views.image_files import png_bytes
@@ -91,6 +91,11 @@ def _pyrender_buffers(views: list[Camera]) -> float:
 
 
 def colonnade() -> Scene:
+    """Return the scene of a new assembly of `colonnade_shape`."""
+    return scene_of(colonnade_shape())
+
+
+def colonnade_shape() -> Shape:
     """Return two rows of round columns on plinths, under beams, as a new assembly."""
     poses, types = [], []
     for row in range(2):
@@ -106,7 +111,7 @@ def colonnade() -> Scene:
     placed[:, :3, 3] = poses
     gaps = np.abs(placed[:, None, :3, 3] - placed[None, :, :3, 3])
     near = np.argwhere(np.triu((gaps <= [0.7, 1.2, 0.1]).all(axis=2), 1)).astype(np.int32)
-    return scene_of(kit_shape(_KIT, Assembly(np.array(types, dtype=np.int16), placed, near)))
+    return kit_shape(_KIT, Assembly(np.array(types, dtype=np.int16), placed, near))
 
 
 def _prism(sides: int, radius: float, height: float, stretch: float = 1.0) -> tuple[FloatArray, IntArray]:

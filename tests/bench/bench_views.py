@@ -4,25 +4,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
+from stages.shape.appearance import Appearance, Material, Texture, TextureImage
+from stages.shape.shape import Shape
 from stages.shape.views.image_files import color_png_bytes, data_png_bytes, exr_bytes, jpeg_bytes, webp_bytes
 from stages.shape.views.renderer_check import check_triangle
-from stages.shape.views.scene import Scene
+from stages.shape.views.scene import Scene, scene_of
 from stages.views.cameras import sample_views
 from stages.views.images import surface_channels, view_files
 from stages.views.numbers import depth_levels, depth_scale, normal_bytes, rounded_depth
 from stages.views.placement import bounding_sphere
 from stages.views.render import SeenSurface, ViewRenderer
 from stages.views.settings import ViewsConfig
-from stages.views.shading import Lamp, lamp_of, shade, to_srgb
-from tests.bench.bench_sketches import colonnade
+from stages.views.shading import Lamp, lamp_of, shade, to_srgb, view_light
+from tests.bench.bench_sketches import colonnade, colonnade_shape
 from tests.bench.measure import Measure
 
-IMAGE_SIZE, CAMERA_COUNT = 256, 12
+IMAGE_SIZE, CAMERA_COUNT, TEXTURE_SIZE = 256, 12, 512
 CONFIG = ViewsConfig.model_validate(
     {"cameras": [{"kind": "ring", "count": CAMERA_COUNT}], "width": IMAGE_SIZE, "height": IMAGE_SIZE}
 )
@@ -42,8 +46,19 @@ def bench() -> Iterator[Measure]:
         peer = 1.0 / rays(scene, renderers[0])
         yield Measure("views, depth, normals and ids", "views", surfaces, name, peer, f"{triangles}, not encoded")
     colors = CAMERA_COUNT / _seconds(lambda: [_color(renderer, lamp) for renderer in renderers])
-    peer_name, opengl = ("pyrender on EGL, without shadows", _pyrender_rate(scene)) if _has_egl() else ("", None)
+    has_egl = check_triangle("egl") is None
+    peer_name = "pyrender on EGL, without shadows" if has_egl else ""
+    opengl = _pyrender_rate(scene, _joined_mesh(scene)) if has_egl else None
     yield Measure("views, colour", "views", colors, peer_name, opengl, "2x2 samples a pixel, shadows, not encoded")
+    shape = _textured()
+    textured, (textured_renderers, _) = scene_of(shape), _renderers(scene_of(shape))
+    colors = CAMERA_COUNT / _seconds(lambda: [view_light(renderer, 2, lamp) for renderer in textured_renderers])
+    opengl = _pyrender_rate(textured, _joined_mesh(textured, shape)) if has_egl else None
+    note = f"texture of {TEXTURE_SIZE}x{TEXTURE_SIZE} on all faces; 2x2 samples a pixel, shadows, not encoded"
+    yield Measure("views, textured colour", "views", colors, peer_name, opengl, note)
+    total = sum(len(content) for content in _sample(textured).values())
+    note = f"{size}, textured, {total / CAMERA_COUNT / 1e3:.1f} kB a view"
+    yield Measure("views, textured samples encoded", "samples", 1.0 / _seconds(lambda: _sample(textured)), note=note)
     for name, kind, encode in _formats(renderers, lamp):
         contents = encode()
         figure = len(contents) / _seconds(encode)
@@ -166,20 +181,41 @@ def _trimesh_seconds(scene: Scene, renderer: ViewRenderer) -> float:
     return 100.0 * _seconds(lambda: mesh.ray.intersects_first(starts, some), rounds=1)
 
 
-def _has_egl() -> bool:
-    return check_triangle("egl") is None
+def _textured() -> Shape:
+    """Return the colonnade with a photo-like texture on all faces, along the axes of each mesh."""
+    waves = np.random.default_rng(0).normal(0, 12, (TEXTURE_SIZE, TEXTURE_SIZE, 3)).cumsum(axis=0).cumsum(axis=1)
+    image = TextureImage.of(np.clip(128 + waves / 8, 0, 255).astype(np.uint8))
+    shape = colonnade_shape()
+    meshes = []
+    for mesh in shape.meshes:
+        uv = mesh.vertices[mesh.faces] @ np.array([[1.0, 0.0], [0.0, 1.0], [0.7, 0.3]])
+        look = Appearance((Material("stone", texture=Texture(image)),), np.zeros(len(uv), np.int32), uv.astype("f4"))
+        meshes.append(replace(mesh, appearance=look))
+    return replace(shape, meshes=tuple(meshes))
 
 
-def _pyrender_rate(scene: Scene) -> float:
-    """Return views a CPU second of pyrender's colour: a lamp without shadows, Mesa's llvmpipe."""
+def _joined_mesh(scene: Scene, textured: Shape | None = None) -> Any:
+    """Return all triangles as one mesh of trimesh, with the texture of a shape."""
     import trimesh
 
+    corners = _world_triangles(scene).reshape(-1, 3)
+    mesh = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
+    if textured is not None:
+        looks = [part_mesh.appearance for part_mesh in textured.meshes if part_mesh.appearance is not None]
+        uv = np.concatenate([look.uv for look in looks if look.uv is not None])[scene.triangle_face]
+        texture = looks[0].materials[0].texture
+        assert texture is not None
+        image = Image.fromarray(texture.image.pixels)
+        mesh.visual = trimesh.visual.TextureVisuals(uv=uv.reshape(-1, 2), image=image)
+    return mesh
+
+
+def _pyrender_rate(scene: Scene, mesh: Any) -> float:
+    """Return views a CPU second of pyrender's colour: a lamp without shadows, Mesa's llvmpipe."""
     from stages.shape.views.opengl import load_pyrender
 
     pyrender = load_pyrender()
     kept = pyrender.Scene(ambient_light=np.full(3, 0.3), bg_color=np.ones(4))
-    corners = _world_triangles(scene)
-    mesh = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), process=False)
     kept.add(pyrender.Mesh.from_trimesh(mesh, smooth=False))
     kept.add(pyrender.DirectionalLight(intensity=3.0), pose=np.eye(4))
     drawer = pyrender.OffscreenRenderer(IMAGE_SIZE, IMAGE_SIZE)
