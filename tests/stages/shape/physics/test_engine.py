@@ -1,4 +1,4 @@
-"""What falls here falls in MuJoCo, on shapes that are far from the border."""
+"""What falls here falls in MuJoCo and in PyBullet, on shapes that are far from the border."""
 
 from __future__ import annotations
 
@@ -7,11 +7,9 @@ import pytest
 from stages.shape.physics.judge import Judge
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.shape import Shape, upright
-from tests.bench.engine_falls import falls_in_mujoco
+from tests.bench.engine_falls import ENGINES
 from tests.stages.shape.geometry.bodies import box
 from tests.stages.shape.physics.structures import solid
-
-pytest.importorskip("mujoco")
 
 
 def tower(width: float) -> Shape:
@@ -48,10 +46,13 @@ CASES = {
 }
 
 
+@pytest.mark.parametrize("engine", ["MuJoCo", "PyBullet"])
 @pytest.mark.parametrize("name", CASES)
-def test_the_dropping_test_and_mujoco_agree(name: str) -> None:
+def test_the_dropping_test_and_the_engines_agree(name: str, engine: str) -> None:
+    if engine not in ENGINES:
+        pytest.skip(f"{engine} is not installed")
     shape, expected = upright(CASES[name][0]), CASES[name][1]
     judge = Judge(shape.meshes, shape.up, PhysicsConfig())
     joints = judge.validity(shape.assembly).joints
     assert judge.fall(shape.assembly, joints).falls == expected
-    assert falls_in_mujoco(shape, joints) == expected
+    assert ENGINES[engine](shape, joints) == expected
