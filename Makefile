@@ -92,7 +92,7 @@ RUN        = @$(SHAPEMILL) run $@ $(OPTIONS) $(RUNNING)
 
 .PHONY: dataset autoconfig exemplars variations proportions programs grammars program_sampling shapeassembly
 .PHONY: string_sampling primitives mixture validity abstraction strings points sketches views surface structure
-.PHONY: captions package
+.PHONY: captions exports package
 dataset: setup  ## Make the dataset of CONFIG in OUT, with MESH in place of its kits: whatever is missing or outdated
 	@[ -z "$$MESH" ] || { CONFIG=$$($(SHAPEMILL) with-models $(DATASET) -- "$$MESH"); echo "config: $$CONFIG"; }; \
 	$(SHAPEMILL) run $(OPTIONS) $(RUNNING)
@@ -138,7 +138,9 @@ structure: mixture  ## Find hierarchies and symmetries of shapes, if the config 
 	$(RUN)
 captions: validity  ## Describe each shape in words, if the config asks for it
 	$(RUN)
-package: validity abstraction strings points sketches views surface structure captions  ## Write the dataset's folder: shards, index, card, checksums
+exports: validity  ## Write files of simulators for each sample, if the config asks for it
+	$(RUN)
+package: validity abstraction strings points sketches views surface structure captions exports  ## Write the dataset's folder: shards, index, card, checksums
 	$(RUN)
 
 .PHONY: train recover export publish

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pipeline.errors import Rejected
-from pipeline.shards import json_bytes, read_shard
+from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.captions.members import CAPTION
 from stages.captions.settings import CaptionsConfig
-from stages.shape.collection.collection import Collection, add_members
+from stages.shape.collection.collection import Collection, add_members, stage_members
 from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.sample import Sample
@@ -32,10 +31,10 @@ def run_shard(task: Task) -> Outcome:
     from stages.captions.words import label_nouns, source_noun
 
     config = task.config.section(CaptionsConfig)
-    judged = _Judged(read_shard(task.input("validity", f"{task.shard.name}.tar")))
+    judged = stage_members(task, "validity")
 
     def written(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
-        members = judged.members(sample.key)
+        members = judged(sample.key)
         shape = collection.shape(sample)
         placement = placement_of(sample.producer, sample.kit)
         physics = json.loads(members["json"])["physics"]
@@ -45,22 +44,6 @@ def run_shard(task: Task) -> Outcome:
         return {"json": json_bytes({}), CAPTION: json_bytes(texts)}
 
     return Outcome(add_members(task, written), {"split": task.shard.params["split"]})
-
-
-class _Judged:
-    """The members of stage `validity`, sample by sample, in the order of the collection."""
-
-    def __init__(self, samples: Iterator[tuple[str, Mapping[str, bytes]]]) -> None:
-        self._samples = samples
-        self._next = next(samples, None)
-
-    def members(self, key: str) -> Mapping[str, bytes]:
-        """Return the members of a sample. Raises Rejected for one that the stage rejected."""
-        if self._next is None or self._next[0] != key:
-            raise Rejected("no statics", "stage validity rejected it")
-        members = self._next[1]
-        self._next = next(self._samples, None)
-        return members
 
 
 def report(plan: Plan) -> Sequence[str]:

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.export.mjcf import mjcf_files
-from stages.export.model import SimulationModel, simulation_model
-from stages.export.obj import obj_files
+from stages.export.formats import shape_files
 from stages.export.settings import ExportSettings
 from stages.export.structurenet import structurenet_files
-from stages.export.urdf import urdf_files
-from stages.export.usd import usd_files
 from stages.package.dataset_sample import DatasetSample
 from stages.programs.language import LANGUAGE as PROGRAM_LANGUAGE
 from stages.programs.program import shape_from_text
@@ -26,12 +22,6 @@ from stages.shape.shape import Shape
 ExportFormat = Literal["urdf", "mjcf", "usd", "obj", "structurenet"]
 FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
 
-_WRITERS: Mapping[ExportFormat, Callable[[SimulationModel], Mapping[str, bytes]]] = {
-    "urdf": urdf_files,
-    "mjcf": mjcf_files,
-    "usd": usd_files,
-}
-
 
 def export_files(sample: DatasetSample, kind: ExportFormat, settings: ExportSettings) -> Mapping[str, bytes]:
     """Return the files of a sample in a format, by their paths below its folder.
@@ -39,16 +29,9 @@ def export_files(sample: DatasetSample, kind: ExportFormat, settings: ExportSett
     Raises ValueError for a shape without weight or, in StructureNet's format, without a hierarchy. Raises ConfigError
     where its program has changed.
     """
-    if kind == "obj":
-        return obj_files(sample.key, sample_shape(sample))
     if kind == "structurenet":
         return structurenet_files(sample.key, sample_shape(sample), sample.contacts.T, sample.record)
-    return _WRITERS[kind](sample_model(sample, settings))
-
-
-def sample_model(sample: DatasetSample, settings: ExportSettings) -> SimulationModel:
-    """Return the links and joints of a sample: parts hold together where the record's statics connects them."""
-    return simulation_model(sample.key, sample_shape(sample), pairs_of(sample.members[JOINTS]), settings)
+    return shape_files(kind, sample.key, sample_shape(sample), pairs_of(sample.members[JOINTS]), settings)
 
 
 def sample_shape(sample: DatasetSample) -> Shape:

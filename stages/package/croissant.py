@@ -28,6 +28,7 @@ FORMATS = {
     "exr": "image/x-exr",
     "txt": "text/plain",
     "json": "application/json",
+    "zip": "application/zip",
 }
 IMAGES = (".png", ".jpg", ".webp")
 """Suffixes of members that mlcroissant decodes as images."""

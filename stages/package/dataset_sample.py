@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -171,6 +172,14 @@ class DatasetSample:
         """The captions by length, such as `short`; empty where the dataset has none."""
         captions: dict[str, str] = json.loads(self.members.get("caption.json", b"{}"))
         return captions
+
+    def exported(self, kind: str) -> dict[str, bytes]:
+        """Return the files of a format, such as `urdf`, by their paths. Raises KeyError where the dataset has none."""
+        name = f"{kind}.zip"
+        if name not in self.members:
+            raise KeyError(f"{self.key} has no {name}; its members are {', '.join(self.members)}")
+        with zipfile.ZipFile(io.BytesIO(self.members[name])) as archive:
+            return {entry: archive.read(entry) for entry in archive.namelist()}
 
     @property
     def text(self) -> str:

@@ -87,7 +87,7 @@ def test_dataset_is_one_call_and_every_stage_runs_after_its_inputs() -> None:
     assert [run[3] for run in runs] == [
         "autoconfig", "exemplars", "variations", "proportions", "programs", "grammars", "program_sampling",
         "shapeassembly", "string_sampling", "primitives", "mixture", "validity", "abstraction", "strings", "points",
-        "sketches", "views", "surface", "structure", "captions", "package",
+        "sketches", "views", "surface", "structure", "captions", "exports", "package",
     ]  # fmt: skip
     assert all(run == ["-m", "pipeline", "run", run[3], *OPTIONS] for run in runs)
 

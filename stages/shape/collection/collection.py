@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 from pipeline.errors import Rejected
-from pipeline.shards import ShardWriter
+from pipeline.shards import ShardWriter, read_shard
 from pipeline.stage import Task
 from stages.shape.collection.classes import Classes
 from stages.shape.collection.discovery import language_of
@@ -47,3 +47,23 @@ def add_members(task: Task, members_of: Callable[[Collection, Sample], Mapping[s
                 task.reject(sample.key, error.reason, error.detail)
             task.progress(writer.samples, total)
     return writer.samples
+
+
+def stage_members(task: Task, stage: str) -> Callable[[str], Mapping[str, bytes]]:
+    """Return a function from the key of a sample to the members that a stage added to it, for the shard of a task.
+
+    Samples are asked for in the order of the collection; one is in memory at a time. The function raises Rejected for
+    a sample that the stage rejected.
+    """
+    samples = read_shard(task.input(stage, f"{task.shard.name}.tar"))
+    following = next(samples, None)
+
+    def members_of(key: str) -> Mapping[str, bytes]:
+        nonlocal following
+        if following is None or following[0] != key:
+            raise Rejected(f"rejected by {stage}")
+        members = following[1]
+        following = next(samples, None)
+        return members
+
+    return members_of

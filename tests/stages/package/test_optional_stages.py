@@ -14,6 +14,7 @@ from pipeline.errors import ConfigError
 from pipeline.registry import find_stages
 from pipeline.shards import read_shard
 from stages.captions.settings import CaptionsConfig
+from stages.exports.settings import ExportsConfig
 from stages.package.reader import Dataset
 from stages.points.settings import PointsConfig
 from stages.sketches.settings import SketchesConfig
@@ -33,6 +34,7 @@ def images_alone() -> Config:
         "sketches": SketchesConfig(views=()),
         "surface": SurfaceConfig(),
         "captions": CaptionsConfig(),
+        "exports": ExportsConfig(),
         "structure": StructureConfig(),
         "views": ViewsConfig(cameras=(RingCameras(count=2),), width=24, height=24, images=("color", "instances")),
     }

@@ -20,6 +20,8 @@ from stages.abstraction.stage import STAGE as ABSTRACTION
 from stages.captions.settings import CaptionsConfig
 from stages.captions.stage import STAGE as CAPTIONS
 from stages.exemplars.settings import ExemplarsConfig
+from stages.exports.settings import ExportsConfig
+from stages.exports.stage import STAGE as EXPORTS
 from stages.package.settings import PackageConfig
 from stages.package.stage import STAGE as PACKAGE
 from stages.points.settings import PointsConfig, ScansConfig
@@ -204,6 +206,7 @@ TOY_STAGES: Mapping[str, Stage] = named_inputs(
         SURFACE,
         CAPTIONS,
         STRUCTURE,
+        EXPORTS,
         replace(PACKAGE, check=lambda _: None),
     ]
 )
@@ -234,6 +237,7 @@ def toy_config(shards: int = 4) -> Config:
         "surface": SurfaceConfig(flags=True, union=True, distances=DistanceConfig(near=24, uniform=8), occupancy=8),
         "captions": CaptionsConfig(lengths=("short", "long")),
         "structure": StructureConfig(hierarchy=True, symmetry=True),
+        "exports": ExportsConfig(formats=("urdf", "mjcf", "usd", "obj")),
         "package": PackageConfig(previewed=1),
     }
     return Config(

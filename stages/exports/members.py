@@ -1,0 +1,27 @@
+"""What stage `exports` adds to every sample: one archive a format."""
+
+from __future__ import annotations
+
+from pipeline.config import Config
+from stages.exports.settings import ExportsConfig
+from stages.shape.collection.members import Member, Members
+
+CONTENTS = {
+    "urdf": "URDF, one file for each piece of the shape, with meshes",
+    "mjcf": "MJCF of MuJoCo, with meshes",
+    "usd": "OpenUSD with the physics schemas",
+    "obj": "Wavefront OBJ with materials",
+}
+
+
+def archive_name(kind: str) -> str:
+    """Return the name of the member with the files of a format."""
+    return f"{kind}.zip"
+
+
+def _members(config: Config) -> tuple[Member, ...]:
+    formats = config.section(ExportsConfig).formats
+    return tuple(Member(archive_name(kind), f"{CONTENTS[kind]}: a zip of files.") for kind in formats)
+
+
+MEMBERS = Members(of=_members)
