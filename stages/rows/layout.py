@@ -125,10 +125,21 @@ class Layout:
 
     def mates(self, shift: FloatArray) -> np.ndarray:
         """Return for each part the part of its class that lies at `shift` (3,) from it, or -1, int64 (n,)."""
+        key = shift.tobytes()
+        if key not in self._mates:
+            distances, nearest = self._anchor_tree.query(self._keyed(self.anchors + shift))
+            self._mates[key] = np.where(distances <= self.mate_tolerance, nearest, -1)
+        return self._mates[key]
+
+    @cached_property
+    def _mates(self) -> dict[bytes, np.ndarray]:
+        return {}
+
+    @cached_property
+    def _anchor_tree(self) -> Any:
         from scipy.spatial import cKDTree
 
-        distances, nearest = cKDTree(self._keyed(self.anchors)).query(self._keyed(self.anchors + shift))
-        return np.where(distances <= self.mate_tolerance, nearest, -1)
+        return cKDTree(self._keyed(self.anchors))
 
     def _keyed(self, positions: FloatArray) -> FloatArray:
         """Return positions (n, 4) in which parts of two classes are far apart."""

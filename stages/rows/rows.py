@@ -10,7 +10,7 @@ import numpy as np
 from stages.rows.layout import Layout
 from stages.rows.slabs import RowChange, Slab
 from stages.rows.steps import ROUNDING_DECIMALS, Step, bay_ends, longest_row, steps_of, with_long_rows
-from stages.shape.arrays import FloatArray
+from stages.shape.arrays import BoolArray, FloatArray
 
 MIN_ROW = 2
 MIN_TORN_ROW = 3
@@ -134,11 +134,13 @@ def _rows_along(
     """
     low, high = layout.spans(normal)
     previous = layout.mates(-step.shift)
+    recurs = (mates >= 0) | (previous >= 0)
     found: dict[tuple[int, ...], list[tuple[float, bool, bool, bool]]] = {}
     if step.is_bay:
         planes = np.unique(np.round(low[bay_ends(layout, step.shift) & (previous >= 0)], ROUNDING_DECIMALS))
     else:
-        planes = _planes(layout, low, high, (mates >= 0) | (previous >= 0))
+        planes = _planes(layout, low, high, recurs)
+        planes = planes[_may_end_slabs(layout, planes, float(normal @ step.shift), low, high, recurs)]
     for at in planes.tolist():
         slab = Slab(layout, normal, step.shift, at, mates, previous, low, high, step.is_bay)
         may_insert = slab.insertion_fault() is None
@@ -160,6 +162,27 @@ def _rows_along(
         insertions = np.array([at for at, may_insert, _, _ in best if may_insert])
         removals = np.array([at for at, _, may_remove, _ in best if may_remove])
         yield Row(number, normal, step.shift, count, copied, insertions, removals, step.is_bay)
+
+
+def _may_end_slabs(
+    layout: Layout, planes: FloatArray, length: float, low: FloatArray, high: FloatArray, recurs: BoolArray
+) -> BoolArray:
+    """Return where a slab that is no bay holds a part that recurs, and no contact leads past it, bool (p,).
+
+    Few planes pass, and the rules of `Slab`, of which these are two, are asked of these alone.
+    planes: ends of slabs, float64 (p,)
+    recurs: which parts have a part one step before or after, bool (n,)
+    """
+    tolerance = layout.tolerance
+    starts, ends = (planes - length - tolerance)[:, None], (planes - tolerance)[:, None]
+    beyond = low >= ends
+    within = (low >= starts) & ~beyond
+    spanning = (low < starts) & (high > (planes + tolerance)[:, None])
+    before = ~(within | beyond | spanning)
+    i, j = layout.edges.T
+    passed = (before[:, i] & beyond[:, j]) | (before[:, j] & beyond[:, i])
+    allowed: BoolArray = (within & recurs).any(axis=1) & ~passed.any(axis=1)
+    return allowed
 
 
 def _planes(layout: Layout, low: FloatArray, high: FloatArray, recurs: np.ndarray) -> FloatArray:
