@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,6 +36,20 @@ class ContactPatches:
     normals: FloatArray
 
 
+class _Question(NamedTuple):
+    """Two parts as one query sees them.
+
+    a, b: their meshes
+    pose: of the second in coordinates of the first, on a grid, float64 (4, 4)
+    key: what equal questions have in common
+    """
+
+    a: int
+    b: int
+    pose: FloatArray
+    key: tuple[int, int, bytes]
+
+
 class PairContacts:
     """Queries about pairs of posed parts with given meshes. Recurring answers are cached."""
 
@@ -44,6 +58,7 @@ class PairContacts:
         self.solids = solids
         self._trees: dict[int, Any] = {}
         self._answers: dict[tuple[Any, ...], Any] = {}
+        self._diagonals = np.array([mesh.diagonal for mesh in self.meshes])
 
     def connected(self, placed: PlacedParts, distance: float, known: IntArray) -> IntArray:
         """Return pairs of parts that overlap or are at most `distance` apart, int32 (m, 2), i < j in lexicographic
@@ -63,7 +78,8 @@ class PairContacts:
         unknown = plain & ~is_connected
         is_connected[unknown] = boxes_within(placed.centres, placed.axes, placed.halves, pairs[unknown], distance)
         unknown = ~plain & ~is_connected
-        is_connected[unknown] = [self._near(placed, i, j, distance) for i, j in pairs[unknown].tolist()]
+        questions = zip(pairs[unknown].tolist(), self._questions(placed, pairs[unknown]), strict=True)
+        is_connected[unknown] = [self._near(placed, i, j, question, distance) for (i, j), question in questions]
         return pairs[is_connected]
 
     def overlaps(self, placed: PlacedParts, pairs: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -77,8 +93,10 @@ class PairContacts:
         plain = _both_boxes(placed, pairs)
         depths[plain] = np.maximum(-separations(placed.centres, placed.axes, placed.halves, pairs[plain]), 0.0)
         volumes[plain] = overlap_volumes(placed.centres, placed.axes, placed.halves, pairs[plain])
-        for row in np.flatnonzero(~plain).tolist():
-            volumes[row], depths[row] = self._overlap(placed, *pairs[row].tolist())
+        closed = np.asarray(self.solids.closed)[placed.types[pairs]].all(axis=1)
+        rows = np.flatnonzero(~plain & closed)
+        for row, question in zip(rows.tolist(), self._questions(placed, pairs[rows]), strict=True):
+            volumes[row], depths[row] = self._overlap(question)
         return volumes, depths
 
     def patches(self, placed: PlacedParts, pairs: IntArray, tolerance: float) -> tuple[ContactPatches, BoolArray]:
@@ -92,9 +110,10 @@ class PairContacts:
         rows, points, normals = box_contacts(placed.centres, placed.axes, placed.halves, pairs[plain], tolerance)
         groups = [(plain[rows], points, normals)]
         locked = np.zeros(len(pairs), dtype=bool)
-        for row in np.setdiff1d(np.arange(len(pairs)), plain).tolist():
-            i, j = pairs[row].tolist()
-            near, points, normals = self._patch(placed, i, j, tolerance)
+        others = np.setdiff1d(np.arange(len(pairs)), plain)
+        for row, question in zip(others.tolist(), self._questions(placed, pairs[others]), strict=True):
+            i = int(pairs[row, 0])
+            near, points, normals = self._patch(question, tolerance)
             locked[row] = near and not len(points)
             rotation, offset = placed.poses[i, :3, :3], placed.poses[i, :3, 3]
             groups.append((np.full(len(points), row), points @ rotation.T + offset, -normals @ rotation.T))
@@ -119,14 +138,15 @@ class PairContacts:
             self._trees[mesh] = build_tree(self.meshes[mesh].vertices, self.meshes[mesh].faces)
         return self._trees[mesh]
 
-    def _question(self, placed: PlacedParts, i: int, j: int) -> tuple[int, int, FloatArray, bytes]:
-        """Return the meshes, the pose of part j in coordinates of part i on a grid, and the cache key of the pose."""
-        a, b = int(placed.types[i]), int(placed.types[j])
-        pose = relative_poses(placed.poses, np.array([[i, j]]))[0]
-        step = POSE_STEP_SHARE * min(self.meshes[a].diagonal, self.meshes[b].diagonal)
-        pose[:3, 3] = np.round(pose[:3, 3] / step) * step + 0.0
-        pose[:3, :3] = np.round(pose[:3, :3] / POSE_STEP_SHARE) * POSE_STEP_SHARE + 0.0
-        return a, b, pose, pose.tobytes()
+    def _questions(self, placed: PlacedParts, pairs: IntArray) -> Iterator[_Question]:
+        """Yield the question of each pair (m, 2)."""
+        kinds = placed.types[pairs]
+        poses = relative_poses(placed.poses, pairs)
+        steps = POSE_STEP_SHARE * self._diagonals[kinds].min(axis=1)[:, None]
+        poses[:, :3, 3] = np.round(poses[:, :3, 3] / steps) * steps + 0.0
+        poses[:, :3, :3] = np.round(poses[:, :3, :3] / POSE_STEP_SHARE) * POSE_STEP_SHARE + 0.0
+        for (a, b), pose in zip(kinds.tolist(), poses, strict=True):
+            yield _Question(a, b, pose, (a, b, pose.tobytes()))
 
     def _remember(self, question: tuple[Any, ...], answer: Any) -> Any:
         if len(self._answers) >= MAX_CACHED_ANSWERS:
@@ -134,28 +154,27 @@ class PairContacts:
         self._answers[question] = answer
         return answer
 
-    def _near(self, placed: PlacedParts, i: int, j: int, distance: float) -> bool:
+    def _near(self, placed: PlacedParts, i: int, j: int, question: _Question, distance: float) -> bool:
         from stages.shape.geometry.mesh_pairs import first_contact
 
-        a, b, pose, key = self._question(placed, i, j)
-        question = ("near", a, b, key, distance)
-        if question in self._answers:
-            return bool(self._answers[question])
-        near = first_contact(self._tree(a), self._tree(b), pose, distance)
+        asked = ("near", question.key, distance)
+        if asked in self._answers:
+            return bool(self._answers[asked])
+        near = first_contact(self._tree(question.a), self._tree(question.b), question.pose, distance)
         if not near:
             inner = (placed.spans[i] - placed.spans[j]) * [[1], [-1]]
-            near = bool((inner >= 0).all() or (inner <= 0).all()) and self._overlap(placed, i, j)[0] > 0
-        return bool(self._remember(question, near))
+            near = bool((inner >= 0).all() or (inner <= 0).all()) and self._overlap(question)[0] > 0
+        return bool(self._remember(asked, near))
 
-    def _overlap(self, placed: PlacedParts, i: int, j: int) -> tuple[float, float]:
+    def _overlap(self, question: _Question) -> tuple[float, float]:
         from stages.shape.physics.patches import overlap
 
-        a, b, pose, key = self._question(placed, i, j)
+        a, b, pose, key = question
         if not (self.solids.closed[a] and self.solids.closed[b]):
             return 0.0, 0.0
-        question = ("overlap", a, b, key)
-        if question in self._answers:
-            cached: tuple[float, float] = self._answers[question]
+        asked = ("overlap", key)
+        if asked in self._answers:
+            cached: tuple[float, float] = self._answers[asked]
             return cached
         moved = self.meshes[b].vertices @ pose[:3, :3].T + pose[:3, 3]
         low = np.maximum(self.meshes[a].bounds[0], moved.min(axis=0))
@@ -163,23 +182,23 @@ class PairContacts:
         answer = (0.0, 0.0)
         if (high > low).all():
             answer = overlap(self._tree(a)[0], self._tree(b)[0], pose, low, high)
-        remembered: tuple[float, float] = self._remember(question, answer)
+        remembered: tuple[float, float] = self._remember(asked, answer)
         return remembered
 
-    def _patch(self, placed: PlacedParts, i: int, j: int, tolerance: float) -> tuple[bool, FloatArray, FloatArray]:
+    def _patch(self, question: _Question, tolerance: float) -> tuple[bool, FloatArray, FloatArray]:
         """Return whether the parts are within `tolerance`, the corners of the patches between them, and normals out of
-        part i.
+        the first.
 
-        All are in coordinates of part i.
+        All are in coordinates of the first.
         """
         from stages.shape.geometry.mesh_pairs import near_pairs
         from stages.shape.geometry.pose import invert
         from stages.shape.physics.patches import facing_polygons, flat_hulls, touching_edges
 
-        a, b, pose, key = self._question(placed, i, j)
-        question = ("patch", a, b, key, tolerance)
-        if question in self._answers:
-            cached: tuple[bool, FloatArray, FloatArray] = self._answers[question]
+        a, b, pose, key = question
+        asked = ("patch", key, tolerance)
+        if asked in self._answers:
+            cached: tuple[bool, FloatArray, FloatArray] = self._answers[asked]
             return cached
         pairs = near_pairs(self._tree(a), self._tree(b), pose, tolerance)
         corners_a, corners_b = self._tree(a)[0], self._tree(b)[0]
@@ -196,7 +215,7 @@ class PairContacts:
             points = np.concatenate([points, other @ pose[:3, :3].T + pose[:3, 3]])
             normals = np.concatenate([normals, -outward @ pose[:3, :3].T])
         answer = (len(pairs) > 0, *flat_hulls(points, normals, tolerance))
-        remembered: tuple[bool, FloatArray, FloatArray] = self._remember(question, answer)
+        remembered: tuple[bool, FloatArray, FloatArray] = self._remember(asked, answer)
         return remembered
 
 

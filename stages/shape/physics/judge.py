@@ -65,6 +65,7 @@ class Judge:
         self._meshes, self._up = tuple(meshes), up
         self._solids = MeshSolids(self._meshes)
         self._touch = PairContacts(self._meshes, self._solids)
+        self._last: tuple[Assembly, PlacedParts] | None = None
 
     def rooted(self, assembly: Assembly) -> bool:
         """Return whether every part is connected to the ground (shapeassembly App. E)."""
@@ -149,7 +150,10 @@ class Judge:
         return self.config.touching * diagonal, self.config.connected * diagonal
 
     def _placed(self, assembly: Assembly) -> PlacedParts:
-        return PlacedParts.of(self._meshes, self._solids, assembly, self._up)
+        # Several questions follow each other about one assembly.
+        if self._last is None or self._last[0] is not assembly:
+            self._last = assembly, PlacedParts.of(self._meshes, self._solids, assembly, self._up)
+        return self._last[1]
 
     def _standing(self, placed: PlacedParts) -> ContactPatches:
         return standing_points(placed, np.arange(len(placed)), self.config.connected * placed.diagonal)

@@ -50,7 +50,7 @@ def mirror_score(placed: PlacedParts) -> float:
         own = _long_axis(placed)
     normals = np.concatenate([ways, [[-own[1], own[0]]], [own]])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return max(_matched(placed, positions, spreads, normal) for normal in normals)
+    return float(_matched(placed, positions, spreads, normals).max())
 
 
 def _long_axis(placed: PlacedParts) -> FloatArray:
@@ -62,20 +62,27 @@ def _long_axis(placed: PlacedParts) -> FloatArray:
 
 def _spreads(placed: PlacedParts) -> FloatArray:
     """Return how the corners of each part spread about their middle, float64 (n, 3, 3), as a root of second moments."""
-    spreads = np.empty((len(placed), 3, 3))
+    moments = np.empty((len(placed), 3, 3))
     for part, points in enumerate(placed.points):
         centred = points - points.mean(axis=0)
-        values, vectors = np.linalg.eigh(centred.T @ centred / len(points))
-        spreads[part] = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+        moments[part] = centred.T @ centred / len(points)
+    values, vectors = np.linalg.eigh(moments)
+    spreads: FloatArray = (vectors * np.sqrt(np.maximum(values, 0.0))[:, None]) @ np.swapaxes(vectors, 1, 2)
     return spreads
 
 
-def _matched(placed: PlacedParts, positions: FloatArray, spreads: FloatArray, normal: FloatArray) -> float:
+def _matched(placed: PlacedParts, positions: FloatArray, spreads: FloatArray, normals: FloatArray) -> FloatArray:
+    """Return the weight that each mirror maps to equal parts, float64 (k,).
+
+    normals: of the mirrors, level and of length 1, float64 (k, 2)
+    """
     from scipy.spatial import cKDTree
 
-    mirror = np.eye(3)
-    mirror[:2, :2] -= 2 * np.outer(normal, normal)
+    mirrors = np.tile(np.eye(3), (len(normals), 1, 1))
+    mirrors[:, :2, :2] -= 2 * normals[:, :, None] * normals[:, None, :]
     there = np.concatenate([positions, spreads.reshape(-1, 9)], axis=1)
-    mirrored = np.concatenate([positions @ mirror, (mirror @ spreads @ mirror).reshape(-1, 9)], axis=1)
+    turned = mirrors[:, None] @ spreads @ mirrors[:, None]
+    mirrored = np.concatenate([positions @ mirrors, turned.reshape(len(normals), -1, 9)], axis=2)
     distances, _ = cKDTree(there).query(mirrored, distance_upper_bound=MIRROR_TOLERANCE_SHARE * placed.diagonal)
-    return float(placed.weights[np.isfinite(distances)].sum())
+    matched: FloatArray = np.isfinite(distances) @ placed.weights
+    return matched
