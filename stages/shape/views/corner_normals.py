@@ -39,17 +39,16 @@ def _corner_normals(vertices, faces, welded, normals, min_cosine):
     weights = np.zeros((count, 3))
     first = np.zeros(welded.max() + 2 if count else 1, np.int64)
     for f in range(count):
-        a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
-        area = np.linalg.norm(np.cross(b - a, c - a))
         for k in range(3):
-            here, ahead, behind = (
-                vertices[faces[f, k]],
-                vertices[faces[f, (k + 1) % 3]],
-                vertices[faces[f, (k + 2) % 3]],
-            )
-            weights[f, k] = area * np.arctan2(area, np.dot(ahead - here, behind - here))
+            here, ahead, behind = faces[f, k], faces[f, (k + 1) % 3], faces[f, (k + 2) % 3]
+            ux, uy, uz = _way(vertices, here, ahead)
+            vx, vy, vz = _way(vertices, here, behind)
+            x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+            area = np.sqrt(x * x + y * y + z * z)
+            weights[f, k] = area * np.arctan2(area, ux * vx + uy * vy + uz * vz)
             first[welded[f, k] + 1] += 1
-    first = np.cumsum(first)
+    for index in range(1, len(first)):
+        first[index] += first[index - 1]
     corners, filled = np.empty(3 * count, np.int64), first.copy()
     for f in range(count):
         for k in range(3):
@@ -57,13 +56,35 @@ def _corner_normals(vertices, faces, welded, normals, min_cosine):
             filled[welded[f, k]] += 1
     corner_normals = np.zeros((count, 3, 3), np.float32)
     for f in range(count):
-        own = normals[f]
         for k in range(3):
-            total = np.zeros(3)
+            x, y, z = 0.0, 0.0, 0.0
             for index in range(first[welded[f, k]], first[welded[f, k] + 1]):
                 other, corner = corners[index] // 3, corners[index] % 3
-                if np.dot(own, normals[other]) >= min_cosine:
-                    total += weights[other, corner] * normals[other]
-            length = np.linalg.norm(total)
-            corner_normals[f, k] = total / length if length > 0.0 else own
+                if _cosine(normals, f, other) >= min_cosine:
+                    x += weights[other, corner] * normals[other, 0]
+                    y += weights[other, corner] * normals[other, 1]
+                    z += weights[other, corner] * normals[other, 2]
+            length = np.sqrt(x * x + y * y + z * z)
+            if length > 0.0:
+                corner_normals[f, k, 0], corner_normals[f, k, 1] = x / length, y / length
+                corner_normals[f, k, 2] = z / length
+            else:
+                for axis in range(3):
+                    corner_normals[f, k, axis] = normals[f, axis]
     return corner_normals
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _way(vertices, start, end):
+    """Return the vector from one vertex to another, as three numbers."""
+    return (
+        vertices[end, 0] - vertices[start, 0],
+        vertices[end, 1] - vertices[start, 1],
+        vertices[end, 2] - vertices[start, 2],
+    )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _cosine(normals, a, b):
+    """Return the cosine of the angle between two unit normals."""
+    return normals[a, 0] * normals[b, 0] + normals[a, 1] * normals[b, 1] + normals[a, 2] * normals[b, 2]

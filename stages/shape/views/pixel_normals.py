@@ -41,9 +41,17 @@ def _interpolate(triangles, screen, flat, corners, parts, face_of, rotations):
             area = ax * by - ay * bx
             u = min(max((px * by - py * bx) / area, 0.0), 1.0) if area != 0.0 else 0.0
             v = min(max((ax * py - ay * px) / area, 0.0), 1.0 - u) if area != 0.0 else 0.0
-            x, y, z = (1.0 - u - v) * n[0] + u * n[1] + v * n[2]
-            turned = np.array([r[k, 0] * x + r[k, 1] * y + r[k, 2] * z for k in range(3)])
-            length, towards = np.linalg.norm(turned), np.dot(turned, flat[t])
+            w = 1.0 - u - v
+            x = w * n[0, 0] + u * n[1, 0] + v * n[2, 0]
+            y = w * n[0, 1] + u * n[1, 1] + v * n[2, 1]
+            z = w * n[0, 2] + u * n[1, 2] + v * n[2, 2]
+            nx = r[0, 0] * x + r[0, 1] * y + r[0, 2] * z
+            ny = r[1, 0] * x + r[1, 1] * y + r[1, 2] * z
+            nz = r[2, 0] * x + r[2, 1] * y + r[2, 2] * z
+            length = np.sqrt(nx * nx + ny * ny + nz * nz)
             if length > 0.0:
-                normals[row, column] = turned / (length if towards >= 0.0 else -length)
+                if nx * flat[t, 0] + ny * flat[t, 1] + nz * flat[t, 2] < 0.0:
+                    length = -length
+                normals[row, column, 0], normals[row, column, 1] = nx / length, ny / length
+                normals[row, column, 2] = nz / length
     return normals
