@@ -72,9 +72,11 @@ class Camera:
             raise ValueError(
                 f"camera distance {self.distance} is inside the shape; at least {MIN_DISTANCE_RADII} radii"
             )
-        middle = (points.min(axis=0) + points.max(axis=0)) / 2
-        turned = (points - middle) @ eye_rotation(self.azimuth, self.elevation, up).T
-        radius = float(np.linalg.norm(turned, axis=1).max()) or 1.0
+        # Along rows of coordinates numpy reduces several times as fast as along columns.
+        rows = np.ascontiguousarray(points.T)
+        middle = (rows.min(axis=1) + rows.max(axis=1)) / 2
+        turned = np.ascontiguousarray(((points - middle) @ eye_rotation(self.azimuth, self.elevation, up).T).T)
+        radius = float(np.sqrt((turned**2).sum(axis=0).max())) or 1.0
         slope = np.tan(np.radians(self.fov) / 2)
         half = slope * np.array([max(aspect, 1.0), max(1.0 / aspect, 1.0)])
         if self.projection == "perspective":
@@ -86,7 +88,7 @@ class Camera:
         eye = np.eye(4)
         eye[:3, :3] = eye_rotation(self.azimuth, self.elevation, up)
         eye[:3, 3] = -eye[:3, :3] @ middle - [shift[0], shift[1], depth]
-        depths = depth - turned[:, 2]
+        depths = depth - turned[2]
         slack = 0.01 * radius
         near, far = max(float(depths.min()) - slack, 0.005 * radius), float(depths.max()) + slack
         return View(eye, _projection(self.projection, frame, near, far), depth, radius)
@@ -94,24 +96,28 @@ class Camera:
     def _perspective_frame(self, turned: FloatArray, half: FloatArray, radius: float) -> tuple[FloatArray, float]:
         """Return the sideways shift (2,) and the distance of the eye.
 
+        turned: coordinates of the points along the axes of the eye, (3, n)
         half: tangents of half the angles of both sides
         """
         if self.distance is not None:
             return np.zeros(2), self.distance * radius
         inner = half * (1.0 - 2.0 * self.margin)
         # A point stays left of the right border exactly if x - shift <= (depth - z) * inner, and so on.
-        right = (turned[:, :2] + turned[:, 2:] * inner).max(axis=0)
-        left = (-turned[:, :2] + turned[:, 2:] * inner).max(axis=0)
-        depth = max(float(((right + left) / (2 * inner)).max()), float(turned[:, 2].max()) + 0.05 * radius)
+        nearer = turned[2] * inner[:, None]
+        right, left = (turned[:2] + nearer).max(axis=1), (nearer - turned[:2]).max(axis=1)
+        depth = max(float(((right + left) / (2 * inner)).max()), float(turned[2].max()) + 0.05 * radius)
         return (right - left) / 2, depth
 
     def _orthographic_frame(
         self, turned: FloatArray, sides: FloatArray, radius: float, slope: float
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the sideways shift (2,) and half extents (2,) of the frame."""
+        """Return the sideways shift (2,) and half extents (2,) of the frame.
+
+        turned: coordinates of the points along the axes of the eye, (3, n)
+        """
         if self.distance is not None:
             return np.zeros(2), sides * self.distance * radius * slope
-        high, low = turned[:, :2].max(axis=0), turned[:, :2].min(axis=0)
+        high, low = turned[:2].max(axis=1), turned[:2].min(axis=1)
         needed = (high - low) / 2 / sides / (1.0 - 2.0 * self.margin)
         return (high + low) / 2, sides * max(float(needed.max()), 1e-9 * radius)
 

@@ -37,7 +37,8 @@ ChannelType = Literal["half", "float"]
 
 def png_bytes(drawing: ByteArray) -> bytes:
     """Return a drawing, uint8 (h, w), as a single-channel 8-bit PNG."""
-    return _written(drawing, "png", "uint8", {})
+    attributes = {"png:compressionLevel": PNG_LEVEL, "png:filter": FILTER_NONE}
+    return _written(drawing, "png", "uint8", attributes)
 
 
 def color_png_bytes(pixels: ByteArray, level: int = PNG_LEVEL) -> bytes:

@@ -53,12 +53,25 @@ def raster(screen: FloatArray, width: int, height: int) -> IntArray:
     A triangle is seen from both sides, unless it has no area on the grid. Raises ValueError for corners that
     are not finite, or too far outside of the picture.
     """
-    farthest = float(np.abs(screen[:, :, :2]).max(initial=1.0))
+    farthest = float(_farthest(screen))
     bits = COORDINATE_BITS - int(np.frexp(farthest)[1]) if np.isfinite(farthest) else 0
     if bits < 1:
         raise ValueError(f"corners of triangles lie {farthest:g} pixels away: the camera is inside the shape")
     triangles: IntArray = _raster(screen, width, height, min(bits, GRID_BITS))
     return triangles
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _farthest(screen):
+    """Return the largest coordinate on the screen without its sign, at least 1; infinite if one is not finite."""
+    farthest = 1.0
+    for t in range(len(screen)):
+        for k in range(3):
+            for axis in range(2):
+                size = abs(screen[t, k, axis])
+                if not size <= farthest:
+                    farthest = size if size > farthest else np.inf
+    return farthest
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -201,13 +201,16 @@ def _between(triangles, parts, thresholds, projection, a, b, p, q):
     a, b: triangles that they show, one of them perhaps none
     """
     screen, normals, crease = triangles.screen, triangles.normals, thresholds.crease
-    if b < 0:
-        return OUTLINE_LINE, _walk(triangles, parts.shifts[parts.of[a]], crease, a, -1, p, q)[1]
-    if a < 0:
-        return OUTLINE_LINE, 1.0 - _walk(triangles, parts.shifts[parts.of[b]], crease, b, -1, q, p)[1]
-    part_a, part_b = parts.of[a], parts.of[b]
-    goal_a, goal_b = (b, a) if part_a == part_b else (-1, -1)
+    # Numba copies the walk to each of its calls: one serves outlines on both sides, too.
+    is_outline, is_turned = a < 0 or b < 0, a < 0
+    if is_turned:
+        a, p, q = b, q, p
+    part_a = parts.of[a]
+    part_b = part_a if is_outline else parts.of[b]
+    goal_a, goal_b = (b, a) if part_a == part_b and not is_outline else (-1, -1)
     arrived, end_a, last_a, sharp = _walk(triangles, parts.shifts[part_a], crease, a, goal_a, p, q)
+    if is_outline:
+        return OUTLINE_LINE, 1.0 - end_a if is_turned else end_a
     if arrived:
         return _on_one_surface(normals, thresholds.rounded, a, b, sharp)
     arrived, end_b, last_b, sharp = _walk(triangles, parts.shifts[part_b], crease, b, goal_b, q, p)
