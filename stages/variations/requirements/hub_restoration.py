@@ -54,7 +54,7 @@ class HubRestorer:
         if assembly.stretches is not None:
             return assembly
         whole = assembly
-        boxes = world_boxes(kit.types, whole.types, whole.poses)
+        boxes = world_boxes(kit.types, whole.types, whole.poses) if kit.grammar.hubs else np.empty((0, 2, 3))
         for hub in kit.grammar.hubs:
             for place in self._places(hub, assembly):
                 box = world_boxes(kit.types, np.array([hub]), place[None])

@@ -70,8 +70,9 @@ class PackedShapes:
             centre = np.einsum("nij,nj->ni", turn_of, centroids[assembly.types]) + place
             order = np.lexsort((centre[:, 0], assembly.types))
             own, numbers = assembly.types[order], []
-            for turn in turn_of[order]:
-                key = np.round(turn * 1e4).astype(np.int16).tobytes()
+            keys = np.round(turn_of[order] * 1e4).astype(np.int16)
+            for turn, rounded in zip(turn_of[order], keys, strict=True):
+                key = rounded.tobytes()
                 if key not in rotations:
                     rotations[key] = len(kept)
                     kept.append(turn)
