@@ -57,11 +57,14 @@ def record_kernels(file: Path) -> None:
 
 
 def _words(kernel: Any, arguments: tuple[Any, ...]) -> list[Any] | None:
-    """Return name and types of a cached kernel of the project; None for any other, and where a type has no words."""
+    """Return name and types of a cached kernel of the project; None for any other.
+
+    Raises TypeError where a type has no words: such a kernel would be compiled by workers, each for itself.
+    """
     name = name_of(kernel.py_func)
     try:
         if not hasattr(kernel._cache, "cache_path") or named(name) is not kernel:
             return None
         return [name, [argument_words(argument) for argument in arguments]]
-    except (AttributeError, ImportError, TypeError):
+    except (AttributeError, ImportError):
         return None

@@ -32,8 +32,12 @@ def argument_words(argument: Any) -> Any:
         return ["kernel", name_of(argument.dispatcher.py_func)]
     if isinstance(argument, types.Omitted):
         return ["omitted", argument.value]
+    if isinstance(argument, types.Literal):
+        return ["literal", argument.literal_value]
     if isinstance(argument, types.Optional):
         return ["optional", argument_words(argument.type)]
+    if argument == types.npy_rng:
+        return "npy_rng"
     if getattr(types, str(argument), None) == argument:
         return str(argument)
     raise TypeError(f"a kernel argument of type {argument} has no words")
@@ -51,4 +55,6 @@ def argument_type(words: Any) -> Any:
         return types.BaseTuple.from_types([argument_type(item) for item in rest[1:]], rest[0] and named(rest[0]))
     if kind == "kernel":
         return types.Dispatcher(named(rest[0]))
+    if kind == "literal":
+        return types.literal(rest[0])
     return types.Omitted(rest[0]) if kind == "omitted" else types.Optional(argument_type(rest[0]))

@@ -97,7 +97,8 @@ def test_kernels_that_the_dataset_uses_are_listed(made: tuple[Path, Path]) -> No
     used = {json.dumps(json.loads(line)["kernel"]) for line in lines}
     unlisted = used - {json.dumps([kernel.name, kernel.arguments]) for kernel in KernelList.read().kernels}
     assert len(used) > 40, "kernels that a cached kernel calls are not loaded"
-    assert len(unlisted) < len(used) / 3, f"run `make kernels`: {sorted(unlisted)}"
+    # Other kits may take other ways, but whatever the default dataset uses is compiled before its workers start.
+    assert len(unlisted) <= 3, f"run `make kernels`: {sorted(unlisted)}"
 
 
 def test_one_worker_killed_in_every_stage_makes_the_folder_of_two_workers(made: tuple[Path, Path]) -> None:

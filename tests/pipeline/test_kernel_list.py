@@ -78,6 +78,8 @@ class Interval(NamedTuple):
         types.BaseTuple.from_types((types.int64, types.int64), Interval),
         types.Omitted(0.5),
         types.Optional(types.int64),
+        types.literal(3),
+        types.npy_rng,
         types.Dispatcher(half),
     ],
     ids=lambda argument: type(argument).__name__,
