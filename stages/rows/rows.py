@@ -169,7 +169,7 @@ def _may_end_slabs(
 ) -> BoolArray:
     """Return where a slab that is no bay holds a part that recurs, and no contact leads past it, bool (p,).
 
-    Few planes pass, and the rules of `Slab`, of which these are two, are asked of these alone.
+    These are two of the rules of `Slab`. Few planes pass them, and only these are asked the others.
     planes: ends of slabs, float64 (p,)
     recurs: which parts have a part one step before or after, bool (n,)
     """
