@@ -181,7 +181,7 @@ def _may_end_slabs(
     before = ~(within | beyond | spanning)
     i, j = layout.edges.T
     passed = (before[:, i] & beyond[:, j]) | (before[:, j] & beyond[:, i])
-    allowed: BoolArray = (within & recurs).any(axis=1) & ~passed.any(axis=1)
+    allowed: BoolArray = np.logical_and((within & recurs).any(axis=1), ~passed.any(axis=1))
     return allowed
 
 
