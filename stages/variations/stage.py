@@ -1,6 +1,7 @@
 """Stage `variations`: kits in, many valid new assemblies out, as shards `<dataset>-<split>-<index>.tar`.
 
-Its shards are the searches and pools of each kit's rounds, the assignment of variants to splits, and the collection.
+Its shards are the searches and pools of each kit's rounds, the selection of each kit's variants, the assignment of all
+to shards, and the collection.
 """
 
 from __future__ import annotations
@@ -16,59 +17,68 @@ from stages.shape.collection.assignment import planned_collection
 from stages.variations.constraint import unknown_in
 from stages.variations.fallback import resolved_fallback
 from stages.variations.report.measures import described, growth
-from stages.variations.search.rounds import last_pool, search_shards
+from stages.variations.search.rounds import last_pool, search_shards, selection_name
 from stages.variations.settings import VariationsConfig
 
 BYTES_PER_VARIANT = 60_000
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """Return the rounds of every kit as far as they are known, then the assignment and the collection."""
+    """Return the rounds and selection of every kit as far as they are known, then the assignment and the collection."""
     if (
         not plan.shards("exemplars")
         or not plan.config.section(VariationsConfig).samples_per_kit
         or resolved_fallback(plan)
     ):
         return []
-    search: list[Shard] = []
-    ended = True
+    searches: list[Shard] = []
+    selections: dict[str, Shard] = {}
     for kit in plan.shards("exemplars"):
-        shards, kit_ended = search_shards(plan, kit)
-        search.extend(shards)
-        ended = ended and kit_ended
-    if not ended:
-        return search
-    assignment = _assignment_shard(plan, search)
-    return [*search, assignment, *_collection_shards(plan, assignment)]
+        shards, ended = search_shards(plan, kit)
+        searches.extend(shards)
+        if ended:
+            selections[kit] = _selection_shard(plan, kit, shards)
+    shards = [*searches, *selections.values()]
+    measures = {kit: plan.summary("variations", shard.name) for kit, shard in selections.items()}
+    if len(measures) < len(plan.shards("exemplars")) or None in measures.values():
+        return shards
+    chosen = tuple(f"variations/{shard.name}" for shard in selections.values())
+    assignment = Shard(f"{plan.config.name}-assignment", {"job": "assignment", "kits": measures}, chosen)
+    return [*shards, assignment, *_collection_shards(plan, assignment, searches)]
 
 
-def _assignment_shard(plan: Plan, search: list[Shard]) -> Shard:
-    """Return the shard that assigns variants to splits, planned once the search of every kit has ended."""
-    kits = [kit.name for kit in plan.config.section(ExemplarsConfig).kits]
-    inputs = (*(f"exemplars/{kit}" for kit in kits), *(f"variations/{shard.name}" for shard in search))
-    ends = {kit: last_pool(plan, kit) for kit in kits}
-    searched = {kit: {key: end[key] for key in ("curve", "crossings", "advice")} for kit, end in ends.items()}
-    params = {"job": "assignment", "kits": kits, "searched": searched}
-    return Shard(f"{plan.config.name}-assignment", params, inputs)
+def _selection_shard(plan: Plan, kit: str, searches: list[Shard]) -> Shard:
+    """Return the shard that chooses the variants of a kit, planned once its search has ended."""
+    end = last_pool(plan, kit)
+    params = {"job": "selection", "kit": kit, "searched": {key: end[key] for key in ("curve", "crossings", "advice")}}
+    inputs = (f"exemplars/{kit}", *(f"variations/{shard.name}" for shard in searches))
+    return Shard(selection_name(kit), params, inputs)
 
 
-def _collection_shards(plan: Plan, assignment: Shard) -> list[Shard]:
+def _collection_shards(plan: Plan, assignment: Shard, searches: list[Shard]) -> list[Shard]:
     """Return the shards of the collection, `<dataset>-<split>-<index>`; none before the assignment is made."""
     summary = plan.summary("variations", assignment.name)
     if summary is None:
         return []
-    searches = tuple(shard for shard in assignment.inputs if not shard.endswith("-pool"))
-    return planned_collection(plan, summary["shards"], (*searches, f"variations/{assignment.name}"))
+    exemplars = [f"exemplars/{kit}" for kit in assignment.params["kits"]]
+    found = [f"variations/{shard.name}" for shard in searches if shard.params["job"] == "search"]
+    return planned_collection(plan, summary["shards"], (*exemplars, *found, f"variations/{assignment.name}"))
 
 
 def run_shard(task: Task) -> Outcome:
-    """Run a search, pool, assignment or collection shard."""
+    """Run a search, pool, selection, assignment or collection shard."""
     from stages.variations.search.pool_shard import run_pool
     from stages.variations.search.search_shard import run_search
-    from stages.variations.selection.assignment import run_assignment
+    from stages.variations.selection.assignment import run_assignment, run_selection
     from stages.variations.selection.collection import run_collection
 
-    jobs = {"search": run_search, "pool": run_pool, "assignment": run_assignment, "collection": run_collection}
+    jobs = {
+        "search": run_search,
+        "pool": run_pool,
+        "selection": run_selection,
+        "assignment": run_assignment,
+        "collection": run_collection,
+    }
     return jobs[task.shard.params["job"]](task)
 
 

@@ -86,6 +86,11 @@ def search_name(round_name: str, k: int) -> str:
     return f"{round_name}-lane{k:02d}"
 
 
+def selection_name(kit: str) -> str:
+    """Return the name of the shard that chooses the variants of a kit. It seeds random streams: keep it."""
+    return f"{kit}-selection"
+
+
 def last_pool(plan: Plan, kit: str) -> dict[str, Any]:
     """Return the summary of the newest pool of a kit, empty before the first."""
     newest: dict[str, Any] = {}

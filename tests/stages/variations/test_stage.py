@@ -120,15 +120,17 @@ def test_split_by_graph_assigns_everything_found(tmp_path: Path) -> None:
     root = tmp_path / "one" / ".work" / "toy" / "variations"
     kits = json.loads((root / "records" / "toy-assignment.json").read_text(encoding="utf-8"))["summary"]["kits"]
     by_key = {sample.key: sample for shard in collection(tmp_path, "one") for sample in read_samples(shard)}
-    groups: dict[tuple[str, str], list[int]] = {}
-    keys = [f"{kit}-{place:06d}" for kit in ("chain", "road") for place in range(kits[kit]["pool"])]
-    for row, key in enumerate(keys):
-        groups.setdefault((by_key[key].kit, by_key[key].graph), []).append(row)
-    expected = assign_splits(
-        list(groups.values()), SplitConfig(val=0.2, test=0.3), decision_rng(5, "variations", "toy-assignment", "splits")
-    )
-    assert sorted(by_key) == sorted(keys)
-    assert [by_key[key].split for key in keys] == [SPLITS[split] for split in expected]
+    every_key = []
+    for kit in ("chain", "road"):
+        keys = [f"{kit}-{place:06d}" for place in range(kits[kit]["pool"])]
+        groups: dict[str, list[int]] = {}
+        for row, key in enumerate(keys):
+            groups.setdefault(by_key[key].graph, []).append(row)
+        rng = decision_rng(5, "variations", f"{kit}-selection", "splits")
+        expected = assign_splits(list(groups.values()), SplitConfig(val=0.2, test=0.3), rng)
+        assert [by_key[key].split for key in keys] == [SPLITS[split] for split in expected]
+        every_key += keys
+    assert sorted(by_key) == sorted(every_key)
     assert {kit: found["discarded"] for kit, found in kits.items()} == {"chain": 0, "road": 0}
 
 
