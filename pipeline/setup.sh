@@ -6,6 +6,7 @@
 set -eu
 
 VERSIONS="3.11 3.12 3.13"
+KERNEL_PACKAGES="numba scipy pydantic PyYAML tqdm"  # what modules with kernels import
 
 fail() { printf '%s\n' "$@" >&2; exit 1; }
 
@@ -98,12 +99,19 @@ pip_install() {
             found=$(count '^Collecting\|^Requirement already')
             new=$(find .venv/lib -maxdepth 3 -name '*.dist-info' -newer .venv/requirements.txt | wc -l)
             echo "set-up: $found packages found, $(count '^ *Downloading\|^ *Using cached\|^Processing') fetched," \
-                "$new installed, ${seconds}s elapsed"
+                "$new installed, $(wc -l < .venv/kernels.log) kernels compiled, ${seconds}s elapsed"
         fi
     done
     wait "$pip" || fail "$(tail -n 20 .venv/install.log)" "pip failed; all that it said is in .venv/install.log"
 }
 
 echo "installing $(grep -c '^[^-]' "$requirements") packages and what they need into .venv; the first time takes minutes"
+# Kernels need few of them: they are compiled while the others come. A first run compiles those that are left.
+: > .venv/kernels.log
+# shellcheck disable=SC2086
+pip_install --constraint requirements.lock $(grep '^--' requirements.lock) $KERNEL_PACKAGES
+nice .venv/bin/python -m pipeline.compile_kernels > .venv/kernels.log 2>&1 &
+kernels=$!
+trap 'kill "$kernels" 2>/dev/null || true' EXIT
 pip_install --constraint requirements.lock --requirement "$requirements"
 pip_install --no-deps --no-build-isolation --editable .

@@ -68,12 +68,17 @@ class Checkout:
         assert old in text
         path.write_text(text.replace(old, new), encoding="utf-8")
 
-    def start(self, module: str = "main") -> subprocess.Popen[str]:
+    @property
+    def environment(self) -> dict[str, str]:
         env = os.environ | {"PYTHONPATH": f"{self.folder}:{ROOT}", "XDG_CACHE_HOME": str(self.cache)}
         # Python takes a .pyc for current when size and second of the source agree, as after a quick edit.
         env["PYTHONDONTWRITEBYTECODE"] = "1"
         env.pop("NUMBA_CACHE_DIR", None)
-        return subprocess.Popen([sys.executable, "-m", f"shop.{module}"], env=env, stdout=subprocess.PIPE, text=True)
+        return env
+
+    def start(self, module: str = "main") -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", f"shop.{module}"]
+        return subprocess.Popen(command, env=self.environment, stdout=subprocess.PIPE, text=True)
 
     def run(self) -> str:
         process = self.start()

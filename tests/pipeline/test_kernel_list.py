@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -122,6 +124,19 @@ def test_listed_kernels_are_compiled_ahead_and_stale_entries_are_skipped(
     assert (seen[-1].done, seen[-1].total) == (3, 3)
     assert shop.run() == "31 8 7 compiled double width"
     assert compile_ahead(kernels, [0, 1, 2, 3], workers, seen.append) == 0
+
+
+def test_set_up_compiles_the_listed_kernels_in_one_process(tmp_path: Path) -> None:
+    shop = Checkout(tmp_path / "a", tmp_path / "cache")
+    area, total = [f"shop.{name}:{name}" for name in ("area", "total")]
+    kernels = [ListedKernel(area, [RING], [], 0.1), ListedKernel(total, [RING], [0], 0.1)]
+    write_list(KernelList([*kernels, ListedKernel("shop.area:gone", [RING], [], 0.1)], {}), tmp_path / "list.json")
+    code = "import sys, pathlib, pipeline.compile_kernels as c; c.main(pathlib.Path(sys.argv[1]))"
+    command = [sys.executable, "-c", code, str(tmp_path / "list.json")]
+    env = shop.environment | {"NUMBA_CACHE_LOCATOR_CLASSES": "pipeline.kernel_cache.KernelLocator"}
+    done = subprocess.run(command, env=env, stdout=subprocess.PIPE, text=True, check=True)
+    assert done.stdout.split() == [area, total, "shop.area:gone"]
+    assert shop.run() == "31 8 7 compiled double width"
 
 
 def test_note_of_a_complete_cache_is_for_one_code_and_one_processor(
