@@ -145,9 +145,9 @@ def test_every_target_gets_every_value_unchanged(tmp_path: Path) -> None:
     )  # fmt: skip
     arguments = [f"{name}={said}" for name in VARIABLES]
     reached = calls(*targets, *arguments)
-    assert len(reached) == 21 + len(targets[1:]) + 1, "21 stages; inspect looks at a program and a model"
+    assert len(reached) == 22 + len(targets[1:]) + 1, "22 stages; inspect looks at a program and a model"
     assert all(any(said in argument for argument in call) for call in reached)
-    assert sum(call.count(said) for call in reached if call[2] == "run") == 21 * 6
+    assert sum(call.count(said) for call in reached if call[2] == "run") == 22 * 6
     assert make("help", *arguments).stdout.count(said) == len(VARIABLES)
     assert not list(tmp_path.iterdir())
 
