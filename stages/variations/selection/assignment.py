@@ -73,7 +73,9 @@ def run_assignment(task: Task) -> Outcome:
     if not any(measures["variants"] for measures in kits.values()):
         advice = [f"{name}: {measures['advice']}" for name, measures in kits.items()]
         raise ConfigError("\n".join(["the search found no variant of any kit", *advice]))
-    chosen, parents, searches = [np.empty((0, 5), dtype=np.int64)], [], []
+    chosen = [np.empty((0, 5), dtype=np.int64)]
+    parents: list[bytes] = []
+    searches: list[str] = []
     for number, name in enumerate(kits):
         rows = np.load(task.input("variations", f"{selection_name(name)}.rows.npy"), allow_pickle=False)
         rows[:, 0] += len(searches)
