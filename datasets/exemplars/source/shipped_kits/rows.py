@@ -18,7 +18,7 @@ GLASS, SHUTTER, DOOR = (126, 160, 178), (66, 110, 92), (150, 52, 48)
 
 def shapes() -> dict[str, KitShape]:
     """Return the dresser, the bridge and the house by name."""
-    return {"dresser": _dresser(), "bridge": _bridge(), "house": _house()}
+    return {"dresser": _dresser(), "bridge": _bridge(), "house": _terrace()}
 
 
 def _dresser(columns: int = 3, rows: int = 3) -> KitShape:
@@ -118,14 +118,14 @@ def _bridge(spans: int = 4) -> KitShape:
     return bridge
 
 
-def _house(bays: int = 4, storeys: int = 3) -> KitShape:
+def _terrace(bays: int = 4, storeys: int = 3) -> KitShape:
     """Put windows with shutters on the front of a wall, 3 apart and 3.2 from storey to storey, a door among them."""
     apart, up, deep = 3.0, 3.2, 7.0
     width, height = bays * apart + 0.6, storeys * up + 0.4
     front = deep / 2
     gable = np.array([[-front - 0.5, 0.0], [front + 0.5, 0.0], [0.0, 3.4]])
     roof = extruded(gable, -width / 2 - 0.4, width / 2 + 0.4, SLATE).rotated(90.0)
-    house = KitShape(
+    terrace = KitShape(
         {
             "step": box((1.9, 0.3, 0.9), (0.0, 0.0, 0.45), STONE, bevel=0.05),
             "wall": box((width, height, deep), (0.0, 0.0, 0.0), BRICK),
@@ -138,24 +138,24 @@ def _house(bays: int = 4, storeys: int = 3) -> KitShape:
             "chimney": _chimney(),
         }
     )
-    house.put("wall", 0.0, 0.0, 0.0)
+    terrace.put("wall", 0.0, 0.0, 0.0)
     for storey in range(storeys):
-        house.put("cornice", 0.0, up * storey + 3.1, front)
+        terrace.put("cornice", 0.0, up * storey + 3.1, front)
         for bay in range(bays):
             x = apart * (bay - (bays - 1) / 2)
             if storey == 0 and bay == 1:
-                house.put("step", x, 0.0, front)
-                house.put("door", x, 0.3, front)
+                terrace.put("step", x, 0.0, front)
+                terrace.put("door", x, 0.3, front)
                 continue
-            house.put("window", x, up * storey + 0.9, front)
+            terrace.put("window", x, up * storey + 0.9, front)
             for side in (-1.0, 1.0):
-                house.put("shutter", x + 0.93 * side, up * storey + 0.95, front)
-    house.put("roof", 0.0, height, 0.0)
+                terrace.put("shutter", x + 0.93 * side, up * storey + 0.95, front)
+    terrace.put("roof", 0.0, height, 0.0)
     for bay in range(bays - 1):
-        house.put("dormer", apart * (bay - (bays - 2) / 2), height, 0.0)
+        terrace.put("dormer", apart * (bay - (bays - 2) / 2), height, 0.0)
     for side in (-1.0, 1.0):
-        house.put("chimney", side * (width / 2 - 0.7), height, 0.0)
-    return house
+        terrace.put("chimney", side * (width / 2 - 0.7), height, 0.0)
+    return terrace
 
 
 def _window() -> Solid:

@@ -19,14 +19,14 @@ from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png, trimmed
 
-VARIANTS = 8
+VARIANT_COUNT = 8
 CELL_PIXELS = 176
 CAMERA = Camera(azimuth=-32.0, elevation=20.0)
-SEED = 1
+RANDOM_SEED = 1
 
 
 def rows_figure() -> bytes:
-    """Draw each model and VARIANTS of it, as `configs/rows.yaml` makes them, as a PNG."""
+    """Draw each model and VARIANT_COUNT of it, as `configs/rows.yaml` makes them, as a PNG."""
     sections = [_section(name, model) for name, model in rows.shapes().items()]
     return picture_png(contact_sheet(sections, "Longer and shorter rows", CELL_PIXELS))
 
@@ -42,8 +42,8 @@ def _section(name: str, model: KitShape) -> Section:
         exemplar,
         ProportionsConfig.model_validate({"require": {"stable": True}}),
         RowsConfig(use=True, size="grow"),
-        VARIANTS,
-        lambda number: decision_rng(SEED, name, number),
+        VARIANT_COUNT,
+        lambda number: decision_rng(RANDOM_SEED, name, number),
         lambda reason, count: None,
     )
     shown = [shapes.unwarped(exemplar, ()).shape, *(layout.unwarped.shape for layout in layouts)]
