@@ -34,7 +34,7 @@ def false_sentences(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
         return
     shape, record = sample.shape, sample.record
     nouns = label_nouns(shape.labels)
-    noun = source_noun(record["kit"], shape.labels, sample.sections.get("captions", {}).get("nouns", {}))
+    noun = source_noun(record["kit"], shape.used_labels, sample.sections.get("captions", {}).get("nouns", {}))
     parser = CaptionParser(noun, list(nouns.values()))
     placement = placement_of(record["producer"], record["kit"])
     seen = witnessed(shape, sample.contacts, record["physics"], nouns, noun, placement)

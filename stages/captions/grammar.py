@@ -80,7 +80,7 @@ SENTENCES = (
     Sentence("stable", "It stands by itself."),
     Sentence("unstable", "It does not stand by itself."),
     Sentence("not rooted", "Not all of its parts are connected to the ground."),
-    Sentence("tilt", "The ground can be tilted by {0:d} degrees before it tips over."),
+    Sentence("tilt", "It stays upright on ground that slopes by {0:d} degrees."),
     Sentence("tilt", "It does not tip over when it is tilted by {0:d} degrees."),
     Sentence("mirror", "It is symmetric about an upright plane."),
 )

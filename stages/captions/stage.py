@@ -39,7 +39,7 @@ def run_shard(task: Task) -> Outcome:
         placement = placement_of(sample.producer, sample.kit)
         physics = json.loads(members["json"])["physics"]
         facts = ShapeFacts.of(shape, pairs_of(members[CONTACTS]), physics, label_nouns(shape.labels), placement)
-        noun = source_noun(sample.kit, shape.labels, config.nouns)
+        noun = source_noun(sample.kit, shape.used_labels, config.nouns)
         texts = captions(facts, noun, config.lengths, task.rng(sample.key))
         return {"json": json_bytes({}), CAPTION: json_bytes(texts)}
 

@@ -104,12 +104,15 @@ def label_nouns(labels: Sequence[str]) -> Mapping[str, str]:
 
 
 def source_noun(kit: str, labels: Sequence[str], nouns: Mapping[str, str]) -> str:
-    """Return what a shape of a source is called: as the config says, as the root of its paths, or as its source."""
+    """Return what a shape of a source is called: as the config says, as the root of its paths, or as its source.
+
+    labels: of the parts of the shape. A source whose name is a plural, such as `primitives`, has shapes.
+    """
     if kit in nouns:
         return nouns[kit]
     roots = {label.partition("/")[0] for label in labels}
-    name = roots.pop() if len(roots) == 1 and all("/" in label for label in labels) else kit
-    return " ".join(_words(name)) or "shape"
+    words = _words(roots.pop() if len(roots) == 1 and all("/" in label for label in labels) else kit)
+    return "shape" if not words or _is_plural(words[-1]) else " ".join(words)
 
 
 def _words(name: str) -> list[str]:

@@ -54,6 +54,11 @@ class Shape:
         labels: TypeArray = self.label_of[self.assembly.types]
         return labels
 
+    @property
+    def used_labels(self) -> tuple[str, ...]:
+        """The labels of its parts, each once, in the order of `labels`."""
+        return tuple(self.labels[label] for label in np.unique(self.part_labels))
+
     @cached_property
     def part_classes(self) -> TypeArray:
         """Class id of each part in the dataset, int16 (n,)."""

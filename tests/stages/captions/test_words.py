@@ -46,6 +46,7 @@ def test_nouns_are_the_words_of_labels_and_unique() -> None:
 def test_a_shape_is_called_by_the_config_by_its_paths_or_by_its_source() -> None:
     assert source_noun("furniture", ["Chair/seat", "Chair/Base/leg"], {}) == "chair"
     assert source_noun("space-base", ["hub"], {}) == "space base"
+    assert source_noun("primitives", ["box"], {}) == "shape", "a source whose name is a plural"
     assert source_noun("space-base", ["hub"], {"space-base": "space station"}) == "space station"
 
 
