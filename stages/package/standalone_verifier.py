@@ -6,7 +6,8 @@
     python verify.py FOLDER --samples 20 --workers 8
 
 It derives from the files what can be derived, by code of its own: checksums, members, records, counts, splits, and from
-the GLB of a sample its bounds, its parts and poses, points and normals, contacts, and the outline of its drawings.
+the GLB of a sample its bounds, its parts and poses, points and normals, contacts, the outline of its drawings, its
+hierarchy and symmetries, its union with signed distances and occupancy, and the sentences of its captions.
 Each fault is printed with its file and sample. Exit code 0: no fault; 1: faults.
 """
 
@@ -24,7 +25,7 @@ import threading
 import time
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
@@ -54,7 +55,45 @@ FAULTS_SHOWN = 20
 SECONDS_BETWEEN_LINES = 5.0
 DISTINCT = ("key", "shape graph", "mesh")
 """What no two splits share; a key is there once."""
-NOT_CHECKED = "not checked: physical stability (only rootedness is), strings and programs, the Parquet index"
+DISTANCES_PER_SAMPLE = 32
+"""Signed distances that are compared with the union, and cells of the occupancy grid."""
+DISTANCE_TOLERANCE_SHARE = 1e-5
+"""Largest error of a signed distance, as a share of the side of the cube."""
+VOLUME_TOLERANCE_SHARE = 1e-3
+IMAGE_TOLERANCE_SHARE = 2e-3
+"""Largest distance of the image of a part from the part that a symmetry names, as a share of the diagonal."""
+CAPTION_SLACK_SHARE = 0.02
+"""Lengths that differ by less than this share of the longest side are alike in captions."""
+ABOUT_SHARE = 0.07
+"""Relative difference that `about` may hide."""
+COUNTERS = {"set", "sets", "pane", "panes", "flight", "flights"}
+"""Words that count others in captions, such as `two panes of glass`."""
+IRREGULAR_SINGULARS = {
+    "shelves": "shelf",
+    "leaves": "leaf",
+    "halves": "half",
+    "feet": "foot",
+    "acroteria": "acroterion",
+}
+NUMBER_WORDS = [
+    *("zero", "one", "two", "three", "four", "five", "six"),
+    *("seven", "eight", "nine", "ten", "eleven", "twelve"),
+]
+TIMES = {"one and a half times": 1.5, "twice": 2.0, "two and a half times": 2.5} | {
+    f"{word} times": float(number) for number, word in enumerate(NUMBER_WORDS)
+}
+NOT_CHECKED = (
+    "not checked: physical stability (only rootedness is), strings and programs, rendered images, files of exports, "
+    "flags of surfaces, colors in captions, the Parquet index"
+)
+JSON_TYPES: dict[str, tuple[type, ...]] = {
+    "object": (dict,),
+    "array": (list,),
+    "string": (str,),
+    "boolean": (bool,),
+    "integer": (int,),
+    "number": (int, float),
+}
 
 
 @dataclass
@@ -105,11 +144,13 @@ def verify(folder: Path, samples: int | None = 100, seed: int = 0, workers: int 
         counts = [(str(shard["path"]), str(shard["split"]), int(shard["samples"])) for shard in manifest["shards"]]
         total, splits = int(manifest["samples"]), dict(manifest["splits"])
         members = [(str(member["name"]), str(member["dtype"]), list(member["shape"])) for member in manifest["members"]]
+        schema = dict(json.loads((folder / "schema.json").read_bytes()))
+        nouns = dict(manifest["config"].get("captions", {}).get("nouns", {}))
         sharing = manifest.get("graphs_share_split")
         producers = sorted(sharing if isinstance(sharing, list) else manifest["producers"] if sharing else ())
         owned = {(kit, number): row["id"] for row in class_rows for kit, number in row.get("own", {}).items()}
     except (OSError, ValueError, KeyError, TypeError) as error:
-        findings.faults.append(f"manifest.json or classes.json cannot be read: {error!r}")
+        findings.faults.append(f"manifest.json, classes.json or schema.json cannot be read: {error!r}")
         return findings
     count = total if samples is None else min(samples, total)
     chosen = np.sort(np.random.default_rng(seed).choice(total, count, replace=False))
@@ -119,7 +160,10 @@ def verify(folder: Path, samples: int | None = 100, seed: int = 0, workers: int 
         if path in listed:
             inside = chosen[slice(*np.searchsorted(chosen, (first, first + size)))]
             places = set((inside - first).tolist())
-            jobs.append(ShardJob(folder, path, split, members, labels, owned, producers, places, (seed, number)))
+            job = ShardJob(
+                folder, path, split, members, labels, owned, producers, places, (seed, number), schema, nouns
+            )
+            jobs.append(job)
         else:
             findings.faults.append(f"{path}: is in manifest.json and not in checksums.txt")
         first += size
@@ -176,6 +220,8 @@ class ShardJob:
     owned: class of each label of each kit, by the kit and the label's number there, where a dataset joins producers
     sharing: producers whose samples of one kit and graph share a split
     places: samples whose geometry is checked, by their place in the shard
+    schema: JSON schema of the records
+    nouns: what captions call the shapes of a kit, where the config states it
     """
 
     folder: Path
@@ -187,6 +233,8 @@ class ShardJob:
     sharing: list[str]
     places: set[int]
     seed: tuple[int, int]
+    schema: dict[str, Any] = field(default_factory=dict)
+    nouns: dict[str, str] = field(default_factory=dict)
 
 
 def check_shard(job: ShardJob) -> DatasetFindings:
@@ -285,6 +333,9 @@ def sample_faults(
         yield f"its record is of {record['key']} in {record['split']}, the shard is of {job.split}"
     if has_empty_value(record):
         yield "its json holds a null or an empty value"
+    for text in schema_faults(job.schema, record, "its json"):
+        yield f"{text}, which schema.json does not allow"
+        break
     arrays = {}
     for name, dtype, shape in job.members:
         if name.endswith(".npy") and name in members:
@@ -299,7 +350,7 @@ def sample_faults(
     for cloud in clouds(arrays):
         yield from label_faults(record, cloud)
     if rng is not None and "glb" in members:
-        yield from geometry_faults(record, members, arrays, rng)
+        yield from geometry_faults(job, record, members, arrays, rng)
         findings.checked["samples with geometry"] += 1
 
 
@@ -308,6 +359,37 @@ def has_empty_value(value: Any) -> bool:
     if isinstance(value, dict | list):
         return not value or any(map(has_empty_value, value.values() if isinstance(value, dict) else value))
     return value is None or value == ""
+
+
+def schema_faults(schema: dict[str, Any], value: Any, place: str) -> Iterator[str]:
+    """Yield where JSON is not as a schema says, by the keywords that schemas of datasets use."""
+    kind = schema.get("type")
+    is_truth = isinstance(value, bool) and kind in ("integer", "number")
+    if kind is not None and (is_truth or not isinstance(value, JSON_TYPES[kind])):
+        yield f"{place} is no {kind}"
+        return
+    if value not in schema.get("enum", [schema.get("const", value)]):
+        yield f"{place} is {value!r}"
+    if isinstance(value, dict):
+        known = schema.get("properties", {})
+        if not {*schema.get("required", ())} <= {*value} or (
+            schema.get("additionalProperties") is False and not {*value} <= {*known}
+        ):
+            yield f"{place} has the fields {', '.join(value)}"
+        for name in known.keys() & value.keys():
+            yield from schema_faults(known[name], value[name], f"{place}: {name}")
+    elif isinstance(value, list):
+        if not schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", len(value)):
+            yield f"{place} has {len(value)} items"
+        for number, item in enumerate(value):
+            yield from schema_faults(schema.get("items", {}), item, f"{place}: {number}")
+    elif isinstance(value, str):
+        if len(value) < schema.get("minLength", 0) or not re.search(schema.get("pattern", ""), value):
+            yield f"{place} is {value!r}"
+    elif isinstance(value, int | float):
+        above, below = schema.get("exclusiveMinimum", -np.inf), schema.get("exclusiveMaximum", np.inf)
+        if not (above < value < below and schema.get("minimum", value) <= value <= schema.get("maximum", value)):
+            yield f"{place} is {value}"
 
 
 def record_faults(
@@ -391,7 +473,11 @@ def label_faults(record: dict[str, Any], cloud: Cloud) -> Iterator[str]:
 
 
 def geometry_faults(
-    record: dict[str, Any], members: dict[str, bytes], arrays: dict[str, np.ndarray], rng: np.random.Generator
+    job: ShardJob,
+    record: dict[str, Any],
+    members: dict[str, bytes],
+    arrays: dict[str, np.ndarray],
+    rng: np.random.Generator,
 ) -> Iterator[str]:
     """Yield what the mesh says against record, points, contacts and drawings."""
     scene: Any = trimesh.load_scene(io.BytesIO(members["glb"]), file_type="glb", process=False)
@@ -429,6 +515,16 @@ def geometry_faults(
         yield from rooted_faults(record, triangles, arrays["joints.npy"], diagonal)
     for index, camera in enumerate(record.get("sketches", ())):
         yield from drawing_faults(f"sketch{index}.png", members[f"sketch{index}.png"], camera, corners)
+    if "hierarchy" in record:
+        yield from hierarchy_faults(record, scene)
+    if "symmetry" in record:
+        yield from symmetry_faults(record, triangles, IMAGE_TOLERANCE_SHARE * diagonal)
+    if "union_faces.npy" in arrays:
+        yield from union_faults(record, arrays, triangles, rng)
+    if "caption.json" in members:
+        boxes = np.array([[part.reshape(-1, 3).min(axis=0), part.reshape(-1, 3).max(axis=0)] for part in triangles])
+        captions = json.loads(members["caption.json"])
+        yield from caption_faults(captions, CaptionFacts(record, boxes, arrays["contacts.npy"], job.nouns))
 
 
 def is_placed_by(matrix: np.ndarray, pose: np.ndarray, tolerance: float) -> bool:
@@ -507,6 +603,331 @@ def near_triangles(triangles: np.ndarray, point: np.ndarray, tolerance: float) -
         closest = trimesh.triangles.closest_point(near, np.repeat(point[None], len(near), axis=0))
         near = near[np.linalg.norm(closest - point, axis=1) <= tolerance]
     return near
+
+
+def hierarchy_faults(record: dict[str, Any], scene: Any) -> Iterator[str]:
+    """Yield groups without a place in the tree, and parts whose node in the GLB is not below that of their group."""
+    groups, group_of = record["hierarchy"]["groups"], record["hierarchy"]["part_groups"]
+    parents = [group["parent"] for group in groups]
+    if parents[0] != -1 or any(not 0 <= parent < place for place, parent in enumerate(parents) if place):
+        yield "its hierarchy is no tree with parents first"
+    if len(group_of) != len(record["parts"]) or not all(0 <= group < len(groups) for group in group_of):
+        yield "its hierarchy does not have each part in one group"
+        return
+    if len(groups) < 2:
+        return
+    nodes = [f"group {number} {group['name']}" for number, group in enumerate(groups)]
+    above = dict(scene.graph.transforms.parents)
+    expected = {part["name"]: nodes[group] for part, group in zip(record["parts"], group_of, strict=True)}
+    expected |= {nodes[place]: nodes[parent] for place, parent in enumerate(parents) if place}
+    for name, node in expected.items():
+        if above.get(name) != node:
+            yield f"{name} is below {above.get(name)} in the GLB, and in its hierarchy below {node}"
+            return
+
+
+def symmetry_faults(record: dict[str, Any], triangles: list[np.ndarray], tolerance: float) -> Iterator[str]:
+    """Yield symmetries that do not take the vertices of a part to those of its image, and orbits that they leave."""
+    symmetry, labels = record["symmetry"], [part["label"] for part in record["parts"]]
+    orbits, (x, z) = symmetry["orbits"], symmetry["axis"]
+    if len(orbits) != len(labels):
+        yield "its symmetry does not have each part in one orbit"
+        return
+    vertices = [np.unique(part.reshape(-1, 3), axis=0) - (x, 0, z) for part in triangles]
+    joined = []
+    for operation in symmetry["operations"]:
+        images = operation["images"]
+        name = f"its {operation['kind']} by {operation['degrees']:g} degrees"
+        if sorted(images) != list(range(len(labels))):
+            yield f"{name} does not exchange its parts"
+            return
+        angle = np.radians(operation["degrees"])
+        cosine, sine = np.cos(angle), np.sin(angle)
+        if operation["kind"] == "mirror":
+            normal = np.array([cosine, 0.0, -sine])
+            matrix = np.eye(3) - 2 * np.outer(normal, normal)
+        else:
+            matrix = np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
+        for part, image in enumerate(images):
+            moved, there = vertices[part] @ matrix.T, vertices[image]
+            gaps = [abs(moved.min(axis=0) - there.min(axis=0)).max(), abs(moved.max(axis=0) - there.max(axis=0)).max()]
+            if labels[part] != labels[image] or max(gaps) > tolerance:
+                yield f"{name} does not take {record['parts'][part]['name']} to {record['parts'][image]['name']}"
+                return
+        joined += [(part, image) for part, image in enumerate(images)]
+    together = component_of(len(labels), np.array(joined).T)
+    if len({*zip(together.tolist(), orbits, strict=True)}) != len({*together.tolist()}) or len({*orbits}) != len(
+        {*together.tolist()}
+    ):
+        yield "its orbits are not those of its symmetries"
+
+
+def union_faults(
+    record: dict[str, Any], arrays: dict[str, np.ndarray], triangles: list[np.ndarray], rng: np.random.Generator
+) -> Iterator[str]:
+    """Yield what is wrong with the union, and signed distances and cells that contradict it."""
+    facts, faces = record["union"], arrays["union_faces.npy"].astype(np.int64)
+    vertices = arrays["union_vertices.npy"].astype(np.float64)
+    if not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
+        yield "its union has faces of vertices that do not exist"
+        return
+    instances = arrays["union_instances.npy"]
+    if len(instances) != len(faces) or instances.min() < 0 or instances.max() >= len(triangles):
+        yield "its union has faces of parts that do not exist"
+        return
+    starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    if not np.array_equal(np.sort(starts * len(vertices) + ends), np.sort(ends * len(vertices) + starts)):
+        yield "its union is not watertight"
+    corners = vertices[faces]
+    low, side = np.array(facts["cube_low"]), float(facts["cube_side"])
+    middles = corners.mean(axis=1)
+    for face in rng.permutation(len(faces))[:DISTANCES_PER_SAMPLE].tolist():
+        if not len(near_triangles(triangles[instances[face]], middles[face], POINT_TOLERANCE_SHARE * side)):
+            yield f"face {face} of its union is not on the part that it names"
+            return
+    if (middles < low - 1e-6 * side).any() or (middles > low + (1 + 1e-6) * side).any():
+        yield "its union is not inside its cube"
+    inner = corners - low
+    volume = float(np.einsum("fi,fi->", inner[:, 0], np.cross(inner[:, 1], inner[:, 2])) / 6)
+    if abs(volume - facts["volume"]) > VOLUME_TOLERANCE_SHARE * max(facts["volume"], 1e-3 * side**3):
+        yield f"its union encloses {volume:.6g}, its json says {facts['volume']}"
+    if "sdf_points.npy" in arrays:
+        points, values = arrays["sdf_points.npy"].astype(np.float64), arrays["sdf_values.npy"].astype(np.float64)
+        for index in rng.permutation(len(points))[:DISTANCES_PER_SAMPLE].tolist():
+            distance = surface_distance(corners, points[index])
+            if abs(distance - abs(values[index])) > DISTANCE_TOLERANCE_SHARE * side:
+                yield f"signed distance {index} is {values[index]:.6g}, and its union {distance:.6g} away"
+                return
+            if distance > DISTANCE_TOLERANCE_SHARE * side and is_inside(corners, points[index]) != (values[index] < 0):
+                yield f"the sign of signed distance {index} is not that of its union"
+                return
+    if "occupancy.npy" in arrays:
+        filled = np.unpackbits(arrays["occupancy.npy"], axis=2)
+        cell = side / len(filled)
+        if abs(float(filled.sum()) * cell**3 - facts["volume"]) > cell * facts["area"]:
+            yield f"its occupancy fills {float(filled.sum()) * cell**3:.6g}, its union {facts['volume']}"
+        for place in rng.integers(0, len(filled), (DISTANCES_PER_SAMPLE, 3)):
+            middle = low + (place + 0.5) * cell
+            if is_inside(corners, middle) != filled[tuple(place)] and surface_distance(corners, middle) > 1e-3 * cell:
+                yield f"cell {place.tolist()} of its occupancy is not as its union"
+                return
+
+
+def surface_distance(corners: np.ndarray, point: np.ndarray) -> float:
+    """Return the distance of a point to the nearest of some triangles (n, 3, 3)."""
+    apart = np.maximum(np.maximum(corners.min(axis=1) - point, point - corners.max(axis=1)), 0)
+    limit = np.linalg.norm(corners[:, 0] - point, axis=1).min()
+    near = corners[np.linalg.norm(apart, axis=1) <= limit]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        closest = trimesh.triangles.closest_point(near, np.repeat(point[None], len(near), axis=0))
+    return float(np.nanmin(np.linalg.norm(closest - point, axis=1)))
+
+
+def is_inside(corners: np.ndarray, point: np.ndarray) -> bool:
+    """Return whether a closed surface of triangles (n, 3, 3) is all around a point, by its solid angle."""
+    away = corners - point
+    lengths = np.linalg.norm(away, axis=2, keepdims=True)
+    a, b, c = (away / np.maximum(lengths, 1e-300)).transpose(1, 0, 2)
+    across = np.einsum("ni,ni->n", a, np.cross(b, c))
+    along = 1 + np.einsum("ni,ni->n", a, b) + np.einsum("ni,ni->n", b, c) + np.einsum("ni,ni->n", c, a)
+    return bool(2 * np.arctan2(across, along).sum() > 2 * np.pi)
+
+
+@dataclass(frozen=True)
+class CaptionFacts:
+    """What captions are compared with.
+
+    boxes: of the parts, float64 (n, 2, 3)
+    contacts: pairs of parts that touch, (2, m)
+    nouns: what shapes are called, by kit, where it is another name
+    """
+
+    record: dict[str, Any]
+    boxes: np.ndarray
+    contacts: np.ndarray
+    nouns: dict[str, str]
+
+    def side(self, word: str) -> float:
+        """Return how tall, wide or long the shape is."""
+        x, y, z = (self.boxes[:, 1].max(axis=0) - self.boxes[:, 0].min(axis=0)).tolist()
+        return float({"tall": y, "wide": x, "long": max(x, z)}[word])
+
+    @property
+    def slack(self) -> float:
+        """Length that makes no difference."""
+        return CAPTION_SLACK_SHARE * max(map(self.side, ("tall", "long", "wide")))
+
+    def parts(self, number: str | None, noun: str) -> list[int]:
+        """Return the parts that a noun names, whose label has its words; none if their number is another.
+
+        number: words or digits, and None for one
+        """
+        count = number_of(number or "a")
+        found = self.alike(noun, is_plural=count != 1)
+        return found if len(found) == count else []
+
+    def alike(self, noun: str, is_plural: bool = False) -> list[int]:
+        """Return the parts that a noun in singular or plural names."""
+        *first, last = noun.split()
+        if first and first[0] in COUNTERS:
+            first = first[2:]
+        elif is_plural:
+            singulars = {IRREGULAR_SINGULARS.get(last), last.removesuffix("s"), last.removesuffix("es")} - {None, last}
+            singulars |= {f"{last[:-3]}y"} if last.endswith("ies") else set()
+            wanted = [sorted([*first, str(form)]) for form in singulars]
+            return [place for place in range(len(self.boxes)) if any(words in wanted for words in self._words(place))]
+        return [place for place in range(len(self.boxes)) if sorted([*first, last]) in self._words(place)]
+
+    def _words(self, part: int) -> list[list[str]]:
+        """Return the words of the last step of a part's label, and those of its last two steps."""
+        steps = [label_words(step) for step in self.record["parts"][part]["label"].split("/")[-2:]]
+        return [sorted(steps[-1]), sorted(word for step in steps for word in step)]
+
+    def middles(self, parts: list[int]) -> np.ndarray:
+        """Return the middles of the boxes of parts, float64 (n, 3)."""
+        middles: np.ndarray = self.boxes[parts].mean(axis=1)
+        return middles
+
+    def in_columns(self, columns: str, rows: str, parts: list[int]) -> bool:
+        """Return whether parts have as many heights as there are rows, each in every column."""
+        if not parts or len(parts) != number_of(columns) * number_of(rows):
+            return False
+        heights = np.sort(self.middles(parts)[:, 1]).reshape(-1, number_of(columns))
+        return bool(np.ptp(heights, axis=1).max() < self.slack and (np.diff(heights[:, 0]) > self.slack / 4).all())
+
+    def in_stack(self, parts: list[int]) -> bool:
+        """Return whether parts are one above the other."""
+        boxes = self.boxes[parts]
+        boxes = boxes[np.argsort(boxes[:, 0, 1])]
+        return bool(parts and (boxes[1:, 0, 1] > boxes[:-1, 1, 1] - self.slack).all())
+
+    def in_row(self, parts: list[int]) -> bool:
+        """Return whether parts are on a line at equal steps."""
+        if len(parts) < 2:
+            return False
+        middles = self.middles(parts)
+        ends = max(combinations(middles, 2), key=lambda pair: float(np.linalg.norm(pair[0] - pair[1])))
+        order = np.argsort((middles - ends[0]) @ (ends[1] - ends[0]))
+        return bool(np.abs(middles[order] - np.linspace(*ends, len(middles))).max() < self.slack)
+
+    def in_circle(self, parts: list[int]) -> bool:
+        """Return whether parts are equally far from their middle, at one height."""
+        if not parts:
+            return False
+        away = self.middles(parts)
+        away = away - away.mean(axis=0)
+        return bool(max(np.ptp(np.linalg.norm(away, axis=1)), np.ptp(away[:, 1])) < self.slack)
+
+    def stands_on(self, parts: list[int]) -> bool:
+        """Return whether some parts are those on the ground."""
+        low = self.boxes[:, 0, 1]
+        return (
+            bool(self.record["physics"]["stable"])
+            and parts == np.flatnonzero(low < low.min() + self.slack / 2).tolist()
+        )
+
+    def is_above(self, parts: list[int], others: list[int]) -> bool:
+        """Return whether all of some parts are above all of others."""
+        if not parts or not others:
+            return False
+        return bool(self.boxes[parts, 0, 1].min() > self.boxes[others, 1, 1].max() - self.slack)
+
+    def all_touch(self, parts: list[int], others: list[int]) -> bool:
+        """Return whether each of some parts touches one of others."""
+        pairs = {(first, second) for pair in self.contacts.T.tolist() for first, second in (pair, pair[::-1])}
+        return bool(parts) and all(any((part, other) in pairs for other in others) for part in parts)
+
+    def is_called(self, noun: str) -> bool:
+        """Return whether the shape is called so: as the config says, by its kit, or by the first step of its labels."""
+        kit, labels = self.record["kit"], [part["label"].partition("/") for part in self.record["parts"]]
+        if kit in self.nouns:
+            return noun == self.nouns[kit]
+        roots = {root for root, _, _ in labels}
+        words = label_words(roots.pop() if len(roots) == 1 and all(slash for _, slash, _ in labels) else kit)
+        return sorted(noun.split()) == sorted(words) or (noun == "shape" and (not words or words[-1].endswith("s")))
+
+    def opens(self, adjective: str | None, noun: str, things: str | None) -> bool:
+        """Return whether the first sentence of a caption holds."""
+        if not self.is_called(noun):
+            return False
+        tall, wide, long = map(self.side, ("tall", "wide", "long"))
+        if (adjective == "tall" and tall <= 1.5 * wide) or (adjective == "low" and long <= 1.5 * tall):
+            return False
+        for thing in re.split(", | and ", things) if things else ():
+            match = re.fullmatch(THING, thing)
+            parts = self.parts(match["n"], match["x"]) if match else []
+            if match is None or not parts or (match["c"] and not self.in_columns(match["c"], match["r"], parts)):
+                return False
+        return True
+
+
+def number_of(word: str) -> int:
+    """Return the number that a word or digits say; 1 for an article."""
+    return 1 if word in ("a", "an") else NUMBER_WORDS.index(word) if word in NUMBER_WORDS else int(word)
+
+
+def label_words(text: str) -> list[str]:
+    """Return the words of a label, in lower case."""
+    return [word.lower() for word in re.split(r"[\s_.\-]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)) if word]
+
+
+NUMBER = rf"(?:{'|'.join(NUMBER_WORDS)}|\d+)"
+SIDE = "(?:tall|wide|long)"
+THING = rf"(?P<n>an?|{NUMBER}) (?P<x>.+?)(?: in (?P<c>{NUMBER}) columns of (?P<r>{NUMBER}))?"
+OPENING = "An? (?:(?P<adjective>tall|low) )?(?P<noun>.+?)(?: (?:with|that has) (?P<things>.+))?"
+N, X = rf"(?:(?P<n>{NUMBER}) )?", "(?P<x>.+?)"
+CAPTION_SENTENCES: dict[str, Callable[..., bool]] = {
+    rf"It (?:is made|consists) of (?P<n>{NUMBER}) parts": lambda it, n: len(it.boxes) == number_of(n),
+    "It is one piece": lambda it: len(it.boxes) == 1,
+    "It is taller than it is (?P<a>wide|long)": lambda it, a: it.side("tall") > it.side(a),
+    "It is wider than it is tall": lambda it: it.side("wide") > it.side("tall"),
+    "It is longer than it is tall": lambda it: it.side("long") > it.side("tall"),
+    rf"It is about as (?P<a>{SIDE}) as it is (?P<b>{SIDE})": lambda it, a, b: (
+        abs(it.side(a) / it.side(b) - 1) < ABOUT_SHARE
+    ),
+    rf"It is about (?P<t>{'|'.join(TIMES)}) as (?P<a>{SIDE}) as it is (?P<b>{SIDE})": lambda it, t, a, b: (
+        abs(it.side(a) / it.side(b) / TIMES[t] - 1) < ABOUT_SHARE
+    ),
+    r"It(?:s height)? is (?P<d>\d+\.\d+) m(?: tall)?": lambda it, d: (
+        it.record["unit"] == "metre" and abs(it.side("tall") - float(d)) < 0.006
+    ),
+    rf"(?:Its|The) {N}{X} (?:form|are arranged in) (?P<c>{NUMBER}) columns of (?P<r>{NUMBER})": lambda it, n, x, c, r: (
+        it.in_columns(c, r, it.parts(n, x))
+    ),
+    f"The {N}{X} are one above the other": lambda it, n, x: it.in_stack(it.parts(n, x)),
+    f"The {N}{X} (?:are in a row, at equal distances|form a straight row)": lambda it, n, x: it.in_row(it.parts(n, x)),
+    f"The {N}{X} form a circle": lambda it, n, x: it.in_circle(it.parts(n, x)),
+    f"It (?:stands|rests) on (?:its )?{N}{X}": lambda it, n, x: it.stands_on(it.parts(n, x)),
+    f"The {N}{X} (?:is|are) above the (?:(?P<m>{NUMBER}) )?(?P<y>.+)": lambda it, n, x, m, y: it.is_above(
+        it.parts(n, x), it.parts(m, y)
+    ),
+    f"Every {X} touches (?:at least one of )?the (?:(?P<m>{NUMBER}) )?(?P<y>.+)": lambda it, x, m, y: it.all_touch(
+        it.alike(x), it.parts(m, y)
+    ),
+    f"The {N}{X} (?:is|are) [a-z]+(?: [a-z]+)?": lambda it, n, x: bool(it.parts(n, x)),
+    "(?:All of it is|It is) [a-z]+(?: [a-z]+)?(?: all over)?": lambda it: True,
+    "It stands by itself": lambda it: it.record["physics"]["stable"],
+    "It does not stand by itself": lambda it: not it.record["physics"]["stable"],
+    "Not all of its parts are connected to the ground": lambda it: not it.record["physics"]["rooted"],
+    r"(?:It stays upright on ground that slopes|It does not tip over when it is tilted) by (?P<d>\d+) degrees": (
+        lambda it, d: it.record["physics"]["tipping_degrees"] > float(d)
+    ),
+    "It is symmetric about an upright plane": lambda it: it.record["physics"]["symmetry"] > 0.99,
+}
+"""Sentences of captions, and whether they hold; the first that a sentence matches counts."""
+
+
+def caption_faults(captions: dict[str, str], facts: CaptionFacts) -> Iterator[str]:
+    """Yield sentences of captions that cannot be read, and those that do not hold. Of colors only the parts count."""
+    for length, caption in captions.items():
+        for place, sentence in enumerate(re.split(r"(?<=\.) ", caption)):
+            known = CAPTION_SENTENCES if place else {OPENING: CaptionFacts.opens}
+            found = ((re.fullmatch(rf"(?:{text})\.", sentence), holds) for text, holds in known.items())
+            match, holds = next((pair for pair in found if pair[0]), (None, None))
+            if match is None or holds is None:
+                yield f"its {length} caption says {sentence!r}, which cannot be read"
+            elif not holds(facts, **match.groupdict()):
+                yield f"its {length} caption says {sentence!r}, which does not hold"
 
 
 def file_digest(path: Path) -> str:

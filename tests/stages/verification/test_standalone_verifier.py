@@ -19,7 +19,6 @@ from stages.package.standalone_verifier import drawing_faults, grey_png, is_plac
 from tests.stages.verification.forge import FOLDER_FORGERIES, FORGERIES, copy_dataset, forge
 
 LEFT_OPEN = {
-    "a margin of its own",
     "a graph of another name",
     "stable flipped",
     "the text of another sample in record too",
