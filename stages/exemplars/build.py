@@ -13,6 +13,7 @@ from stages.exemplars.hubs import hub_types, remove_hubs, with_touching_types
 from stages.exemplars.identify import IdentifiedParts, identify_parts
 from stages.exemplars.inferred_dockings import infer_dockings
 from stages.exemplars.model import Model
+from stages.exemplars.node_groups import groups_of_models
 from stages.exemplars.observed_grammar import observe_contacts, observe_grammar
 from stages.exemplars.read import read_parts
 from stages.exemplars.row_neighbourhoods import with_row_neighbourhoods
@@ -128,6 +129,7 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
         up=settings.up,
         one_surface=all(model.is_cut for model in models),
         unit="metre" if all(model.unit == 1.0 for model in models) else "unknown",
+        groups=groups_of_models(models, names, assemblies, types),
     )
     if config.row_neighbourhoods:
         kit = replace(kit, grammar=with_row_neighbourhoods(kit))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from stages.shape.kit_files import load_kit
 from stages.shape.kit_input import input_kits
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, kit_shape, mesh_name, part_count
-from stages.shape.stretch import bake, split
+from stages.shape.stretch import split
 
 
 class KitDecoder:
@@ -93,8 +94,7 @@ def _rebuild(paths: DatasetPaths) -> RebuildShape:
             raise ValueError(f"kit {kit.name} has no part type {', '.join(unknown)}")
         types = np.array([index_of[mesh] for mesh in meshes], dtype=np.int16)
         rigid, stretches = split(np.array(poses, dtype=np.float64))
-        meshes_in_use, assembly = bake(kit.types, Assembly(types, rigid, contacts, stretches))
-        return Shape(meshes_in_use, assembly, "y", kit.labels, one_surface=kit.one_surface, unit=kit.unit)
+        return replace(kit_shape(kit, Assembly(types, rigid, contacts, stretches)), up="y")
 
     return shape
 

@@ -8,7 +8,7 @@ from typing import Literal
 
 from stages.exemplars.settings import Segmentation
 from stages.model_files.packing import pack_scene, unpack_scene
-from stages.model_files.scene import ModelScene, Placement, Surface
+from stages.model_files.scene import ModelScene, Placement, SceneNode, Surface
 from stages.shape.appearance import Appearance
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
@@ -28,6 +28,7 @@ class RawPart:
     faces: int32 (f, 3).
     face_colors: uint8 (f, 3) sRGB.
     appearance: materials, texture coordinates and normals, if the file has them and they are kept.
+    node: the node of the model that places it, for a format with a node tree.
     """
 
     name: str
@@ -38,6 +39,7 @@ class RawPart:
     faces: IntArray
     face_colors: ByteArray
     appearance: Appearance | None = None
+    node: int | None = None
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ class Model:
     warnings: a sentence each.
     up: the axis that points up as the file states it, if its format lets files choose.
     unit: metres of one unit of the coordinates, if the format or the file says.
+    nodes: the node tree, parents before their children; empty for formats without one.
     """
 
     path: Path
@@ -58,6 +61,7 @@ class Model:
     warnings: tuple[str, ...]
     up: Literal["y", "z"] | None = None
     unit: float | None = None
+    nodes: tuple[SceneNode, ...] = ()
 
     @property
     def shows_more_than_colors(self) -> bool:
@@ -86,10 +90,11 @@ def pack_model(model: Model) -> bytes:
             Surface(name, mesh.vertices, mesh.faces, mesh.face_colors, appearance=mesh.appearance)
             for name, mesh in meshes.items()
         ),
-        tuple(Placement(part.name, part.label, index_of[part.mesh_name], part.pose) for part in model.parts),
+        tuple(Placement(part.name, part.label, index_of[part.mesh_name], part.pose, part.node) for part in model.parts),
         model.warnings,
         model.up,
         model.unit,
+        model.nodes,
     )
     return pack_scene(scene, segmentation=model.segmentation, why=model.why)
 
@@ -104,8 +109,10 @@ def unpack_model(path: Path, content: bytes) -> Model:
     parts = [
         RawPart(
             *(part.name, mesh.name, part.label, part.pose, mesh.vertices, mesh.faces, mesh.face_colors),
-            mesh.appearance,
+            *(mesh.appearance, part.node),
         )
         for part, mesh in ((placement, meshes[placement.surface]) for placement in scene.placements)
     ]
-    return Model(path, tuple(parts), stated["segmentation"], stated["why"], scene.warnings, scene.up, scene.unit)
+    return Model(
+        *(path, tuple(parts), stated["segmentation"], stated["why"], scene.warnings, scene.up, scene.unit, scene.nodes)
+    )

@@ -90,7 +90,9 @@ def parse_parts(
     segmented, source, why = segment_into_parts(path, scene, segmentation, may_cut)
     check_size(path, segmented, limits)
     parts, warnings = rigid_parts(path, segmented)
-    return Model(path, parts, source, why, first_warnings([*scene.warnings, *warnings]), scene.up, scene.unit)
+    return Model(
+        path, parts, source, why, first_warnings([*scene.warnings, *warnings]), scene.up, scene.unit, scene.nodes
+    )
 
 
 def _in_metres(scene: ModelScene, units: Units) -> ModelScene:

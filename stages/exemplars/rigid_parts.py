@@ -47,6 +47,7 @@ def rigid_parts(path: Path, scene: ModelScene) -> tuple[tuple[RawPart, ...], lis
                 surface.faces,
                 surface.face_colors,
                 surface.appearance,
+                placement.node,
             )
         )
     return tuple(parts), warnings

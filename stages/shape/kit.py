@@ -94,6 +94,19 @@ class PartType(PartMesh):
         return self.meaning or self.name
 
 
+@dataclass(frozen=True, eq=False)
+class PartGroup:
+    """Parts that the node tree of a model groups below one node.
+
+    parts: type of each part, at least two
+    poses: of the parts, in the coordinates of the first one, float64 (k, 4, 4)
+    """
+
+    name: str
+    parts: tuple[PartType, ...]
+    poses: FloatArray
+
+
 def labels_of(types: Sequence[PartType]) -> tuple[tuple[str, ...], TypeArray]:
     """Return the distinct labels of some types in order of appearance, and the index of each type's label, int16
     (types,).
@@ -236,6 +249,7 @@ class Kit:
     up: axis that points up in the exemplars' coordinates
     one_surface: whether the parts were cut from one surface; then no line is drawn where they meet
     unit: unit of all coordinates
+    groups: groups of parts in the node trees of the exemplars, larger ones first
     """
 
     name: str
@@ -248,6 +262,7 @@ class Kit:
     up: Literal["y", "z"]
     one_surface: bool = False
     unit: LengthUnit = "unknown"
+    groups: tuple[PartGroup, ...] = ()
 
     def type_names(self) -> tuple[str, ...]:
         """Return the names of the types, in order."""

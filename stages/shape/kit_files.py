@@ -20,7 +20,7 @@ from stages.shape.appearance import (
 )
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.docking import DockingTable
-from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType, labels_of
+from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartGroup, PartType, labels_of
 
 
 def kit_json(kit: Kit) -> dict[str, Any]:
@@ -80,7 +80,12 @@ def kit_json(kit: Kit) -> dict[str, Any]:
             for docking in kit.grammar.dockings
         ],
         "nested": [{"a": names[a], "b": names[b], "depth": depth} for (a, b), depth in kit.grammar.nested.items()],
+        **({"groups": [_group_json(group) for group in kit.groups]} if kit.groups else {}),
     }
+
+
+def _group_json(group: PartGroup) -> dict[str, Any]:
+    return {"name": group.name, "parts": [part.name for part in group.parts], "poses": group.poses.tolist()}
 
 
 def _looks(kit: Kit) -> tuple[tuple[Material, ...], list[IntArray | None]]:
@@ -160,7 +165,13 @@ def load_kit(text: Path, arrays: Path) -> Kit:
         up=described["up"],
         one_surface=described.get("one_surface", False),
         unit=described.get("unit", "unknown"),
+        groups=tuple(_group(group, {kind.name: kind for kind in types}) for group in described.get("groups", ())),
     )
+
+
+def _group(described: Mapping[str, Any], types: Mapping[str, PartType]) -> PartGroup:
+    parts = tuple(types[name] for name in described["parts"])
+    return PartGroup(described["name"], parts, np.array(described["poses"]))
 
 
 def _part_type(name: str, meaning: str, members: Mapping[str, bytes], materials: tuple[Material, ...]) -> PartType:

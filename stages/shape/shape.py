@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from stages.shape.arrays import FloatArray, TypeArray
-from stages.shape.kit import Assembly, Kit, LengthUnit, PartMesh
+from stages.shape.kit import Assembly, Kit, LengthUnit, PartGroup, PartMesh
 from stages.shape.part_joint import PartJoint
 from stages.shape.stretch import StretchedMesh, bake, placements
 
@@ -30,6 +30,7 @@ class Shape:
     one_surface: whether the parts were cut from one surface, so that no line is drawn where they meet
     unit: unit of all coordinates
     part_joints: joint of each part, None for a part that stays; if empty, no part moves
+    groups: groups that its source names; the shape has those whose parts it has at these places
     """
 
     meshes: tuple[PartMesh, ...]
@@ -41,6 +42,7 @@ class Shape:
     one_surface: bool = False
     unit: LengthUnit = "unknown"
     part_joints: tuple[PartJoint | None, ...] = ()
+    groups: tuple[PartGroup, ...] = ()
 
     @cached_property
     def label_of(self) -> TypeArray:
@@ -97,7 +99,7 @@ class Shape:
 def kit_shape(kit: Kit, assembly: Assembly) -> Shape:
     """Return the shape of an assembly of the kit's types; stretched parts have meshes of their own."""
     meshes, baked = bake(kit.types, assembly)
-    return Shape(meshes, baked, kit.up, kit.labels, one_surface=kit.one_surface, unit=kit.unit)
+    return Shape(meshes, baked, kit.up, kit.labels, one_surface=kit.one_surface, unit=kit.unit, groups=kit.groups)
 
 
 def mesh_name(part_name: str) -> str:

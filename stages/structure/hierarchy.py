@@ -1,4 +1,4 @@
-"""The groups of the parts of a shape, where its text names them."""
+"""The groups of the parts of a shape: those that its text or its source names, and rows of congruent parts."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ from dataclasses import dataclass
 
 from stages.shape.part_joint import PartJoint
 from stages.shape.shape import Shape
+from stages.structure.groups import named_groups, sibling_rows
 
 ROOT = "shape"
+LANGUAGES_OF_KITS = ("kit", "proportions")
+"""Languages of samples that are made of the parts of models."""
 SEPARATOR = "/"
 """Between the names of nested assemblies in the name of a part."""
 
@@ -53,6 +56,25 @@ def moving_hierarchy(shape: Shape) -> Hierarchy:
     return Hierarchy(tuple(groups), tuple(part_groups))
 
 
+def model_hierarchy(shape: Shape) -> Hierarchy:
+    """Return the hierarchy of a shape of the parts of models: groups of their node trees, and rows within them."""
+    groups, part_groups = [(ROOT, -1)], [0] * len(shape)
+    for name, parts in named_groups(shape):
+        groups.append((name, part_groups[min(parts)]))
+        for part in parts:
+            part_groups[part] = len(groups) - 1
+    siblings = [[part for part, own in enumerate(part_groups) if own == group] for group in range(len(groups))]
+    for group, rows in enumerate(sibling_rows(shape, siblings)):
+        for row in rows:
+            if len(row) < len(siblings[group]) or any(parent == group for _, parent in groups):
+                groups.append((f"row of {shape.labels[shape.part_labels[row[0]]]}", group))
+                for part in row:
+                    part_groups[part] = len(groups) - 1
+    return Hierarchy(tuple(groups), tuple(part_groups))
+
+
 def hierarchy_of(shape: Shape, language: str) -> Hierarchy:
     """Return the hierarchy of a shape. language: of its sample, as records call it"""
-    return path_hierarchy(shape.part_names) if language == "shapeassembly" else moving_hierarchy(shape)
+    if language == "shapeassembly":
+        return path_hierarchy(shape.part_names)
+    return model_hierarchy(shape) if language in LANGUAGES_OF_KITS else moving_hierarchy(shape)

@@ -26,8 +26,9 @@ def _hierarchy() -> dict[str, Any]:
     )
     numbers = {"type": "integer", "minimum": 0}
     return object_schema(
-        "groups of parts: assemblies of a ShapeAssembly program, or parts of a program that move together; one group "
-        "where nothing names groups; several are nodes of the GLB, above those of their parts",
+        "groups of parts: assemblies of a ShapeAssembly program; parts of a program that move together; or, of the "
+        "parts of models, those below one node of their model, and rows of congruent parts at equal steps; one group "
+        "where nothing of this is known; several are nodes of the GLB, above those of their parts",
         {
             "groups": _list_of(group, "all groups, parents first"),
             "part_groups": _list_of(numbers, "group of each part, in the order of `parts`"),

@@ -12,8 +12,9 @@ class StructureConfig(StrictModel):
 
     hierarchy: bool = Field(
         False,
-        description="whether records and GLBs have the groups of parts that programs name: assemblies of "
-        "ShapeAssembly programs, and parts of curve programs that move together; any other shape is one group",
+        description="whether records and GLBs have groups of parts: assemblies of ShapeAssembly programs, parts of "
+        "curve programs that move together, and in shapes of kits the nodes of the models and rows of congruent parts; "
+        "any other shape is one group",
     )
     symmetry: bool = Field(
         False,
