@@ -60,10 +60,10 @@ def bench() -> Iterator[Measure]:
         if not (ROOT / dataset.needs).exists():
             continue
         with tempfile.TemporaryDirectory() as folder:
-            _seconds(dataset, dataset.few, Path(folder) / "few", stages)
+            seconds_by_stage(dataset, dataset.few, Path(folder) / "few", stages)
             out = Path(folder) / "out"
-            seconds = _seconds(dataset, dataset.small, out, stages)
-            again = _seconds(dataset, dataset.small, out, stages)
+            seconds = seconds_by_stage(dataset, dataset.small, out, stages)
+            again = seconds_by_stage(dataset, dataset.small, out, stages)
             samples = _samples(out)
         spent = sum(seconds.values())
         note = f"{samples} samples in {spent:.1f} CPU s; a run over finished shards: {sum(again.values()):.1f} CPU s"
@@ -77,7 +77,7 @@ def bench() -> Iterator[Measure]:
                 yield Measure(f"{dataset.config}: {stage}", "samples", samples / seconds[stage], note=said)
 
 
-def _seconds(dataset: Dataset, changes: Mapping[str, Any], out: Path, stages: list[str]) -> dict[str, float]:
+def seconds_by_stage(dataset: Dataset, changes: Mapping[str, Any], out: Path, stages: list[str]) -> dict[str, float]:
     """Return the CPU seconds of each stage of one run."""
     config = yaml.safe_load((ROOT / "configs" / f"{dataset.config}.yaml").read_text(encoding="utf-8"))
     for section, keys in changes.items():
