@@ -16,12 +16,12 @@ CONTENTS = {
 
 def archive_name(kind: str) -> str:
     """Return the name of the member with the files of a format."""
-    return f"{kind}.zip"
+    return f"{kind}.tar.gz"
 
 
 def _members(config: Config) -> tuple[Member, ...]:
     formats = config.section(ExportsConfig).formats
-    return tuple(Member(archive_name(kind), f"{CONTENTS[kind]}: a zip of files.") for kind in formats)
+    return tuple(Member(archive_name(kind), f"{CONTENTS[kind]}: an archive of files.") for kind in formats)
 
 
 MEMBERS = Members(of=_members)

@@ -15,7 +15,8 @@ class ExportsConfig(StrictModel):
 
     formats: tuple[Literal["urdf", "mjcf", "usd", "obj"], ...] = Field(
         (),
-        description="Formats that each sample has as members: for each a zip of the files that `make export` writes.",
+        description="Formats that each sample has as members: for each a `.tar.gz` of the files that `make export` "
+        "writes.",
     )
     links: Literal["parts", "bodies"] = Field(
         "parts", description="`parts`: each part is a link; `bodies`: parts that keep their places are one link."

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.exports.archive import zip_bytes
+from stages.exports.archive import archive_bytes
 from stages.exports.members import archive_name
 from stages.exports.settings import ExportsConfig
 from stages.shape.collection.collection import Collection, add_members, stage_members
@@ -37,7 +37,7 @@ def run_shard(task: Task) -> Outcome:
             files = {kind: shape_files(kind, sample.key, shape, joints, config.assumed) for kind in config.formats}
         except ValueError as error:
             raise Rejected("cannot be exported", str(error)) from error
-        archives = {archive_name(kind): zip_bytes(of_kind) for kind, of_kind in files.items()}
+        archives = {archive_name(kind): archive_bytes(of_kind) for kind, of_kind in files.items()}
         return {"json": json_bytes({}), **archives}
 
     return Outcome(add_members(task, exported), {"split": task.shard.params["split"]})

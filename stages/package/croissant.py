@@ -28,7 +28,7 @@ FORMATS = {
     "exr": "image/x-exr",
     "txt": "text/plain",
     "json": "application/json",
-    "zip": "application/zip",
+    "gz": "application/gzip",
 }
 IMAGES = (".png", ".jpg", ".webp")
 """Suffixes of members that mlcroissant decodes as images."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +15,8 @@ import numpy.typing as npt
 
 from pipeline.paths import write_file
 from pipeline.shards import bytes_array
+from stages.exports.archive import archive_files
+from stages.exports.members import archive_name
 from stages.shape.arrays import ByteArray
 
 if TYPE_CHECKING:
@@ -175,11 +176,10 @@ class DatasetSample:
 
     def exported(self, kind: str) -> dict[str, bytes]:
         """Return the files of a format, such as `urdf`, by their paths. Raises KeyError where the dataset has none."""
-        name = f"{kind}.zip"
+        name = archive_name(kind)
         if name not in self.members:
             raise KeyError(f"{self.key} has no {name}; its members are {', '.join(self.members)}")
-        with zipfile.ZipFile(io.BytesIO(self.members[name])) as archive:
-            return {entry: archive.read(entry) for entry in archive.namelist()}
+        return archive_files(self.members[name])
 
     @property
     def text(self) -> str:

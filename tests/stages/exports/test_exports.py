@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +10,7 @@ import pytest
 import trimesh
 
 from pipeline.paths import write_file
-from stages.exports.archive import zip_bytes
+from stages.exports.archive import archive_bytes, archive_files
 from stages.exports.audit import AUDIT
 from stages.exports.members import CONTENTS, archive_name
 from stages.package.dataset_sample import DatasetSample
@@ -56,14 +54,14 @@ def test_mujoco_pybullet_openusd_and_trimesh_open_the_members(sample: DatasetSam
 
 
 def test_a_format_that_is_no_member_is_named(sample: DatasetSample) -> None:
-    with pytest.raises(KeyError, match=r"has no structurenet\.zip"):
+    with pytest.raises(KeyError, match=r"has no structurenet\.tar\.gz"):
         sample.exported("structurenet")
 
 
 def test_the_bytes_of_an_archive_depend_on_its_files_alone() -> None:
     files = {"a.txt": b"one", "meshes/b.obj": b"v 0 0 0\n" * 100}
-    assert zip_bytes(files) == zip_bytes(dict(files))
-    assert len(zip_bytes(files)) < 500
+    assert archive_bytes(files) == archive_bytes(dict(files))
+    assert len(archive_bytes(files)) < 500
 
 
 def test_corrupted_and_foreign_archives_are_found(sample: DatasetSample, toy_folder: Path) -> None:  # noqa: F811
@@ -75,10 +73,9 @@ def test_corrupted_and_foreign_archives_are_found(sample: DatasetSample, toy_fol
     name = archive_name("urdf")
     broken = bytearray(members[name])
     broken[80] ^= 255
-    for content in (bytes(broken), b"", b"PK"):
+    for content in (bytes(broken), b"", b"\x1f\x8b"):
         assert len(list(AUDIT.faults(replace(good, members={**members, name: content})))) == 1
-    with zipfile.ZipFile(io.BytesIO(members[name])) as archive:
-        files = {entry: archive.read(entry) for entry in archive.namelist()}
+    files = archive_files(members[name])
     del files[next(entry for entry in files if entry.endswith(".urdf"))]
-    forged = replace(good, members={**members, name: zip_bytes(files)})
+    forged = replace(good, members={**members, name: archive_bytes(files)})
     assert any(name in fault for fault in AUDIT.recheck(forged, None))  # type: ignore[arg-type]

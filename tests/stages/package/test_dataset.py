@@ -33,7 +33,7 @@ from tests.stages.package.toy import (
     toy_samples,
 )
 
-MEMBERS = ["glb", "txt", "caption.json", "urdf.zip", "mjcf.zip", "usd.zip", "obj.zip"]
+MEMBERS = ["glb", "txt", "caption.json", "urdf.tar.gz", "mjcf.tar.gz", "usd.tar.gz", "obj.tar.gz"]
 MEMBERS += ["points.npy", "normals.npy", "labels.npy", "instances.npy"]
 MEMBERS += ["points1.npy", "normals1.npy", "labels1.npy", "instances1.npy", "scan_points0.npy", "scan_normals0.npy"]
 MEMBERS += ["scan_labels0.npy", "scan_instances0.npy", "scan_cameras0.npy"]
