@@ -239,7 +239,6 @@ def test_mutated_files_are_read_or_refused(tmp_path: Path) -> None:
     assert [outcome.message for outcome in results if outcome.end == "escaped"] == []
     assert [outcome.message for outcome in results if outcome.end == "stopped"] == []
     assert Counter(outcome.end for outcome in results)["read"] >= 20
-    assert max(outcome.cpu for outcome in results) < LIMITS.cpu_seconds
 
 
 @pytest.mark.skipif(not HOSTILE.is_dir(), reason="the files that showed a fault are not next to the project")
