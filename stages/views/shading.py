@@ -8,6 +8,9 @@ upward part of the normal, and lit the share of the lamp's light that no part of
 with the shape: a point has the same colour in all views. Base colours are those of faces, or of materials and textures
 (`stages.shape.views.texels`). Weights inside a triangle are perspective-correct. Blended surfaces cast no shadow.
 
+Materials bend normals, dim the sky and emit light by their textures (`stages.shape.views.surface_maps`). Metal, and
+what has a texture of roughness, also reflects the lamp, by the microfacets of glTF 2.0 (GGX, Schlick), and the sky.
+
 Numba compiles this module when it is imported: import it inside functions.
 """
 
@@ -25,6 +28,7 @@ from stages.shape.views.camera import View
 from stages.shape.views.palette import linear_to_srgb, srgb_to_linear
 from stages.shape.views.scene import Scene
 from stages.shape.views.screen import clip_at, eye_depth
+from stages.shape.views.surface_maps import bent_normals, emitted_light, surface_finish
 from stages.shape.views.texels import has_holes, sample_colors
 from stages.views.cameras import Sphere, circle, light_view, orbit_rotation
 from stages.views.render import ViewRenderer
@@ -41,6 +45,9 @@ SHADOW_OFFSET_RADII = 0.006
 """How far a point is moved along its normal before it is looked up in the shadow map."""
 MIN_LAMP_COSINE = 0.1
 """Faces at flatter angles to the lamp count as if at this one, when their plane is looked up in the shadow map."""
+MIN_ROUGHNESS = 0.15
+"""Smoother surfaces reflect the lamp as if of this roughness, so that it has a visible size."""
+DIELECTRIC_REFLECTANCE = 0.04
 GOLDEN_ANGLE_DEGREES = 137.50776405003785
 LINEAR_LEVELS = 65_536
 """Steps of linear light from which sRGB is looked up."""
@@ -132,12 +139,24 @@ def shade(
     to_fill = np.array([_dot(row, lamp.fill) for row in turn])
     up = turn[:, 1].copy()
     taps = _taps(supersample, SHADOW_SOFTNESS_RADII * view.radius)
+    maps = scene.meshes.maps if by_sample else None
+    bent = finish = np.empty((0, 0, 3), dtype=np.float32)
+    if maps is not None and maps.bends is not None:
+        rows, normals = bent_normals(seen, maps, moves[:, :3, :3])
+        bent = np.zeros((*seen.triangles.shape, 3), dtype=np.float32)
+        bent.reshape(-1, 3)[rows] = normals
+    if maps is not None and (maps.finish is not None or maps.occlusion is not None):
+        finish = surface_finish(seen, maps)
     lit: Float32Array = _lit(
         *(seen.triangles, supersample, seen.screen, seen.normals, parts, faces, base, by_sample),
         *(scene.meshes.corner_normals, moves[:, :3, :3], view.projection, to_lamp, to_fill, up),
         *(lamp.depth, _between(view.eye, lamp.view.eye), lamp.view.projection, taps),
-        SHADOW_OFFSET_RADII * view.radius,
+        *(SHADOW_OFFSET_RADII * view.radius, bent, finish),
     )
+    if maps is not None and maps.emission is not None:
+        height, width = lit.shape[:2]
+        emitted = emitted_light(seen, maps).reshape(height, supersample, width, supersample, 3)
+        lit[:, :, :3] += emitted.mean(axis=(1, 3))
     return lit
 
 
@@ -247,6 +266,8 @@ def _lit(
     lamp_projection,
     taps,
     offset,
+    bent,
+    finish,
 ):
     rows, columns = triangles.shape
     height, width = rows // supersample, columns // supersample
@@ -272,30 +293,89 @@ def _lit(
                 towards = turned[0] * flat[t, 0] + turned[1] * flat[t, 1] + turned[2] * flat[t, 2]
                 for k in range(3):
                     turned[k] = flat[t, k] if length == 0.0 else turned[k] / (length if towards >= 0.0 else -length)
+                if len(bent) > 0 and (bent[r, c, 0] != 0.0 or bent[r, c, 1] != 0.0 or bent[r, c, 2] != 0.0):
+                    for k in range(3):
+                        turned[k] = bent[r, c, k]
+                open_sky = finish[r, c, 0] * 1.0 if len(finish) > 0 else 1.0
                 facing = turned[0] * to_lamp[0] + turned[1] * to_lamp[1] + turned[2] * to_lamp[2]
                 rise = turned[0] * up[0] + turned[1] * up[1] + turned[2] * up[2]
                 fill = turned[0] * to_fill[0] + turned[1] * to_fill[1] + turned[2] * to_fill[2]
                 strength = (
-                    FILL_LIGHT * max(fill, 0.0) + SKY_LIGHT * (0.5 + 0.5 * rise) + GROUND_LIGHT * (0.5 - 0.5 * rise)
+                    FILL_LIGHT * max(fill, 0.0)
+                    + SKY_LIGHT * open_sky * (0.5 + 0.5 * rise)
+                    + GROUND_LIGHT * open_sky * (0.5 - 0.5 * rise)
                 )
                 # Where the flat face turns away from the lamp, the smooth normal does not bring light back.
                 side = flat[t, 0] * to_lamp[0] + flat[t, 1] * to_lamp[1] + flat[t, 2] * to_lamp[2]
+                key = 0.0
                 if facing > 0.0 and side > 0.0:
                     reached = 1.0
                     if len(shadow) > 0:
-                        depth = eye_depth(clip_at(screen, t, c + 0.5, r + 0.5), projection)
-                        scale = 1.0 if projection[3, 3] != 0.0 else depth
-                        x = ((c + 0.5) * 2.0 / columns - 1.0) / projection[0, 0] * scale
-                        y = (1.0 - (r + 0.5) * 2.0 / rows) / projection[1, 1] * scale
+                        x, y, depth = _place(screen, t, r, c, rows, columns, projection)
                         plane = flat[t, 0], flat[t, 1], flat[t, 2], offset
                         reached = _reached(shadow, to_shadow, lamp_projection, x, y, -depth, *plane, taps[sample])
-                    strength += KEY_LIGHT * facing * reached
+                    key = KEY_LIGHT * facing * reached
+                    strength += key
                 color = base[r * columns + c if by_sample else face_of[t]]
-                red, green, blue = red + strength * color[0], green + strength * color[1], blue + strength * color[2]
                 alpha += 1.0
+                if len(finish) == 0 or finish[r, c, 1] < 0.0:
+                    red, green, blue = (
+                        red + strength * color[0],
+                        green + strength * color[1],
+                        blue + strength * color[2],
+                    )
+                    continue
+                x, y, depth = _place(screen, t, r, c, rows, columns, projection)
+                away = (-x, -y, depth) if projection[3, 3] == 0.0 else (0.0, 0.0, 1.0)
+                sky = SKY_LIGHT * open_sky, GROUND_LIGHT * open_sky
+                mirrored, rest = _reflected(turned, away, to_lamp, up, finish[r, c, 1] * 1.0, key, sky)
+                metal = finish[r, c, 2] * 1.0
+                rest += DIELECTRIC_REFLECTANCE * (1.0 - metal) * mirrored
+                strength = strength * (1.0 - metal) + mirrored * metal
+                red, green = red + strength * color[0] + rest, green + strength * color[1] + rest
+                blue = blue + strength * color[2] + rest
             light[row, column, 0], light[row, column, 1] = red * share, green * share
             light[row, column, 2], light[row, column, 3] = blue * share, alpha * share
     return light
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def _place(screen, t, row, column, rows, columns, projection):
+    """Return where a sample is in eye space: to the right, upwards, and away from the camera."""
+    depth = eye_depth(clip_at(screen, t, column + 0.5, row + 0.5), projection)
+    scale = 1.0 if projection[3, 3] != 0.0 else depth
+    x = ((column + 0.5) * 2.0 / columns - 1.0) / projection[0, 0] * scale
+    y = (1.0 - (row + 0.5) * 2.0 / rows) / projection[1, 1] * scale
+    return x, y, depth
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _reflected(normal, away, to_lamp, up, roughness, key, sky):
+    """Return the light that a surface mirrors: what its reflectance is multiplied by, and what is added to that.
+
+    away: towards the camera
+    key: light of the lamp on the surface; sky: light from above and from below
+    """
+    length = np.sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2])
+    ax, ay, az = away[0] / length, away[1] / length, away[2] / length
+    facing = min(max(normal[0] * ax + normal[1] * ay + normal[2] * az, 1e-3), 1.0)
+    rise = 2.0 * facing * (normal[0] * up[0] + normal[1] * up[1] + normal[2] * up[2])
+    rise = min(max(rise - (ax * up[0] + ay * up[1] + az * up[2]), -1.0), 1.0)
+    around = sky[0] * (0.5 + 0.5 * rise) + sky[1] * (0.5 - 0.5 * rise)
+    grazing = (1.0 - min(roughness, 1.0)) * (1.0 - facing) ** 5
+    mirrored, rest = around * (1.0 - grazing), around * grazing
+    if key > 0.0:
+        hx, hy, hz = ax + to_lamp[0], ay + to_lamp[1], az + to_lamp[2]
+        length = max(np.sqrt(hx * hx + hy * hy + hz * hz), 1e-9)
+        half = max((normal[0] * hx + normal[1] * hy + normal[2] * hz) / length, 0.0)
+        lamp = max(normal[0] * to_lamp[0] + normal[1] * to_lamp[1] + normal[2] * to_lamp[2], 0.0)
+        edge = (1.0 - min(max((ax * hx + ay * hy + az * hz) / length, 0.0), 1.0)) ** 5
+        a = max(min(roughness, 1.0), MIN_ROUGHNESS) ** 2
+        width = half * half * (a * a - 1.0) + 1.0
+        hidden = lamp * (facing * (1.0 - a) + a) + facing * (lamp * (1.0 - a) + a)
+        peak = key * a * a / (width * width) * 0.5 / hidden
+        mirrored, rest = mirrored + peak * (1.0 - edge), rest + peak * edge
+    return mirrored, rest
 
 
 @numba.njit(cache=True, error_model="numpy")

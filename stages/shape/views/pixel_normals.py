@@ -8,17 +8,20 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.arrays import Float32Array
+from stages.shape.arrays import Float32Array, FloatArray
 from stages.shape.views.buffers import Visible
 
 
-def smooth_normals(seen: Visible) -> Float32Array:
+def smooth_normals(seen: Visible, rotations: FloatArray | None = None) -> Float32Array:
     """Return the unit normal of each pixel in eye space, float32 (h, w, 3), zero for background.
+
+    rotations: of each part to eye space, float64 (n, 3, 3); by default a product whose digits depend on the machine
 
     A normal points towards the viewer, as those of the flat faces do.
     """
     scene = seen.scene
-    rotations = (seen.view.eye @ scene.poses)[:, :3, :3]
+    if rotations is None:
+        rotations = (seen.view.eye @ scene.poses)[:, :3, :3]
     parts, faces = scene.triangle_part, scene.triangle_face
     normals: Float32Array = _interpolate(
         seen.triangles, seen.screen, seen.normals, scene.meshes.corner_normals, parts, faces, rotations

@@ -41,15 +41,17 @@ def portrait(
     part_colors: colour of each part instead of its faces' own, uint8 (n, 3)
 
     A soft key light from the upper left with shadows, sky and ground light, darker corners, thin lines where parts
-    meet, and a shadow on the ground. Materials have their textures and their alpha, unless `part_colors` are given;
-    what is seen through is rasterised. Raises ShardFailed for a blank picture.
+    meet, and a shadow on the ground. Materials have their textures, bent normals, emission and alpha, unless
+    `part_colors` are given; what is seen through is rasterised. Raises ShardFailed for a blank picture.
     """
     from stages.shape.views.pixel_normals import smooth_normals
     from stages.shape.views.screen import surface_buffers
+    from stages.shape.views.surface_maps import bent_normals, emitted_light
     from stages.shape.views.texels import has_holes, sample_colors
 
     width, height = size[0] * SUBPIXELS_PER_PIXEL, size[1] * SUBPIXELS_PER_PIXEL
     look = scene.meshes.look if part_colors is None else None
+    maps = scene.meshes.maps if part_colors is None else None
     layers: list[tuple[IntArray, Float32Array]] = []
     if look is not None and has_holes(scene):
         seen, layers = _solid_and_layers(scene, camera, width, height)
@@ -57,6 +59,9 @@ def portrait(
         seen = visible_triangles(scene, camera, (width, height), renderer)
     depth, _, part, color = surface_buffers(scene, seen.view, seen.triangles, seen.screen, seen.normals)
     normal = smooth_normals(seen)
+    if maps is not None:
+        rows, bent = bent_normals(seen, maps, (seen.view.eye @ scene.poses)[:, :3, :3])
+        normal.reshape(-1, 3)[rows] = bent
     if part_colors is not None:
         color = np.where(part[..., None] >= 0, part_colors[part], color)
     opaque = scene
@@ -79,6 +84,8 @@ def portrait(
         base = sample_colors(scene, seen.triangles, seen.screen, seen.view.projection)[shown, :3].astype(np.float64)
     albedo = 0.02 + 0.90 * base
     picture[shown] = albedo * (lit[:, None] * KEY * (0.35 + 0.65 * open_sky) + sky * open_sky)
+    if maps is not None:
+        picture[shown] += emitted_light(seen, maps)[shown]
     for triangles, colors in reversed(layers):
         _blend_layer(picture, replace(seen, triangles=triangles), colors, light)
     lines = _ink(seen, size)[..., None]

@@ -16,7 +16,7 @@ from stages.shape.kit import PartMesh
 from stages.shape.shape import Shape
 
 if TYPE_CHECKING:
-    from stages.shape.views.mesh_look import MeshLook
+    from stages.shape.views.mesh_look import MeshLook, SurfaceMaps
 
 WELD_DISTANCE_SHARE = 2e-6
 """Vertices closer than this share of half their mesh's longest side count as one vertex."""
@@ -84,6 +84,21 @@ class MeshSet:
         from stages.shape.views.mesh_look import mesh_look
 
         return mesh_look(self.looks, np.diff(self.face_first).tolist()) if self.looks else None
+
+    @cached_property
+    def maps(self) -> SurfaceMaps | None:
+        """What materials have besides base colours; None if they have nothing."""
+        from stages.shape.views.mesh_look import surface_maps
+
+        return surface_maps(self.looks, np.diff(self.face_first).tolist()) if self.looks else None
+
+    @cached_property
+    def frames(self) -> FloatArray:
+        """Where texture coordinates grow on each face, to the right and upwards, float64 (f, 2, 3)."""
+        from stages.shape.views.mesh_look import face_frames
+
+        uv = np.zeros((len(self.faces), 3, 2), np.float32) if self.look is None else self.look.uv
+        return face_frames(self.vertices[self.faces], uv)
 
     @cached_property
     def _welded(self) -> np.ndarray:

@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import Float32Array, FloatArray, IntArray
-from stages.shape.views.mesh_look import ALPHA_MODES
+from stages.shape.views.mesh_look import ALPHA_MODES, MeshLook
 from stages.shape.views.palette import srgb_to_linear
 from stages.shape.views.raster import COORDINATE_BITS, GRID_BITS, centres_between, raster
 from stages.shape.views.scene import Scene
@@ -38,8 +38,19 @@ def sample_colors(scene: Scene, triangles: IntArray, screen: FloatArray, project
     meshes = scene.meshes
     if meshes.look is None:
         raise ValueError("the scene has no materials")
-    linear = srgb_to_linear(meshes.colors)
-    colors: Float32Array = _sample(triangles, screen, projection, scene.triangle_face, linear, meshes.look)
+    return sample_look(scene, triangles, screen, projection, meshes.look, srgb_to_linear(meshes.colors))
+
+
+def sample_look(
+    scene: Scene,
+    triangles: IntArray,
+    screen: FloatArray,
+    projection: FloatArray,
+    look: MeshLook,
+    face_colors: FloatArray,
+) -> Float32Array:
+    """Return the colours of a look as `sample_colors` does. face_colors: of faces without a material, float64 (f, 3)"""
+    colors: Float32Array = _sample(triangles, screen, projection, scene.triangle_face, face_colors, look)
     return colors
 
 
