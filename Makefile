@@ -212,7 +212,7 @@ release: setup  ## Join the fragments of changes/ into the changelog, set VERSIO
 lock: setup-dev  ## Choose the newest versions of everything and pin them in requirements.lock
 	$(PYTHON) -m venv --clear .venv/lock
 	$(PYTHON) -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
-	    print(*p["dependencies"], *p["optional-dependencies"]["cluster"], *p["optional-dependencies"]["stores"], *p["optional-dependencies"]["dev"], sep="\n")' > .venv/lock/asked.txt
+	    print(*p["dependencies"], *sum(p["optional-dependencies"].values(), []), sep="\n")' > .venv/lock/asked.txt
 	grep '^--' requirements.lock >> .venv/lock/asked.txt
 	.venv/lock/bin/python -m pip install -r .venv/lock/asked.txt
 	{ grep '^[#-]' requirements.lock; .venv/lock/bin/python -m pip freeze --all --exclude pip | sed 's/+.*//'; } > lock.tmp
@@ -235,9 +235,11 @@ $(READY)/core:
 $(READY)/models $(READY)/cluster $(READY)/stores: | $(READY)/core
 	pipeline/setup.sh $(@F)
 	touch $@
-$(READY)/dev: | $(READY)/core
+$(READY)/dev:
 	pipeline/setup.sh models cluster stores dev
-	touch $@ $(READY)/models $(READY)/cluster $(READY)/stores
+	rm -rf .venv/ready-*
+	mkdir $(READY)
+	touch $(addprefix $(READY)/,core models cluster stores dev)
 
 clean: setup  ## Delete the work folder of CONFIG (records, shards); the finished dataset stays
 	@$(SHAPEMILL) clean $(DATASET)
