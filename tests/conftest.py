@@ -22,14 +22,17 @@ from tests.warm_workers import warm_workers
 settings.register_profile("shapemill", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("shapemill")
 
-_WITH_WARM_WORKERS = {Path(__file__).with_name(folder) for folder in ("stages", "eval")}
-"""Folders of tests that run stages and do not test how workers start and end."""
+_WITH_WARM_WORKERS = {
+    Path(__file__).parent / name
+    for name in ("stages", "eval", "pipeline/test_damage.py", "pipeline/test_prune.py", "pipeline/test_run.py")
+}
+"""Folders and files of tests that run stages and do not test how workers start and end."""
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     # Around fixtures, too: most of them make a dataset for all tests of a file.
-    with warm_workers() if _WITH_WARM_WORKERS & set(item.path.parents) else nullcontext():
+    with warm_workers() if _WITH_WARM_WORKERS & {item.path, *item.path.parents} else nullcontext():
         return (yield)
 
 

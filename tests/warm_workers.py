@@ -1,6 +1,7 @@
 """Workers that stay, with imports and kernels, for the next run of this process: tests of stages start a few.
 
-A start costs 3 to 9 seconds of imports. Tests of the engine itself start workers of their own, as runs do.
+A start costs 3 to 9 seconds of imports, half a second for toy stages. Tests of how workers start and end start some of
+their own.
 """
 
 from __future__ import annotations
