@@ -32,7 +32,9 @@ def foreign_files(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
         files = archive_files(sample.members[archive_name(kind)])
         if list(files) != list(expected):
             yield f"{archive_name(kind)} has the files {', '.join(files)}, not {', '.join(expected)}"
-        elif [len(content.split()) for content in files.values()] != [len(each.split()) for each in expected.values()]:
+        elif [len(content.split()) for content in files.values()] != [
+            len(content.split()) for content in expected.values()
+        ]:
             yield f"{archive_name(kind)} has other contents than its shape makes"
 
 
