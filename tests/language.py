@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 PRODUCT = ("pipeline", "stages", "eval", "datasets/exemplars/source")
@@ -57,28 +58,51 @@ def product_files() -> list[Path]:
     return files_under(ROOT / top for top in PRODUCT)
 
 
+class Source(NamedTuple):
+    """What the rules look at in a Python file. Syntax trees of all files would take gigabytes."""
+
+    names: list[tuple[str, int]]
+    """Each name that it binds, with its line: variables, arguments, fields, functions, classes."""
+    texts: list[tuple[int, int]]
+    """First and last line of each text."""
+    imports: list[str]
+    """Dotted names of its imports, also inside functions."""
+    constants: list[tuple[str, int]]
+    """Numeric constants of the module whose name is one word."""
+    classes: list[tuple[str, int]]
+    """Public classes of the module."""
+
+
 @cache
-def parsed(path: Path) -> ast.Module:
-    """Return the syntax tree of a file."""
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
-def bound_names(tree: ast.AST) -> Iterator[tuple[str, int]]:
-    """Yield each name that a file binds, with its line: variables, arguments, fields, functions, classes."""
+def read_source(path: Path) -> Source:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    source = Source([], [], [], list(_bare_constants(tree)), [])
     for node in ast.walk(tree):
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            yield node.id, node.lineno
+        if isinstance(node, ast.Name):
+            if isinstance(node.ctx, ast.Store):
+                source.names.append((node.id, node.lineno))
+        elif isinstance(node, ast.Constant):
+            if isinstance(node.value, str) and node.end_lineno is not None:
+                source.texts.append((node.lineno, node.end_lineno))
         elif isinstance(node, ast.arg):
-            yield node.arg, node.lineno
+            source.names.append((node.arg, node.lineno))
         elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-            yield node.name, node.lineno
+            source.names.append((node.name, node.lineno))
+        elif isinstance(node, ast.Import):
+            source.imports.extend(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            source.imports.extend([node.module, *(f"{node.module}.{alias.name}" for alias in node.names)])
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            source.classes.append((node.name, node.lineno))
+    return source
 
 
 def retired_names(path: Path) -> Iterator[str]:
     """Yield what in a file's names is retired."""
     for word in RETIRED_IN_NAMES & set(path.stem.split("_")):
         yield f"the file's name holds '{word}'"
-    for name, line in bound_names(parsed(path)):
+    for name, line in read_source(path).names:
         words = {word.lower() for word in _WORDS.findall(name)} | {name}
         for word in sorted(words & RETIRED_IN_NAMES):
             yield f"line {line}: {name} holds '{word}'"
@@ -91,9 +115,8 @@ def prose(path: Path) -> Iterator[tuple[int, str]]:
         # a page may quote a paper's word
         yield from ((number, re.sub(r'"[^"]*"', "", line)) for number, line in enumerate(lines, 1))
         return
-    for node in ast.walk(parsed(path)):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.end_lineno is not None:
-            yield from ((number, lines[number - 1]) for number in range(node.lineno, node.end_lineno + 1))
+    for first, last in read_source(path).texts:
+        yield from ((number, lines[number - 1]) for number in range(first, last + 1))
     yield from ((number, line.partition("#")[2]) for number, line in enumerate(lines, 1) if "#" in line)
 
 
@@ -119,7 +142,11 @@ def _is_number(node: ast.expr | None) -> bool:
 
 def bare_constants(path: Path) -> Iterator[str]:
     """Yield the numeric constants of a module whose name is one word, so that it says no quantity."""
-    for node in parsed(path).body:
+    yield from (f"line {line}: {name}" for name, line in read_source(path).constants)
+
+
+def _bare_constants(tree: ast.Module) -> Iterator[tuple[str, int]]:
+    for node in tree.body:
         if isinstance(node, ast.Assign):
             targets, value = node.targets, node.value
         elif isinstance(node, ast.AnnAssign) and node.value is not None:
@@ -133,16 +160,15 @@ def bare_constants(path: Path) -> Iterator[str]:
             for name, number in pairs:
                 one_word = isinstance(name, ast.Name) and name.id.isupper() and "_" not in name.id.strip("_")
                 if one_word and _is_number(number):
-                    yield f"line {node.lineno}: {ast.unparse(name)}"
+                    yield ast.unparse(name), node.lineno
 
 
 def public_classes(files: Iterable[Path]) -> dict[str, list[str]]:
     """Return the public classes of some files by name, with where each is defined."""
     found: dict[str, list[str]] = defaultdict(list)
     for path in files:
-        for node in parsed(path).body:
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                found[node.name].append(f"{path.relative_to(ROOT)}:{node.lineno}")
+        for name, line in read_source(path).classes:
+            found[name].append(f"{path.relative_to(ROOT)}:{line}")
     return found
 
 
@@ -154,16 +180,10 @@ def classes_defined_twice(files: Iterable[Path]) -> list[str]:
 def import_circles(files: Iterable[Path]) -> list[str]:
     """Return one circle of imports between files, imports inside functions included, or nothing."""
     modules = {".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in files}
-    reads: dict[str, set[str]] = {}
-    for module, path in modules.items():
-        reads[module] = set()
-        for node in ast.walk(parsed(path)):
-            names = []
-            if isinstance(node, ast.Import):
-                names = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-            reads[module] |= {name for name in names if name in modules and name != module}
+    reads = {
+        module: {name for name in read_source(path).imports if name in modules and name != module}
+        for module, path in modules.items()
+    }
     try:
         list(TopologicalSorter(reads).static_order())
     except CycleError as error:
