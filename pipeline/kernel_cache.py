@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import ast
 import fcntl
+import gc
 import hashlib
 import os
 import time
@@ -156,9 +157,13 @@ _saved: list[str] = []
 def _compile(kernel: dispatcher.Dispatcher, signature: Any) -> Any:
     with global_compiler_lock:
         _compilations.append([])
+        collects = gc.isenabled()
+        gc.disable()  # a kernel leaves little garbage, and looking for it takes a tenth of the time
         try:
             return _numba_compile(kernel, signature)
         finally:
+            if collects:
+                gc.enable()
             for lock in _compilations.pop():
                 lock.release()
             if not _compilations:
