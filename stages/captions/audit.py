@@ -33,7 +33,7 @@ def false_sentences(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
     if CAPTION not in sample.members:
         return
     shape, record = sample.shape, sample.record
-    nouns = label_nouns(shape.labels)
+    nouns = label_nouns(shape.used_labels)
     noun = source_noun(record["kit"], shape.used_labels, sample.sections.get("captions", {}).get("nouns", {}))
     parser = CaptionParser(noun, list(nouns.values()))
     placement = placement_of(record["producer"], record["kit"])

@@ -21,6 +21,8 @@ IMPORTANCE = (
     *("circle", "above", "height", "parts", "touches", "tilt", "mirror", "stable"),
 )
 """Kinds of facts, those first that a medium caption states."""
+SAY_THAT_IT_STANDS = {"stands on", "tilt"}
+"""Kinds of facts after which a caption need not say that the shape stands."""
 SHUFFLED_KINDS = 4
 """Among as many of the most important kinds, chance decides which a medium caption states."""
 
@@ -47,10 +49,15 @@ def _caption(facts: Sequence[Fact], noun: str, length: CaptionLength, rng: np.ra
 
 
 def _chosen(facts: Sequence[Fact], count: int, rng: np.random.Generator) -> list[Fact]:
-    """Return up to `count` facts, the most important kinds first, but for some of them in an order by chance."""
+    """Return up to `count` facts, the most important kinds first, but for some of them in an order by chance.
+
+    That a shape stands by itself is left out after facts that say more.
+    """
     kinds = sorted({fact.kind for fact in facts}, key=IMPORTANCE.index)
     shuffled = [kinds[index] for index in rng.permutation(min(SHUFFLED_KINDS, len(kinds))).tolist()]
     chosen: list[Fact] = []
     for kind in [*shuffled, *kinds[len(shuffled) :]]:
         chosen += [fact for fact in facts if fact.kind == kind][: MAX_OF_KIND.get(kind, 1)]
-    return chosen[:count]
+    kept = chosen[:count]
+    stands = any(fact.kind in SAY_THAT_IT_STANDS for fact in kept)
+    return [fact for fact in kept if not (stands and fact.kind == "stable")]

@@ -38,7 +38,7 @@ def run_shard(task: Task) -> Outcome:
         shape = collection.shape(sample)
         placement = placement_of(sample.producer, sample.kit)
         physics = json.loads(members["json"])["physics"]
-        facts = ShapeFacts.of(shape, pairs_of(members[CONTACTS]), physics, label_nouns(shape.labels), placement)
+        facts = ShapeFacts.of(shape, pairs_of(members[CONTACTS]), physics, label_nouns(shape.used_labels), placement)
         noun = source_noun(sample.kit, shape.used_labels, config.nouns)
         texts = captions(facts, noun, config.lengths, task.rng(sample.key))
         return {"json": json_bytes({}), CAPTION: json_bytes(texts)}

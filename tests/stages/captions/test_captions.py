@@ -70,6 +70,7 @@ def test_captions_get_longer_and_say_what_one_sees_first() -> None:
     assert "six drawers in two columns of three" in texts["short"]
     assert len(texts["short"]) < len(texts["medium"]) < len(texts["long"])
     assert texts["long"].count(".") > 6
+    assert "stands by itself" not in texts["long"], "it says how far it can be tilted"
 
 
 def test_seeds_vary_captions_and_equal_seeds_repeat_them() -> None:
