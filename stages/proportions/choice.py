@@ -29,6 +29,8 @@ def chosen_texts(
             distinct.add(read_proportions(text).warp)
         # A layout that gives one sample gives a typical one, not the most extreme.
         picked = distinct.farthest_first(quota) if quota > 1 or len(groups) == 1 else list(range(len(own)))[:quota]
+        if not picked and quota and unwarped.layout is not None:
+            picked = [0]  # other rows alone make it new
         chosen.append([own[number] for number in picked])
     digests = [_digest(shapes, groups[index][0]) for index in order]
     return [(text, digest) for picked, digest in zip(chosen, digests, strict=True) for text in picked]

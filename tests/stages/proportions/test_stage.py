@@ -65,7 +65,14 @@ def test_rows_of_a_shelf_become_samples_that_verify(tmp_path: Path) -> None:
     assert code == 0, said
 
 
-def write_shelf_config(folder: Path) -> Path:
+def test_every_layout_is_one_shape_where_parts_keep_their_sizes(tmp_path: Path) -> None:
+    config = write_shelf_config(tmp_path, size="grow", min_count=0.75, max_count=1.25)
+    said = run(config, tmp_path / "out", *STAGES)
+    assert "shelf: 6 of 12 shapes of" in said
+    assert len({json.dumps(json.loads(sample.text)["rows"]) for sample in samples(tmp_path / "out")}) == 6
+
+
+def write_shelf_config(folder: Path, **rows: object) -> Path:
     meshes = {"side": box(0.05, 3.6, 0.4), "board": box(0.9, 0.04, 0.4)}
     boards = [("board", pose(0.0, 0.2 + 0.4 * number, 0.0)) for number in range(8)]
     sides = [("side", pose(x, 1.8, 0.0)) for x in (-0.475, 0.475)]
@@ -76,7 +83,7 @@ def write_shelf_config(folder: Path) -> Path:
         "seed": 3,
         "license": "MIT",
         "exemplars": {"kits": [stated({"name": "shelf", "shapes": [shape]})]},
-        "variations": {"samples_per_kit": 0, "rows": {"use": True}},
+        "variations": {"samples_per_kit": 0, "rows": {"use": True, **rows}},
         "proportions": {
             "samples_per_kit": 12,
             "parallel_searches": 1,

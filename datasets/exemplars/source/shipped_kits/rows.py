@@ -15,6 +15,9 @@ ASPHALT, CAST_IRON, LAMP = (96, 98, 104), (52, 58, 62), (250, 224, 150)
 BRICK, BRICK_DARK, CREAM, SLATE = (178, 96, 76), (148, 78, 62), (236, 226, 206), (84, 92, 106)
 GLASS, SHUTTER, DOOR = (126, 160, 178), (66, 110, 92), (150, 52, 48)
 
+COURSE_HEIGHT = 0.75
+"""Of the stones of a pier."""
+
 
 def shapes() -> dict[str, KitShape]:
     """Return the dresser, the bridge and the house by name."""
@@ -61,9 +64,11 @@ def _dresser(columns: int = 3, rows: int = 3) -> KitShape:
     return dresser
 
 
-def _bridge(spans: int = 4) -> KitShape:
-    """Put arches between piers 6 apart under one roadway, with parapets and a lamp above each pier."""
-    span, broad, wide, springing, crown = 6.0, 1.2, 4.0, 3.0, 5.6
+def _bridge(spans: int = 4, courses: int = 3) -> KitShape:
+    """Put arches between piers of courses, 6 apart, under one roadway, with parapets and lamps above each pier."""
+    span, broad, wide = 6.0, 1.2, 4.0
+    springing = 0.7 + courses * COURSE_HEIGHT
+    crown = springing + 2.6
     length = spans * span + broad
     clear = span - broad
     opening = arch(clear, crown - springing - 0.5, crown - springing - 0.5, 10)
@@ -72,10 +77,11 @@ def _bridge(spans: int = 4) -> KitShape:
     spandrel = spandrel.tinted(
         STONE_DARK, lambda _, corners: bool(np.ptp(corners[:, 2]) > 1.0 and corners[:, 1].max() < crown - springing)
     )
-    pier = joined(
-        stacked(chamfered(broad + 0.6, wide + 1.6, 0.6), [(0.0, 0.0), (0.0, 0.5), (-0.2, 0.7)], STONE_DARK),
-        stacked(chamfered(broad, wide + 1.0, 0.5), [(0.0, 0.7), (0.0, 2.9)], STONE_LIGHT),
-        box((broad, crown - 2.9, wide), (0.0, 2.9, 0.0), STONE_LIGHT),
+    foot = stacked(chamfered(broad + 0.6, wide + 1.6, 0.6), [(0.0, 0.0), (0.0, 0.5), (-0.2, 0.7)], STONE_DARK)
+    course = stacked(
+        chamfered(broad, wide + 1.0, 0.5),
+        [(-0.04, 0.0), (0.0, 0.06), (0.0, COURSE_HEIGHT - 0.06), (-0.04, COURSE_HEIGHT)],
+        [STONE_DARK, STONE_LIGHT, STONE_DARK],
     )
     parapet = box((span - 0.5, 0.9, 0.4), (0.0, 0.0, 0.0), STONE, bevel=0.08)
     for x in (-1.8, -0.6, 0.6, 1.8):
@@ -90,10 +96,12 @@ def _bridge(spans: int = 4) -> KitShape:
         box((length, 0.4, wide + 0.6), (0.0, 0.0, 0.0), STONE_LIGHT),
         box((length, 0.04, wide - 0.8), (0.0, 0.4, 0.0), ASPHALT),
     )
-    bank = np.array([[0.0, 0.0], [7.0, 0.0], [7.0, 5.0], [0.0, crown]])
+    bank = np.array([[0.0, 0.0], [7.0, 0.0], [7.0, crown - 0.6], [0.0, crown]])
     bridge = KitShape(
         {
-            "pier": pier,
+            "foot": foot,
+            "course": course,
+            "pier": box((broad, crown - springing, wide), (0.0, 0.0, 0.0), STONE_LIGHT),
             "arch": spandrel,
             "road": road,
             "parapet": parapet,
@@ -104,7 +112,10 @@ def _bridge(spans: int = 4) -> KitShape:
     )
     start = -spans * span / 2
     for k in range(spans + 1):
-        bridge.put("pier", start + span * k, 0.0, 0.0)
+        bridge.put("foot", start + span * k, 0.0, 0.0)
+        for course_number in range(courses):
+            bridge.put("course", start + span * k, 0.7 + COURSE_HEIGHT * course_number, 0.0)
+        bridge.put("pier", start + span * k, springing, 0.0)
         for z in (-1.0, 1.0):
             bridge.put("post", start + span * k, crown + 0.4, 2.1 * z)
             bridge.put("lamp", start + span * k, crown + 1.6, 2.1 * z)
