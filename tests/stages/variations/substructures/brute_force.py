@@ -43,10 +43,11 @@ def results(
     """The codes of all that comes of replacing a piece of the graph by one of the giver, where that is simple."""
     found = set()
     theirs: dict[Outside, list[tuple[Piece, int]]] = {}
-    for other in pieces(giver):
+    others = list(pieces(giver))
+    for other in others:
         for turn in range(len(other.cuts)):
             theirs.setdefault(_met(other, turn, same_outside), []).append((other, turn))
-    for piece in pieces(graph):
+    for piece in others if graph is giver else pieces(graph):
         for other, turn in theirs.get(_met(piece, 0, same_outside), ()):
             if matches(graph, giver, piece, other, turn, same_outside=same_outside):
                 made = replaced(graph, giver, piece, other, turn)

@@ -8,6 +8,8 @@ import numpy as np
 
 from stages.variations.substructures.ordered_graph import OrderedGraph, ordered_graph
 
+Rows = list[tuple[int, ...]]
+
 
 def path(*types: int) -> OrderedGraph:
     last = len(types) - 1
@@ -97,14 +99,20 @@ def code(graph: OrderedGraph) -> tuple[tuple[int, ...], ...]:
         return ((int(graph.types[0]),),)
     kinds = list(zip(graph.types.tolist(), np.diff(graph.starts).tolist(), strict=True))
     rarest = min(kinds, key=lambda kind: (kinds.count(kind), kind))
-    starts = [dart for dart, node in enumerate(graph.tails.tolist()) if kinds[node] == rarest]
-    return min(_code_from(graph, dart) for dart in starts)
-
-
-def _code_from(graph: OrderedGraph, dart: int) -> tuple[tuple[int, ...], ...]:
     types, starts, tails, twins = (entry.tolist() for entry in graph[:4])
+    best: Rows = []
+    for dart, node in enumerate(tails):
+        if kinds[node] == rarest:
+            best = _smaller_rows(types, starts, tails, twins, dart, best)
+    return tuple(best)
+
+
+def _smaller_rows(
+    types: list[int], starts: list[int], tails: list[int], twins: list[int], dart: int, best: Rows
+) -> Rows:
+    """Return the rows of nodes in the order of a walk from a dart, or the best ones so far where these are smaller."""
     first, place = {tails[dart]: dart}, {tails[dart]: 0}
-    order, rows = [tails[dart]], []
+    order, rows, equal = [tails[dart]], [], bool(best)
     for node in order:
         begin = first[node]
         row = [types[node]]
@@ -116,4 +124,8 @@ def _code_from(graph: OrderedGraph, dart: int) -> tuple[tuple[int, ...], ...]:
                 order.append(head)
             row.append(place[head])
         rows.append(tuple(row))
-    return tuple(rows)
+        if equal and rows[-1] != best[len(rows) - 1]:
+            if rows[-1] > best[len(rows) - 1]:
+                return best
+            equal = False
+    return rows

@@ -109,7 +109,8 @@ def judge(base: OrderedGraph, giver: OrderedGraph) -> Figures:
     if per_k_n2 > 1:
         raise Unlike(f"{len(operations)} operations are more than k n²")
     seen = _edge_types(base) | _edge_types(giver)
-    here, there = ({frozenset(entry.cuts): entry for entry in brute_force.pieces(graph)} for graph in (base, giver))
+    here = {frozenset(piece.cuts): piece for piece in brute_force.pieces(base)}
+    there = here if base is giver else {frozenset(piece.cuts): piece for piece in brute_force.pieces(giver)}
     held = missed = 0
     ways = [operations.boundary(number) for number in range(len(operations))]
     ways += [entry[:, ::-1] for entry in ways] if base is giver else []
