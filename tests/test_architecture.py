@@ -11,6 +11,8 @@ from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[1]
 
 BANNED_NAMES = {"utils", "util", "helpers", "helper", "common", "misc"}
@@ -35,6 +37,13 @@ def relative(path: Path) -> str:
 def parsed(path: Path) -> ast.Module:
     """Parse a file, once for all rules."""
     return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def forget_trees() -> Iterator[None]:
+    """Tests after these need no syntax trees, which would slow down every full garbage collection."""
+    yield
+    parsed.cache_clear()
 
 
 def imports(tree: ast.AST) -> Iterator[str]:
