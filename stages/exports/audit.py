@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pipeline.paths import DatasetPaths
-from stages.exports.archive import archive_files
-from stages.exports.members import archive_name
 from stages.exports.settings import ExportsConfig
+from stages.shape.collection.archive import archive_files, archive_name
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import PackagedSample
 from stages.shape.collection.pairs import JOINTS, pairs_of

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pipeline.config import Config
 from stages.exports.settings import ExportsConfig
+from stages.shape.collection.archive import archive_name
 from stages.shape.collection.members import Member, Members
 
 CONTENTS = {
@@ -12,11 +13,6 @@ CONTENTS = {
     "usd": "OpenUSD with the physics schemas",
     "obj": "Wavefront OBJ with materials",
 }
-
-
-def archive_name(kind: str) -> str:
-    """Return the name of the member with the files of a format."""
-    return f"{kind}.tar.gz"
 
 
 def _members(config: Config) -> tuple[Member, ...]:

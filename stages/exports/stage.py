@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.exports.archive import archive_bytes
-from stages.exports.members import archive_name
 from stages.exports.settings import ExportsConfig
+from stages.shape.collection.archive import archive_bytes, archive_name
 from stages.shape.collection.collection import Collection, add_members, stage_members
 from stages.shape.collection.pairs import JOINTS, pairs_of
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count

@@ -15,9 +15,8 @@ import numpy.typing as npt
 
 from pipeline.paths import write_file
 from pipeline.shards import bytes_array
-from stages.exports.archive import archive_files
-from stages.exports.members import archive_name
 from stages.shape.arrays import ByteArray
+from stages.shape.collection.archive import archive_files, archive_name
 
 if TYPE_CHECKING:
     import trimesh

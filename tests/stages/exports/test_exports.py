@@ -10,11 +10,11 @@ import pytest
 import trimesh
 
 from pipeline.paths import write_file
-from stages.exports.archive import archive_bytes, archive_files
 from stages.exports.audit import AUDIT
-from stages.exports.members import CONTENTS, archive_name
+from stages.exports.members import CONTENTS
 from stages.package.dataset_sample import DatasetSample
 from stages.package.reader import Dataset
+from stages.shape.collection.archive import archive_bytes, archive_files, archive_name
 from stages.shape.collection.packaged import PackagedSample
 from tests.stages.package.conftest import toy_folder  # noqa: F401
 

@@ -12,6 +12,11 @@ import zlib
 from collections.abc import Mapping
 
 
+def archive_name(kind: str) -> str:
+    """Return the name of the member with the files of a format."""
+    return f"{kind}.tar.gz"
+
+
 def archive_bytes(files: Mapping[str, bytes]) -> bytes:
     """Return an archive of files by their paths, in their order, without times."""
     buffer = io.BytesIO()
