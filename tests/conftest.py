@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 
 # As in workers of the engine: with several threads on a busy machine LAPACK is a hundred times slower. Before numpy is
@@ -27,6 +28,17 @@ _WITH_WARM_WORKERS = {
     for name in ("stages", "eval", "pipeline/test_damage.py", "pipeline/test_prune.py", "pipeline/test_run.py")
 }
 """Folders and files of tests that run stages and do not test how workers start and end."""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    # Imports make 750,000 objects that stay to the end. No full garbage collection needs to look through them.
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
 
 
 @pytest.hookimpl(wrapper=True)
