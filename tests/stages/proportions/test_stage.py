@@ -67,9 +67,9 @@ def test_rows_of_a_shelf_become_samples_that_verify(tmp_path: Path) -> None:
 
 def test_every_layout_is_one_shape_where_parts_keep_their_sizes(tmp_path: Path) -> None:
     config = write_shelf_config(tmp_path, size="grow", min_count=0.75, max_count=1.25)
-    said = run(config, tmp_path / "out", *STAGES)
-    assert "shelf: 6 of 12 shapes of" in said
-    assert len({json.dumps(json.loads(sample.text)["rows"]) for sample in samples(tmp_path / "out")}) == 6
+    run(config, tmp_path / "out", *STAGES)
+    changes = [json.loads(sample.text).get("rows") for sample in samples(tmp_path / "out")]
+    assert len({json.dumps(each) for each in changes if each}) == 4, "6, 7, 9 or 10 boards for 8"
 
 
 def write_shelf_config(folder: Path, **rows: object) -> Path:
