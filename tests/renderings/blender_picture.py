@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
 from pathlib import Path
 from typing import Any
 
-SAMPLES_PER_PIXEL = 48
+SAMPLES_PER_PIXEL = 16
 LAMP_ENERGY, SKY_LIGHT = 2.2, 0.28
 """A white surface that faces the lamp gives back 0.7 of its light, and 0.28 of that of the sky, as in `views`."""
 
@@ -20,6 +21,7 @@ def main() -> None:
     """Write the pictures of a list of models."""
     for job in json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")):
         _draw(job)
+    os._exit(0)  # the package may crash when it unloads
 
 
 def _draw(job: dict[str, Any]) -> None:

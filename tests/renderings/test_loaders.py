@@ -16,8 +16,11 @@ def test_the_look_that_a_file_holds_is_the_one_that_trimesh_shows() -> None:
     expected = stored(content)
     shown = trimesh_look(trimesh.load_scene(io.BytesIO(content), file_type="glb", process=False))
     assert {name for name, _ in expected} == {"tiles", "leaves"}
-    assert sorted(shown) == sorted(expected)
+    assert overlap(expected, shown, with_names=True) == len(expected) == len(shown)
 
 
-def test_entries_count_as_often_as_both_lists_have_them() -> None:
-    assert overlap(["a", "a", "b"], ["b", "a", "c"]) == 2
+def test_entries_count_as_often_as_both_looks_have_them() -> None:
+    red, blue = (4, 4, 200.0, 0.0, 0.0), (4, 4, 0.0, 0.0, 200.0)
+    expected, found = [("a", red), ("a", red), ("b", blue)], [("b", blue), ("c", (4, 4, 201.0, 0.0, 0.0))]
+    assert overlap(expected, found, with_names=False) == 2
+    assert overlap(expected, found, with_names=True) == 1
