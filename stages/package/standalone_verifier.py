@@ -60,6 +60,8 @@ DISTANCES_PER_SAMPLE = 32
 DISTANCE_TOLERANCE_SHARE = 1e-5
 """Largest error of a signed distance, as a share of the side of the cube."""
 VOLUME_TOLERANCE_SHARE = 1e-3
+PUSH_TOLERANCE = 1e-5
+"""Margins this near to the push of the config may be of stable shapes or of others, in weights."""
 IMAGE_TOLERANCE_SHARE = 2e-3
 """Largest distance of the image of a part from the part that a symmetry names, as a share of the diagonal."""
 CAPTION_SLACK_SHARE = 0.02
@@ -145,7 +147,9 @@ def verify(folder: Path, samples: int | None = 100, seed: int = 0, workers: int 
         total, splits = int(manifest["samples"]), dict(manifest["splits"])
         members = [(str(member["name"]), str(member["dtype"]), list(member["shape"])) for member in manifest["members"]]
         schema = dict(json.loads((folder / "schema.json").read_bytes()))
-        nouns = dict(manifest["config"].get("captions", {}).get("nouns", {}))
+        config = manifest["config"]
+        nouns = dict(config.get("captions", {}).get("nouns", {}))
+        push = float(config.get("validity", {}).get("push", "nan"))
         sharing = manifest.get("graphs_share_split")
         producers = sorted(sharing if isinstance(sharing, list) else manifest["producers"] if sharing else ())
         owned = {(kit, number): row["id"] for row in class_rows for kit, number in row.get("own", {}).items()}
@@ -161,7 +165,7 @@ def verify(folder: Path, samples: int | None = 100, seed: int = 0, workers: int 
             inside = chosen[slice(*np.searchsorted(chosen, (first, first + size)))]
             places = set((inside - first).tolist())
             job = ShardJob(
-                folder, path, split, members, labels, owned, producers, places, (seed, number), schema, nouns
+                folder, path, split, members, labels, owned, producers, places, (seed, number), schema, nouns, push
             )
             jobs.append(job)
         else:
@@ -222,6 +226,7 @@ class ShardJob:
     places: samples whose geometry is checked, by their place in the shard
     schema: JSON schema of the records
     nouns: what captions call the shapes of a kit, where the config states it
+    push: what a stable shape bears, in weights; nan if it is not stated
     """
 
     folder: Path
@@ -235,6 +240,7 @@ class ShardJob:
     seed: tuple[int, int]
     schema: dict[str, Any] = field(default_factory=dict)
     nouns: dict[str, str] = field(default_factory=dict)
+    push: float = float("nan")
 
 
 def check_shard(job: ShardJob) -> DatasetFindings:
@@ -424,8 +430,12 @@ def record_faults(
     if "joints.npy" in arrays:
         yield from pair_faults("joints.npy", arrays["joints.npy"], len(parts))
         components = component_count(len(parts), arrays["joints.npy"])
-        if record["physics"]["components"] != components:
-            yield f"counts {record['physics']['components']} components; joints.npy makes {components}"
+        physics = record["physics"]
+        if physics["components"] != components:
+            yield f"counts {physics['components']} components; joints.npy makes {components}"
+        bears = physics["margin"] - job.push
+        if abs(bears) > PUSH_TOLERANCE and physics["stable"] != (bears > 0):
+            yield f"is called stable: {physics['stable']}, and bears {physics['margin']} of its weight as a push"
     if "txt" in members and not members["txt"].decode().startswith(record["text"]):
         yield "its text is not that of the record"
     findings.note("key", record["key"].encode(), sample)
