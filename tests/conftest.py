@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import os
+import subprocess
+import sys
 
 # As in workers of the engine: with several threads on a busy machine LAPACK is a hundred times slower. Before numpy is
 # imported; torch heeds OMP.
@@ -12,6 +14,7 @@ os.environ.update(dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUM
 from collections.abc import Iterator
 from contextlib import nullcontext
 from functools import cache
+from importlib.util import cache_from_source, find_spec
 from pathlib import Path
 
 import pytest
@@ -28,6 +31,18 @@ _WITH_WARM_WORKERS = {
     for name in ("stages", "eval", "pipeline/test_damage.py", "pipeline/test_prune.py", "pipeline/test_run.py")
 }
 """Folders and files of tests that run stages and do not test how workers start and end."""
+
+_LIBRARIES = "torch, open3d, trimesh, matplotlib.pyplot, pyrender, pyarrow.parquet, numba, scipy.optimize, networkx"
+"""What most test files import."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    # Python compiles the modules of a new environment at their first import, for 10 CPU seconds. Workers, which start
+    # at the same time, would each do so.
+    torch = find_spec("torch")
+    is_new = torch is not None and not Path(cache_from_source(str(torch.origin))).exists()
+    if is_new and config.getoption("numprocesses", None) and not sys.dont_write_bytecode:
+        subprocess.run([sys.executable, "-c", f"import {_LIBRARIES}"], check=False)
 
 
 @pytest.hookimpl(wrapper=True)
