@@ -69,7 +69,7 @@ def test_every_layout_is_one_shape_where_parts_keep_their_sizes(tmp_path: Path) 
     config = write_shelf_config(tmp_path, size="grow", min_count=0.75, max_count=1.25)
     run(config, tmp_path / "out", *STAGES)
     changes = [json.loads(sample.text).get("rows") for sample in samples(tmp_path / "out")]
-    assert len({json.dumps(each) for each in changes if each}) == 4, "6, 7, 9 or 10 boards for 8"
+    assert len({json.dumps(rows) for rows in changes if rows}) == 4, "6, 7, 9 or 10 boards for 8"
 
 
 def write_shelf_config(folder: Path, **rows: object) -> Path:
