@@ -63,6 +63,7 @@ def croissant(
     origins: the files that the dataset was made from
     """
     license = str(facts["license"])
+    members = _identified(members)
     document: dict[str, Any] = mlc.Metadata(
         name=facts["name"],
         description=facts["description"],
@@ -137,7 +138,7 @@ def _files(
 
 
 def _file_set(member: Mapping[str, Any], shards: Sequence[Mapping[str, Any]]) -> mlc.FileSet:
-    name = f"files-{_identifier(member)}"
+    name = f"files-{member['identifier']}"
     return mlc.FileSet(
         id=name,
         name=name,
@@ -170,7 +171,7 @@ def _samples(columns: Mapping[str, str]) -> mlc.RecordSet:
 
 
 def _member_records(member: Mapping[str, Any]) -> mlc.RecordSet:
-    name = _identifier(member)
+    name = str(member["identifier"])
     files = f"files-{name}"
     file_name = mlc.Source(
         file_set=files,
@@ -187,7 +188,7 @@ def _member_records(member: Mapping[str, Any]) -> mlc.RecordSet:
 
 def _joined_records(member: Mapping[str, Any]) -> mlc.RecordSet:
     """Return the member with the split and the kit of its sample."""
-    own = _identifier(member)
+    own = str(member["identifier"])
     name = f"{own}-of-samples"
     key, content = (mlc.Source(field=f"{own}/{field}") for field in ("key", "content"))
     joined = mlc.Source(field="samples/key")
@@ -236,6 +237,14 @@ def _full_name(name: str) -> str:
     return {"sc": "https://schema.org/", "cr": "http://mlcommons.org/croissant/"}[prefix] + rest
 
 
-def _identifier(member: Mapping[str, Any]) -> str:
-    """Return `points` for `points.npy`; members named by their format keep their name: `glb`, `json`."""
-    return str(member["name"]).partition(".")[0]
+def _identified(members: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Return members with an `identifier`: `points` for `points.npy`, `glb` for `glb`, and with its format for a member
+    whose name another one has, such as `normals1-png` where there is `normals1.npy`.
+    """
+    found: dict[str, Mapping[str, Any]] = {}
+    for member in members:
+        name = str(member["name"])
+        identifier = name.partition(".")[0]
+        identifier = name.replace(".", "-") if identifier in found else identifier
+        found[identifier] = {**member, "identifier": identifier}
+    return list(found.values())
