@@ -18,7 +18,6 @@ from eval.programs.two_sample_test import POINTS_PER_CLOUD, features_of
 from pipeline.errors import Rejected
 from stages.abstraction.hierarchy import Boxes, hierarchy_of
 from stages.abstraction.settings import AbstractionConfig
-from stages.shape.adam import Adam
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.fitting import fit, fit_cuboids
 from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES
@@ -69,7 +68,7 @@ def train_cloud_encoder(descriptors: FloatArray, points: LatentPoints, seed: int
             nn.Linear(HIDDEN_UNITS, points.shape[1]),
         )  # fmt: skip
         batches = max(1, len(inputs) // 64)
-        optimizer = Adam(module.parameters(), 1e-3, weight_decay=1e-2, decoupled_weight_decay=True)
+        optimizer = torch.optim.AdamW(module.parameters(), 1e-3, weight_decay=1e-2)
         schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, TRAINING_EPOCHS * batches)
         for _ in range(TRAINING_EPOCHS):
             for batch in torch.randperm(len(inputs)).chunk(batches):

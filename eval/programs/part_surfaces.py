@@ -15,7 +15,6 @@ from eval.engine.pictures import cloud_portrait
 from eval.programs.figures import boxes_portrait, picture_figure
 from stages.abstraction.hierarchy import MAX_TURNED_VOLUME_SHARE
 from stages.programs.program import find_program
-from stages.shape.adam import Adam
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import box_corners, nearest_axes
 from stages.shapeassembly.extraction.hierarchy import Box
@@ -111,7 +110,7 @@ def train_surfaces(parts: PartClouds, steps: int, seed: int) -> PartSurfaces:
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         module = PartSurfaces()
-    optimizer = Adam(module.parameters(), 2e-3)
+    optimizer = torch.optim.Adam(module.parameters(), 2e-3)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
     for _ in range(steps):
         rows = torch.randint(len(points), (BATCH_SIZE,), generator=noise)

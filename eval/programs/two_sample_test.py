@@ -12,7 +12,6 @@ from torch import Tensor, nn
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from eval.engine.table import Cell
-from stages.shape.adam import Adam
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import frame_of, subsample
 from stages.training.recovery.trained import PRETRAINED_FOLDER, find_models
@@ -93,7 +92,7 @@ def classifier_acceptance(samples: FloatArray, real: FloatArray, seed: int) -> f
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         classifier = _Classifier()
-        optimizer = Adam(classifier.parameters(), 1e-3)
+        optimizer = torch.optim.Adam(classifier.parameters(), 1e-3)
         shares = []
         for epoch in range(TRAINING_EPOCHS):
             classifier.train()

@@ -12,7 +12,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from stages.shape.adam import Adam
 from stages.training.checkpoint import tensors_below
 from stages.training.training_task import TrainingTask
 
@@ -63,13 +62,13 @@ class TrainState:
     """A task with its optimiser and the number of steps taken."""
 
     task: TrainingTask
-    optimizer: Adam
+    optimizer: torch.optim.Adam
     step: int = 0
 
     @classmethod
     def of(cls, task: TrainingTask) -> TrainState:
         """Start training a task."""
-        return cls(task, Adam(task.module.parameters(), lr=task.config.learning_rate))
+        return cls(task, torch.optim.Adam(task.module.parameters(), lr=task.config.learning_rate))
 
     def tensors(self) -> dict[str, Tensor]:
         """Return weights as `weights.<name>`, moments of the optimiser as `exp_avg.<name>` and `exp_avg_sq.<name>`.

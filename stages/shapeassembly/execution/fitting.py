@@ -10,7 +10,6 @@ import torch
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from stages.shape.adam import Adam
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.clouds import chamfer_l1
 from stages.shapeassembly.execution.differentiable import DifferentiableProgram
@@ -119,7 +118,7 @@ def _descended(
         raise ValueError("there are no points to fit to")
     target = cKDTree(points)
     values = torch.tensor(start, requires_grad=True)
-    optimiser = Adam([values], lr=rate)
+    optimiser = torch.optim.Adam([values], lr=rate)
     falling = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps, eta_min=rate / 10)
     cloud = torch.from_numpy(np.asarray(points, dtype=np.float64))
     best, best_values = np.inf, values.detach().clone()

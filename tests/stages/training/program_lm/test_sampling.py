@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 
-from stages.shape.adam import Adam
 from stages.shapeassembly import execute, parse
 from stages.shapeassembly.analysis.structure import signature
 from stages.shapeassembly.syntax.checks import protruding_parts, violations
@@ -98,7 +97,7 @@ def test_words_are_sampled_by_probability_among_allowed_top_p() -> None:
 def test_model_learns_and_samples_two_programs() -> None:
     module = new_model(ENTRY, VALUES, MAX_WORDS, 0)
     learner = ProgramLmTask(module, {}, ENTRY, TEXTS, TEXTS)
-    optimizer = Adam(module.parameters(), lr=3e-3)
+    optimizer = torch.optim.Adam(module.parameters(), lr=3e-3)
     noise = torch.Generator().manual_seed(0)
     stream = learner.batches(np.random.default_rng(0))
     with torch.no_grad():
