@@ -59,9 +59,10 @@ def test_a_format_that_is_no_member_is_named(sample: DatasetSample) -> None:
 
 
 def test_the_bytes_of_an_archive_depend_on_its_files_alone() -> None:
-    files = {"a.txt": b"one", "meshes/b.obj": b"v 0 0 0\n" * 100}
+    files = {"a.txt": b"one", "meshes/b.obj": b"v 0 0 0\n" * 100, f"{'long-name-' * 40}ö.obj": b""}
     assert archive_bytes(files) == archive_bytes(dict(files))
-    assert len(archive_bytes(files)) < 500
+    assert archive_files(archive_bytes(files)) == files
+    assert len(archive_bytes(files)) < 600
 
 
 def test_corrupted_and_foreign_archives_are_found(sample: DatasetSample, toy_folder: Path) -> None:  # noqa: F811
