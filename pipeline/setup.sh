@@ -110,8 +110,10 @@ echo "installing $(grep -c '^[^-]' "$requirements") packages and what they need 
 : > .venv/kernels.log
 # shellcheck disable=SC2086
 pip_install --constraint requirements.lock $(grep '^--' requirements.lock) $KERNEL_PACKAGES
-nice .venv/bin/python -m pipeline.compile_kernels > .venv/kernels.log 2>&1 &
+nice .venv/bin/python -m pipeline.compile_kernels > .venv/kernels.log 2> .venv/kernels-errors.log &
 kernels=$!
 trap 'kill "$kernels" 2>/dev/null || true' EXIT
+trap 'exit 130' INT  # dash runs no EXIT trap for a signal, and what runs in the background ignores Ctrl-C
+trap 'exit 143' TERM
 pip_install --constraint requirements.lock --requirement "$requirements"
 pip_install --no-deps --no-build-isolation --editable .
