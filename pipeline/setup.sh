@@ -103,17 +103,20 @@ pip_install() {
         fi
     done
     wait "$pip" || fail "$(tail -n 20 .venv/install.log)" "pip failed; all that it said is in .venv/install.log"
+    pip=""
 }
 
 echo "installing $(grep -c '^[^-]' "$requirements") packages and what they need into .venv; the first time takes minutes"
+# What runs in the background ignores Ctrl-C, and dash runs no EXIT trap for a signal.
+pip="" kernels=""
+trap 'for process in $pip $kernels; do kill "$process" 2>/dev/null || true; done' EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM
 # Kernels need few of them: they are compiled while the others come. A first run compiles those that are left.
 : > .venv/kernels.log
 # shellcheck disable=SC2086
 pip_install --constraint requirements.lock $(grep '^--' requirements.lock) $KERNEL_PACKAGES
 nice .venv/bin/python -m pipeline.compile_kernels > .venv/kernels.log 2> .venv/kernels-errors.log &
 kernels=$!
-trap 'kill "$kernels" 2>/dev/null || true' EXIT
-trap 'exit 130' INT  # dash runs no EXIT trap for a signal, and what runs in the background ignores Ctrl-C
-trap 'exit 143' TERM
 pip_install --constraint requirements.lock --requirement "$requirements"
 pip_install --no-deps --no-build-isolation --editable .
