@@ -84,6 +84,7 @@ NUMBER_WORDS = [
 TIMES = {"one and a half times": 1.5, "twice": 2.0, "two and a half times": 2.5} | {
     f"{word} times": float(number) for number, word in enumerate(NUMBER_WORDS)
 }
+CONTACT_KINDS = {"point", "line", "face"}
 NOT_CHECKED = (
     "not checked: physical stability (only rootedness is), strings and programs, rendered images, files of exports, "
     "flags of surfaces, colors in captions, the Parquet index"
@@ -152,6 +153,8 @@ def verify(folder: Path, samples: int | None = 100, seed: int = 0, workers: int 
         push = float(config.get("validity", {}).get("push", "nan"))
         sharing = manifest.get("graphs_share_split")
         producers = sorted(sharing if isinstance(sharing, list) else manifest["producers"] if sharing else ())
+        kits = config.get("exemplars", {}).get("kits", [])
+        partial = {str(kit["name"]) for kit in kits if set(kit["contact"]["kinds"]) != CONTACT_KINDS}
         owned = {(kit, number): row["id"] for row in class_rows for kit, number in row.get("own", {}).items()}
     except (OSError, ValueError, KeyError, TypeError) as error:
         findings.faults.append(f"manifest.json, classes.json or schema.json cannot be read: {error!r}")
@@ -165,7 +168,8 @@ def verify(folder: Path, samples: int | None = 100, seed: int = 0, workers: int 
             inside = chosen[slice(*np.searchsorted(chosen, (first, first + size)))]
             places = set((inside - first).tolist())
             job = ShardJob(
-                folder, path, split, members, labels, owned, producers, places, (seed, number), schema, nouns, push
+                *(folder, path, split, members, labels, owned, producers, places, (seed, number)),
+                *(schema, nouns, push, partial),
             )
             jobs.append(job)
         else:
@@ -227,6 +231,7 @@ class ShardJob:
     schema: JSON schema of the records
     nouns: what captions call the shapes of a kit, where the config states it
     push: what a stable shape bears, in weights; nan if it is not stated
+    partial: kits whose shape graphs leave out kinds of contact, so that parts may touch without being in contacts.npy
     """
 
     folder: Path
@@ -241,6 +246,7 @@ class ShardJob:
     schema: dict[str, Any] = field(default_factory=dict)
     nouns: dict[str, str] = field(default_factory=dict)
     push: float = float("nan")
+    partial: set[str] = field(default_factory=set)
 
 
 def check_shard(job: ShardJob) -> DatasetFindings:
@@ -520,7 +526,8 @@ def geometry_faults(
     if "contacts.npy" in arrays:
         tolerance = max(float(record["contact_tolerance"]), 1e-6 * diagonal)
         names = [part["name"] for part in record["parts"]]
-        yield from contact_faults(names, triangles, arrays["contacts.npy"], tolerance, rng)
+        pairs = PAIRS_PER_SAMPLE if record["kit"] not in job.partial else 0
+        yield from contact_faults(names, triangles, arrays["contacts.npy"], tolerance, pairs, rng)
     if "joints.npy" in arrays:
         yield from rooted_faults(record, triangles, arrays["joints.npy"], diagonal)
     for index, camera in enumerate(record.get("sketches", ())):
@@ -580,9 +587,17 @@ def point_faults(
 
 
 def contact_faults(
-    names: list[str], triangles: list[np.ndarray], contacts: np.ndarray, tolerance: float, rng: np.random.Generator
+    names: list[str],
+    triangles: list[np.ndarray],
+    contacts: np.ndarray,
+    tolerance: float,
+    pairs: int,
+    rng: np.random.Generator,
 ) -> Iterator[str]:
-    """Yield contacts of parts that are apart, and pairs that touch at a vertex and are no contact."""
+    """Yield contacts of parts that are apart, and pairs that touch at a vertex and are no contact.
+
+    pairs: number of pairs that are no contacts and are looked at
+    """
     boxes = [(part.reshape(-1, 3).min(axis=0), part.reshape(-1, 3).max(axis=0)) for part in triangles]
 
     def apart(first: int, second: int) -> bool:
@@ -594,7 +609,7 @@ def contact_faults(
         if apart(first, second):
             yield f"{names[first]} and {names[second]} are in contacts.npy, and are apart"
     near = [pair for pair in combinations(range(len(triangles)), 2) if pair not in listed and not apart(*pair)]
-    for place in rng.permutation(len(near))[:PAIRS_PER_SAMPLE].tolist():
+    for place in rng.permutation(len(near))[:pairs].tolist():
         for first, second in (near[place], near[place][::-1]):
             vertices = np.unique(triangles[first].reshape(-1, 3), axis=0)
             low, high = boxes[second]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import io
+import json
 import subprocess
 import sys
 import tarfile
@@ -83,6 +84,18 @@ def test_a_sample_that_is_there_twice_is_found(folder: Path) -> None:
             tar.addfile(entry, io.BytesIO(content))
     reseal(folder)
     assert any(f"{key}: is there twice" in fault for fault in verify(folder, 0).faults)
+
+
+def test_touching_parts_are_no_fault_where_the_graph_leaves_out_kinds_of_contact(folder: Path) -> None:
+    forge(folder, "a dropped contact", np.random.default_rng(0))
+    assert any("touch, and are not in contacts.npy" in fault for fault in verify(folder, None).faults)
+    manifest = folder / "manifest.json"
+    content = json.loads(manifest.read_bytes())
+    content["config"]["exemplars"]["kits"] = [
+        {"name": name, "contact": {"kinds": ["face"]}} for name in content["kits"]
+    ]
+    manifest.write_text(json.dumps(content), encoding="utf-8")
+    assert not any("touch, and are not in contacts.npy" in fault for fault in verify(folder, None).faults)
 
 
 def test_shard_outside_the_folder_is_not_opened(folder: Path) -> None:
