@@ -26,6 +26,8 @@ EditKind = Literal["removed", "shortened", "moved"]
 EDIT_KINDS = cast(tuple[EditKind, ...], get_args(EditKind))
 UNSUPPORTED, TIPS_OVER = "unsupported", "tips over"
 KEY_SUFFIX = "-falls"
+NAME = "mixture"
+"""Language of edited samples."""
 
 MIN_STANDING_DEGREES = 8.0
 """Least tilt that the shape bears that stands. Engines agree on what falls, except near the 5.71 degrees of a push."""
@@ -181,6 +183,15 @@ def original_sample(sample: Sample) -> tuple[Sample, Edit]:
     """Return the sample that was edited, and the edit, from one that `falling_partner` made."""
     text = json.loads(sample.text)
     return replace(sample, producer=text["producer"], text=text["text"]), _edit_of(text)
+
+
+def described_language(language: str, text: str) -> str:
+    """Return the language that names the parts of a sample: of an edited one, that of the sample before the edit.
+
+    language, text: of the sample, as records call them
+    """
+    edited_from: str = json.loads(text)["language"] if language == NAME else language
+    return edited_from
 
 
 def original_record(record: Mapping[str, Any]) -> tuple[dict[str, Any], Edit]:

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.errors import ConfigError
 from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan, Task
-from stages.mixture.contrast import edited, original_record, original_sample
+from stages.mixture.contrast import NAME, edited, original_record, original_sample
 from stages.mixture.settings import MixtureConfig
 from stages.shape.arrays import IntArray
 from stages.shape.collection.discovery import language_of, languages
@@ -23,8 +23,6 @@ from stages.shape.collection.language import Language, RebuildShape, ShapeDecode
 from stages.shape.collection.shards import sample_producers
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
-
-NAME = "mixture"
 
 
 class MixtureDecoder:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pipeline.paths import DatasetPaths
+from stages.mixture.contrast import described_language
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import PackagedSample
 from stages.structure.members import HIERARCHY, SYMMETRY
@@ -39,7 +40,8 @@ def structure_faults(sample: PackagedSample) -> Iterator[str]:
 def recomputed_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
     """Yield a sentence for a hierarchy or a symmetry that the shape does not have."""
     config = StructureConfig.model_validate(sample.sections.get("structure", {}))
-    fields = structure_fields(sample.shape, sample.record["language"], config)
+    language = described_language(sample.record["language"], sample.record["text"])
+    fields = structure_fields(sample.shape, language, config)
     if HIERARCHY in fields and fields[HIERARCHY] != sample.record[HIERARCHY]:
         yield "its hierarchy is not that of its text"
     if SYMMETRY in fields:

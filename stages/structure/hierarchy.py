@@ -74,7 +74,7 @@ def model_hierarchy(shape: Shape) -> Hierarchy:
 
 
 def hierarchy_of(shape: Shape, language: str) -> Hierarchy:
-    """Return the hierarchy of a shape. language: of its sample, as records call it"""
+    """Return the hierarchy of a shape. language: that names its parts, as records call it"""
     if language == "shapeassembly":
         return path_hierarchy(shape.part_names)
     return model_hierarchy(shape) if language in LANGUAGES_OF_KITS else moving_hierarchy(shape)

@@ -7,6 +7,7 @@ from typing import Any
 
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.mixture.contrast import described_language
 from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.discovery import language_of
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
@@ -29,14 +30,14 @@ def run_shard(task: Task) -> Outcome:
     config = task.config.section(StructureConfig)
 
     def described(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
-        language = language_of(sample.producer).name
+        language = described_language(language_of(sample.producer).name, sample.text)
         return {"json": json_bytes(structure_fields(collection.shape(sample), language, config))}
 
     return Outcome(add_members(task, described), {"split": task.shard.params["split"]})
 
 
 def structure_fields(shape: Shape, language: str, config: StructureConfig) -> dict[str, Any]:
-    """Return the fields of the record of an upright shape. language: of its sample, as records call it"""
+    """Return the fields of the record of an upright shape. language: that names its parts, as records call it"""
     from stages.structure.symmetry import shape_symmetry
 
     fields: dict[str, Any] = {}

@@ -42,6 +42,7 @@ SECTIONS: dict[str, Any] = {
         "programs": [{"name": "furniture", "path": "datasets/exemplars/programs"}],
         "splits": {"shards": 1, "val": 0.2, "test": 0.2},
     },
+    "structure": {"hierarchy": True},
     "points": {"uniform": 64},
     "sketches": {"size": 48, "renderer": "raster", "views": [{"name": "front"}]},
     "package": {"previewed": 4},
@@ -125,7 +126,7 @@ def test_pairs_are_in_one_split_and_the_index_names_them(made: tuple[Path, tuple
     records = {record["key"]: record for record, _ in records_of(made[0])}
     rows = pyarrow.parquet.read_table(made[0] / "mix-index/mix.parquet").to_pylist()
     assert {row["key"] for row in rows} == set(records)
-    pairs = 0
+    pairs = nested = 0
     for row in rows:
         record = records[row["key"]]
         contrast = record["lineage"]["contrast"]
@@ -136,8 +137,12 @@ def test_pairs_are_in_one_split_and_the_index_names_them(made: tuple[Path, tuple
             assert partner["split"] == record["split"]
             assert record["lineage"]["parents"] == [partner["key"]]
             assert (record["producer"], record["lineage"]["method"]) == ("mixture", "contrast")
+            if partner["language"] == "shapeassembly" and len(partner["parts"]) == len(record["parts"]):
+                assert record["hierarchy"] == partner["hierarchy"]
+                nested += len(record["hierarchy"]["groups"]) > 1
             pairs += 1
     assert pairs >= 20
+    assert nested, "the edited shape of a hierarchical one has its hierarchy"
     card = (made[0] / "mix" / "README.md").read_text(encoding="utf-8")
     assert sum(int(line.split("|")[2]) for line in card.splitlines() if line.startswith("| a part is ")) == pairs
 

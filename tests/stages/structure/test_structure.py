@@ -171,7 +171,7 @@ def test_siblings_are_related_by_contacts_and_symmetries() -> None:
 )
 def test_damaged_records_are_found(damage: Callable[[dict[str, Any]], object], fault: str) -> None:
     shape = plates((0.8, 0.5, 0.7), (-0.8, 0.5, 0.7))
-    record = {"language": "assembly", "parts": [{}] * 3, **structure_fields(shape, "assembly", ALL)}
+    record = {"language": "assembly", "text": "", "parts": [{}] * 3, **structure_fields(shape, "assembly", ALL)}
     sample = PackagedSample("a", record, {}, {}, shape, {"structure": ALL.model_dump()})
     paths: Any = None
     assert [*AUDIT.faults(sample), *AUDIT.recheck(sample, paths)] == []
