@@ -6,17 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eval.engine.parallel_map import parallel_map
 from eval.engine.table import Table
 from eval.generated.set_metrics import (
     CANDIDATES_PER_SET,
     JSD_CELLS,
     NOVELTY_PERCENTILE,
-    Neighbours,
-    earth_movers_distance,
     jensen_shannon_divergence,
     nearest_by_chamfer,
-    nearest_in_matrix,
+    nearest_by_earth_movers,
     normalized_clouds,
     set_metrics,
     shape_descriptors,
@@ -40,14 +37,12 @@ COLUMNS = (
 )
 MIN_HALVES = 4
 """Shapes of a reference that is compared with itself."""
-EMD_ROWS_PER_TASK = 8
 
 
 def comparison_table(
     names: Sequence[str],
     sets: Sequence[FloatArray],
     normalize: bool,
-    emd_shapes: int,
     emd_points: int,
     workers: int = 1,
 ) -> Table:
@@ -56,17 +51,17 @@ def comparison_table(
     names, sets: generated, then reference; float64 (n, k, 3) and (m, k, 3), y up, at least two shapes each.
     """
     generated, reference = (normalized_clouds(clouds) if normalize else clouds for clouds in sets)
-    rows = [(f"{names[0]} against {names[1]}", *_figures(generated, reference, emd_shapes, emd_points, workers))]
+    rows = [(f"{names[0]} against {names[1]}", *_figures(generated, reference, emd_points, workers))]
     if len(reference) >= MIN_HALVES:
         order = np.random.default_rng(0).permutation(len(reference))
         halves = [reference[np.sort(half)] for half in np.array_split(order, 2)]
-        rows.append((f"two halves of {names[1]}", *_figures(halves[0], halves[1], emd_shapes, emd_points, workers)))
+        rows.append((f"two halves of {names[1]}", *_figures(halves[0], halves[1], emd_points, workers)))
     points = sets[0].shape[1]
     scale = "Each cloud is centred and scaled to a sphere of radius 1." if normalize else "Sizes are kept."
     notes = (
-        f"Clouds of {points:,} points, uniform by area. {scale} CD: squared distances, both directions summed, the "
-        f"nearest of {CANDIDATES_PER_SET} candidates. EMD: optimal assignment of {emd_points} points, at most "
-        f"{emd_shapes} shapes a set. Both sets have the size of the smaller.",
+        f"Clouds of {points:,} points, uniform by area. {scale} CD: squared distances, both directions summed. EMD: "
+        f"optimal assignment of {emd_points} points. Nearest shapes are the best of {CANDIDATES_PER_SET} candidates. "
+        "Both sets have the size of the smaller.",
         "1-NNA: 50 means that the sets cannot be told apart, 100 that they are separate. COV: share of reference "
         f"shapes that are nearest to a generated one. JSD: bits, {JSD_CELLS}³ cells. Fréchet: of distances within a "
         "shape and of heights, not of a network. Novel: farther from the reference than "
@@ -76,16 +71,17 @@ def comparison_table(
 
 
 def _figures(
-    generated: FloatArray, reference: FloatArray, emd_shapes: int, emd_points: int, workers: int
+    generated: FloatArray, reference: FloatArray, emd_points: int, workers: int
 ) -> tuple[str | int | float, ...]:
     from eval.programs.two_sample_test import frechet_distance
 
     count = min(len(generated), len(reference))
     generated, reference = _subset(generated, count), _subset(reference, count)
-    with ticking("eval", f"comparing {count} and {count} shapes"):
+    with ticking("eval", f"comparing {count} and {count} shapes by CD"):
         of_generated, of_reference, diversity = nearest_by_chamfer(generated, reference, workers)
-    chamfer = set_metrics(of_generated, of_reference)
-    emd = set_metrics(*_nearest_by_emd(generated[:emd_shapes], reference[:emd_shapes], emd_points, workers))
+    with ticking("eval", f"comparing {count} and {count} shapes by EMD"):
+        by_emd = nearest_by_earth_movers(generated[:, :emd_points], reference[:, :emd_points], workers)
+    chamfer, emd = set_metrics(of_generated, of_reference), set_metrics(*by_emd)
     return (
         count,
         chamfer.one_nna,
@@ -104,22 +100,3 @@ def _figures(
 def _subset(clouds: FloatArray, count: int) -> FloatArray:
     chosen: FloatArray = clouds[np.sort(np.random.default_rng(0).permutation(len(clouds))[:count])]
     return chosen
-
-
-def _nearest_by_emd(
-    generated: FloatArray, reference: FloatArray, points: int, workers: int
-) -> tuple[Neighbours, Neighbours]:
-    clouds = np.concatenate([generated, reference])[:, :points]
-    starts = range(0, len(clouds), EMD_ROWS_PER_TASK)
-    distances = np.zeros((len(clouds), len(clouds)))
-
-    def rows_from(start: int) -> FloatArray:
-        rows = np.zeros((min(EMD_ROWS_PER_TASK, len(clouds) - start), len(clouds)))
-        for row in range(len(rows)):
-            for other in range(start + row + 1, len(clouds)):
-                rows[row, other] = earth_movers_distance(clouds[start + row], clouds[other])
-        return rows
-
-    for start, rows in parallel_map(rows_from, starts, workers, "shapes by EMD"):
-        distances[start : start + len(rows)] = rows
-    return nearest_in_matrix(distances + distances.T, len(generated))

@@ -8,9 +8,10 @@ Representations and Generative Models for 3D Point Clouds*, 2018. Conventions di
 - Both sets have one size; the larger is subsampled.
 - Ties of the nearest neighbour count half.
 
-Nearest neighbours by CD come from candidates. The squared distance to a cloud is tabulated on a grid and interpolated
-at the points of the others, which is one product of matrices for all pairs. The best candidates of each shape are then
-compared exactly.
+Nearest neighbours come from candidates, which are then compared exactly. Estimates that are one product of matrices
+for all pairs choose them. For CD, the squared distance to a cloud is tabulated on a grid and interpolated at the points
+of the others. For EMD, clouds are compared along lines as well (sliced Wasserstein distance): on 100 and 100 chairs
+the nearest one of all pairs was always among 8 candidates, by either estimate alone among 8 of 93 to 98 %.
 """
 
 from __future__ import annotations
@@ -22,10 +23,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from eval.engine.parallel_map import parallel_map
 from stages.shape.arrays import FloatArray, IntArray
 
-CANDIDATES_PER_SET = 16
-"""Shapes of a set that are compared exactly with a shape."""
+CANDIDATES_PER_SET = 8
+"""Shapes of either set that are compared exactly with a shape."""
+EMD_PAIRS_PER_TASK = 64
+LINES_PER_DISTANCE = 64
+"""Lines of a sliced Wasserstein distance."""
 GRID_NODES = 24
 """Nodes of the distance grid along an axis."""
 CLOUDS_PER_PRODUCT = 128
@@ -72,45 +77,82 @@ def normalized_clouds(clouds: FloatArray) -> FloatArray:
 
 
 def nearest_by_chamfer(
-    generated: FloatArray, reference: FloatArray, threads: int = 1
+    generated: FloatArray, reference: FloatArray, workers: int = 1
 ) -> tuple[Neighbours, Neighbours, float]:
     """Return the neighbours of generated and of reference shapes by CD, and the mean CD of random generated pairs.
 
-    generated, reference: float64 (n, k, 3) and (m, k, 3), at least two shapes each.
+    generated, reference: float64 (n, k, 3) and (m, k, 3), at least two shapes each. workers: threads.
     """
     clouds = np.concatenate([generated, reference])
     trees = [cKDTree(cloud) for cloud in clouds]
-    sets = np.arange(len(clouds)) >= len(generated)
-    with ThreadPoolExecutor(threads) as pool:
+    random_pairs = np.random.default_rng(0).integers(len(generated), size=(DIVERSITY_PAIRS, 2))
+    random_pairs = np.sort(random_pairs[random_pairs[:, 0] != random_pairs[:, 1]], axis=1)
+    with ThreadPoolExecutor(workers) as pool:
         estimates = _estimated_chamfer(clouds, trees, pool)
-        np.fill_diagonal(estimates, np.inf)
-        candidates = []
-        for columns in (np.flatnonzero(~sets), np.flatnonzero(sets)):
-            order = np.argsort(estimates[:, columns], axis=1, kind="stable")[:, :CANDIDATES_PER_SET]
-            candidates.append(columns[order])
-        rng = np.random.default_rng(0)
-        random_pairs = rng.integers(len(generated), size=(DIVERSITY_PAIRS, 2))
-        random_pairs = random_pairs[random_pairs[:, 0] != random_pairs[:, 1]]
-        rows = np.repeat(np.arange(len(clouds)), sum(found.shape[1] for found in candidates))
-        pairs = np.stack([rows, np.concatenate(candidates, axis=1).ravel()], axis=1)
-        pairs = np.unique(np.sort(np.concatenate([pairs, random_pairs]), axis=1), axis=0)
-        pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+        pairs = np.concatenate([_candidate_pairs(estimates, len(generated)), random_pairs])
+        pairs = np.unique(pairs, axis=0)
         distances = np.fromiter(pool.map(lambda pair: _chamfer(trees, *pair), pairs.tolist()), np.float64, len(pairs))
-    known = {(i, j): distance for (i, j), distance in zip(map(tuple, pairs.tolist()), distances.tolist(), strict=True)}
+    matrix = _matrix(pairs, distances, len(clouds))
+    return (*nearest_in_matrix(matrix, len(generated)), float(matrix[tuple(random_pairs.T)].mean()))
 
-    def distance(i: int, j: int) -> float:
-        return np.inf if i == j else known[min(i, j), max(i, j)]
 
-    exact = [np.array([[distance(i, j) for j in row] for i, row in enumerate(found.tolist())]) for found in candidates]
-    diversity = float(np.mean([distance(i, j) for i, j in random_pairs.tolist()]))
-    results = []
-    for own, other in ((0, 1), (1, 0)):
-        members = sets == bool(own)
-        best = exact[other][members].argmin(axis=1)
-        index = np.take_along_axis(candidates[other][members], best[:, None], axis=1)[:, 0]
-        start = 0 if other == 0 else len(generated)
-        results.append(Neighbours(exact[own][members].min(axis=1), exact[other][members].min(axis=1), index - start))
-    return results[0], results[1], diversity
+def nearest_by_earth_movers(
+    generated: FloatArray, reference: FloatArray, workers: int = 1
+) -> tuple[Neighbours, Neighbours]:
+    """Return the neighbours of generated and of reference shapes by EMD.
+
+    An assignment of 256 points takes 10 ms and one of 2,048 points 3 s, so clouds should be small.
+
+    generated, reference: float64 (n, k, 3) and (m, k, 3), at least two shapes each. workers: processes.
+    """
+    clouds = np.concatenate([generated, reference])
+    with ThreadPoolExecutor(workers) as pool:
+        chamfer = _estimated_chamfer(clouds, [cKDTree(cloud) for cloud in clouds], pool)
+    pairs = _candidate_pairs(_sliced_distances(clouds) + np.sqrt(chamfer.clip(0)) / 2, len(generated))
+
+    def distances_of(task: IntArray) -> list[float]:
+        return [earth_movers_distance(clouds[first], clouds[second]) for first, second in task]
+
+    tasks = np.array_split(pairs, -(-len(pairs) // EMD_PAIRS_PER_TASK))
+    distances = [distance for _, found in parallel_map(distances_of, tasks, workers, "EMD") for distance in found]
+    return nearest_in_matrix(_matrix(pairs, np.array(distances), len(clouds)), len(generated))
+
+
+def _candidate_pairs(estimates: FloatArray, generated: int) -> IntArray:
+    """Return each shape with the shapes of either set that are nearest by estimates (n, n), int (p, 2)."""
+    np.fill_diagonal(estimates, np.inf)
+    shapes = np.arange(len(estimates))[:, None]
+    pairs = []
+    for start, end in ((0, generated), (generated, len(estimates))):
+        nearest = start + np.argsort(estimates[:, start:end], axis=1, kind="stable")[:, :CANDIDATES_PER_SET]
+        pairs.append(np.stack(np.broadcast_arrays(shapes, nearest), axis=-1).reshape(-1, 2))
+    both = np.sort(np.concatenate(pairs), axis=1)
+    result: IntArray = np.unique(both[both[:, 0] != both[:, 1]], axis=0)
+    return result
+
+
+def _matrix(pairs: IntArray, distances: FloatArray, count: int) -> FloatArray:
+    """Return the distances of pairs as a symmetric matrix (count, count), infinite elsewhere."""
+    matrix = np.full((count, count), np.inf)
+    first, second = pairs.T
+    matrix[first, second] = matrix[second, first] = distances
+    return matrix
+
+
+def _sliced_distances(clouds: FloatArray) -> FloatArray:
+    """Return the sliced Wasserstein distances of all pairs, float32 (n, n).
+
+    Along a line the optimal assignment is that of the sorted points (Bonneel et al., 2015), so that each cloud becomes
+    a vector and all distances one product of matrices.
+    """
+    lines = np.random.default_rng(0).normal(size=(3, LINES_PER_DISTANCE))
+    lines /= np.linalg.norm(lines, axis=0)
+    vectors = np.sort(clouds @ lines, axis=1).reshape(len(clouds), -1)
+    vectors = (vectors - vectors.mean(axis=0)).astype(np.float32)
+    lengths = (vectors**2).sum(axis=1)
+    squared = lengths[:, None] + lengths - 2 * (vectors @ vectors.T)
+    distances: FloatArray = np.sqrt(squared.clip(0) / vectors.shape[1])
+    return distances
 
 
 def _chamfer(trees: Sequence[cKDTree], i: int, j: int) -> float:

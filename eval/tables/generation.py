@@ -12,6 +12,7 @@ from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import Evaluation, TableResult
 from eval.engine.requirements import FINISHED_DATASET
 from pipeline.config import StrictModel
+from pipeline.options import DEFAULT_WORKERS
 
 if TYPE_CHECKING:
     from stages.shape.arrays import FloatArray
@@ -25,10 +26,9 @@ class GenerationOptions(StrictModel):
     generated: str = Field("test", description="a split, exemplars, or a folder of models or a dataset, or an .npy")
     reference: str = Field("train", description="the set it is compared with, given in the same way")
     kit: str = Field("", description="only shapes of this kit of the dataset; empty for all")
-    max_shapes: int = Field(MAX_SHAPES, ge=2, le=20_000, description="shapes of a set; others are left out at random")
+    max_shapes: int = Field(MAX_SHAPES, ge=2, le=5000, description="shapes of a set; others are left out at random")
     points: int = Field(2048, ge=64, le=10_000, description="points of a cloud, uniform by area")
-    emd_shapes: int = Field(100, ge=2, description="shapes of a set that are compared by EMD, which takes longer")
-    emd_points: int = Field(256, ge=16, description="points of a cloud that are compared by EMD")
+    emd_points: int = Field(256, ge=16, le=2048, description="points of a cloud that are compared by EMD")
     normalize: Literal["shape", "none"] = Field(
         "shape", description="shape: each cloud is centred and scaled to a sphere of radius 1; none: sizes count"
     )
@@ -49,7 +49,7 @@ def _compute_from_files(paths: Sequence[Path], options: GenerationOptions) -> Ta
     if len(paths) != 2:
         raise ConfigError(f"generation compares two sets, such as generated/ and reference/; got {len(paths)}")
     sets = [clouds_of_path(path, options.max_shapes, options.points) for path in paths]
-    return _compared([path.name for path in paths], sets, options, workers=1)
+    return _compared([path.name for path in paths], sets, options, DEFAULT_WORKERS)
 
 
 def _compared(
@@ -61,7 +61,6 @@ def _compared(
         names,
         sets,
         normalize=options.normalize == "shape",
-        emd_shapes=options.emd_shapes,
         emd_points=options.emd_points,
         workers=workers,
     )
@@ -71,7 +70,7 @@ def _compared(
 TABLE = Evaluation(
     question="How near is one set of shapes to another: generated to real, val to train, a dataset to its exemplars?",
     requirements=(FINISHED_DATASET,),
-    estimate_seconds=lambda run: 100 + 0.3 * min(run.samples, 2 * MAX_SHAPES),
+    estimate_seconds=lambda run: 10 + 0.4 * min(run.samples, 2 * MAX_SHAPES),
     compute=_compute,
     compute_from_files=_compute_from_files,
     options=GenerationOptions,
