@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,8 +16,10 @@ from stages.exemplars.congruence import ComparableMesh, comparable_mesh, congrue
 from stages.exemplars.extremal_frame import extremal_frame
 from stages.exemplars.label_map import apply_label_map
 from stages.exemplars.model import Model, RawPart
+from stages.exemplars.moved_look import look_on
 from stages.exemplars.repair import repair_mesh
 from stages.exemplars.settings import KitConfig
+from stages.model_files.scene import Surface
 from stages.shape.appearance import NO_MATERIAL, Appearance
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, pose_vectors
@@ -34,7 +36,7 @@ class IdentifiedParts:
     left_out: model, name and reason of each part that is not used: it has no triangle with area, or it coincides with
         another of its type.
     aliases: for each type its other names in the models, in order of appearance.
-    other_looks: model and name of each part whose colours or materials are not those of its type's first part.
+    other_looks: model and name of each part whose colours or materials are lost: it has those of its type's first part.
     """
 
     types: tuple[PartType, ...]
@@ -55,13 +57,24 @@ class IdentifiedParts:
 
 @dataclass
 class _Type:
-    """A part type with its prepared mesh, its label, and the models' names for it, its own first."""
+    """A part type with its prepared mesh, its label, the models' names for it, its own first, and its looks by what
+    they show.
+    """
 
     mesh: ComparableMesh
     part: PartType
     label: str | None
     names: dict[str, None]
-    look: frozenset[Any]
+    looks: dict[frozenset[Any], int]
+
+
+class _Identified(NamedTuple):
+    """The type of a part, the transform (4, 4) from type to part coordinates, its look, and whether that is its own."""
+
+    part_type: int
+    into_part: FloatArray
+    look: int
+    is_own_look: bool
 
 
 def identify_parts(models: Sequence[Model], config: KitConfig) -> IdentifiedParts:
@@ -78,10 +91,11 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> IdentifiedPart
     left_out: list[tuple[Model, str, str]] = []
     other_looks: list[tuple[Model, str]] = []
     for model, parts in zip(models, apply_label_map(models, config), strict=True):
-        known: dict[tuple[str, str | None], tuple[int, FloatArray] | None] = {}
+        known: dict[tuple[str, str | None], _Identified | None] = {}
         names: list[str] = []
         indices: list[int] = []
         poses: list[FloatArray] = []
+        looks: list[int] = []
         for part in parts:
             label = None if config.types == "congruence" else part.label
             key = (part.mesh_name, label)
@@ -91,18 +105,20 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> IdentifiedPart
             if identified is None:
                 left_out.append((model, part.name, "it has no triangle with area"))
                 continue
-            index, into_part = identified
+            index = identified.part_type
             if model.segmentation != "components":  # whose names are only numbers
                 types[index].names[_type_name(part)] = None
-            if _look_of(part) != types[index].look:
+            if not identified.is_own_look:
                 other_looks.append((model, part.name))
             names.append(part.name)
             indices.append(index)
-            poses.append(part.pose @ into_part)
+            poses.append(part.pose @ identified.into_part)
+            looks.append(identified.look)
         if not names:
             raise ConfigError(f"{model.path}: no part has a triangle with area; export the model with its surfaces")
         no_edges = np.empty((0, 2), dtype=np.int32)
-        assemblies.append(Assembly(np.array(indices, dtype=np.int16), np.array(poses), no_edges))
+        look_of = np.array(looks, dtype=np.int16)
+        assemblies.append(Assembly(np.array(indices, dtype=np.int16), np.array(poses), no_edges, looks=look_of))
         part_names.append(tuple(names))
     part_types = tuple(known_type.part for known_type in types)
     aliases = tuple(tuple(known_type.names)[1:] for known_type in types)
@@ -142,9 +158,10 @@ def coincident_parts(types: Sequence[PartType], assembly: Assembly, tolerance: f
 
 def _identify(
     part: RawPart, label: str | None, config: KitConfig, types: list[_Type], repairs: Counter[str]
-) -> tuple[int, FloatArray] | None:
-    """Return the type of a part, added to `types` if new, and the transform (4, 4) from type to part coordinates; None
-    for a part without area."""
+) -> _Identified | None:
+    """Return the type of a part, added to `types` if new, and its look, added to its type if new and if the config
+    keeps it; None for a part without area.
+    """
     vertices, faces, sources, repair = repair_mesh(part.vertices, part.faces)
     repairs.update(repair.changes)
     if len(faces) == 0:
@@ -155,9 +172,21 @@ def _identify(
             transforms = congruences(known_type.mesh, shape, config.congruence_tolerance, config.mirror_images_match)
             if len(transforms):
                 # Both meshes are compared about their centroids; the type's coordinates start at its own.
-                into_part = transforms[0].copy()
-                into_part[:3, 3] = shape.centroid
-                return index, into_part
+                transforms[:, :3, 3] = shape.centroid
+                shown = _look_of(part)
+                if shown in known_type.looks:
+                    return _Identified(index, transforms[0].copy(), known_type.looks[shown], True)
+                if config.appearance.keep == "textures":
+                    own = Surface(part.name, vertices, faces, part.face_colors[sources])
+                    own = replace(own, appearance=_repaired_look(part, vertices[faces], sources))
+                    found = look_on(known_type.part, own, transforms, config.congruence_tolerance)
+                    if found is not None:
+                        into_part, look = found
+                        known_type.looks[shown] = len(known_type.looks)
+                        others = (*known_type.part.other_looks, look)
+                        known_type.part = replace(known_type.part, other_looks=others)
+                        return _Identified(index, into_part, known_type.looks[shown], True)
+                return _Identified(index, transforms[0].copy(), 0, False)
     centred = vertices - shape.centroid
     symmetries = congruences(shape, shape, config.congruence_tolerance, config.mirror_images_match)
     symmetries[:, :3, 3] = 0.0
@@ -171,10 +200,10 @@ def _identify(
         meaning=_type_name(part) if config.types == "meaning" else "",
         appearance=_repaired_look(part, vertices[faces], sources),
     )
-    types.append(_Type(shape, part_type, label, {_type_name(part): None}, _look_of(part)))
+    types.append(_Type(shape, part_type, label, {_type_name(part): None}, {_look_of(part): 0}))
     into_part = np.eye(4)
     into_part[:3, 3] = shape.centroid
-    return len(types) - 1, into_part
+    return _Identified(len(types) - 1, into_part, 0, True)
 
 
 def _look_of(part: RawPart) -> frozenset[Any]:

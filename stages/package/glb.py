@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import json
 import struct
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ import numpy as np
 from stages.package.glb_materials import MaterialTable
 from stages.shape.appearance import NO_MATERIAL, Appearance, Material
 from stages.shape.arrays import ByteArray, Float32Array, FloatArray
-from stages.shape.kit import PartMesh
+from stages.shape.kit import PartMesh, PartType
 from stages.shape.shape import Shape
 
 GL_FLOAT, GL_UNSIGNED_BYTE, GL_UNSIGNED_SHORT, GL_UNSIGNED_INT = 5126, 5121, 5123, 5125
@@ -54,6 +55,14 @@ class MeshChunk:
     accessors: tuple[dict[str, Any], ...]
     primitives: tuple[Primitive, ...]
 
+    @cached_property
+    def arrays(self) -> tuple[tuple[bytes, str], ...]:
+        """The bytes of each accessor, and what tells them apart from equal bytes with another meaning."""
+        return tuple(
+            (padded(self.content[offset : offset + length], b"\0"), json.dumps([target, accessor]))
+            for (offset, length, target), accessor in zip(self.views, self.accessors, strict=True)
+        )
+
 
 def glb_bytes(shape: Shape, hierarchy: Mapping[str, Any] | None = None) -> bytes:
     """Return the GLB of a shape: named nodes in the order of the parts, and the meshes in use.
@@ -72,21 +81,31 @@ def glb_bytes(shape: Shape, hierarchy: Mapping[str, Any] | None = None) -> bytes
     meshes: list[dict[str, Any]] = []
     table = MaterialTable()
     start = 0
+    # Looks of a type share their arrays of positions, normals and corners.
+    looks = Counter(id(mesh.vertices) for mesh in map(shape.meshes.__getitem__, used) if isinstance(mesh, PartType))
+    known: dict[tuple[int, bytes, str], int] = {}
     for index in used:
-        chunk = chunks[index]
-        first = len(accessors)
-        for (offset, length, target), accessor in zip(chunk.views, chunk.accessors, strict=True):
-            views.append({"buffer": 0, "byteOffset": start + offset, "byteLength": length, "target": target})
+        chunk, surface = chunks[index], id(shape.meshes[index].vertices)
+        places: list[int] = []
+        for (_, length, target), accessor, array in zip(chunk.views, chunk.accessors, chunk.arrays, strict=True):
+            key = surface, *array
+            if key in known:
+                places.append(known[key])
+                continue
+            if looks[surface] > 1:
+                known[key] = len(accessors)
+            places.append(len(accessors))
+            views.append({"buffer": 0, "byteOffset": start, "byteLength": length, "target": target})
             accessors.append({"bufferView": len(accessors), **accessor})
+            content.append(array[0])
+            start += len(array[0])
         primitives: list[dict[str, Any]] = []
         for primitive in chunk.primitives:
-            attributes = {name: first + accessor for name, accessor in primitive.attributes.items()}
-            primitives.append({"attributes": attributes, "indices": first + primitive.indices})
+            attributes = {name: places[accessor] for name, accessor in primitive.attributes.items()}
+            primitives.append({"attributes": attributes, "indices": places[primitive.indices]})
             if primitive.material is not None:
                 primitives[-1]["material"] = table.index(primitive.material)
         meshes.append({"name": chunk.name, "primitives": primitives})
-        content.append(chunk.content)
-        start += len(chunk.content)
     for image in table.image_files:
         views.append({"buffer": 0, "byteOffset": start, "byteLength": len(image)})
         content.append(padded(image, b"\0"))

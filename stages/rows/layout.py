@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray, TypeArray
+from stages.shape.exemplar_looks import with_looks
 from stages.shape.geometry.pose import transform_points
 from stages.shape.kit import Assembly, Exemplar, Kit, PartMesh
 from stages.shape.shape import Shape
@@ -201,8 +202,9 @@ def graph_layout(kit: Kit, exemplar: Exemplar) -> Layout:
 
 
 def _layout(kit: Kit, assembly: Assembly) -> Layout:
+    meshes, looked = with_looks(kit, assembly)
     return Layout(
-        tuple(kit.types[kind] for kind in assembly.types.tolist()),
+        tuple(meshes[kind] for kind in looked.types.tolist()),
         assembly.poses,
         assembly.types,
         _classes(kit, assembly),

@@ -159,6 +159,17 @@ class Appearance:
         return replace(self, normals=np.where(away[:, None, None], -self.normals, self.normals))
 
 
+@dataclass(frozen=True, eq=False)
+class Look:
+    """Colours and appearance of a surface.
+
+    face_colors: sRGB, uint8 (f, 3)
+    """
+
+    face_colors: ByteArray
+    appearance: Appearance | None
+
+
 def joined(appearances: Sequence[Appearance | None], face_counts: Sequence[int]) -> Appearance | None:
     """Return the look of meshes one after another, or None if none has one.
 

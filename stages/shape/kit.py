@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from stages.shape.appearance import Appearance
+from stages.shape.appearance import Appearance, Look
 from stages.shape.arrays import ByteArray, FloatArray, IntArray, TypeArray
 from stages.shape.geometry.triangles import triangle_areas
 
@@ -83,15 +83,26 @@ class PartType(PartMesh):
     frame: extremal-point coordinate frame (strings §6) in part coordinates, float64 (4, 4)
     symmetries: rigid transforms that map the part onto itself, the identity first, float64 (k, 4, 4)
     meaning: label that it shares with other surfaces; if empty, its name is its label
+    other_looks: looks that congruent parts have beside its own
     """
 
     frame: FloatArray
     symmetries: FloatArray
     meaning: str = ""
+    other_looks: tuple[Look, ...] = ()
 
     @property
     def label(self) -> str:
         return self.meaning or self.name
+
+    @cached_property
+    def looked(self) -> tuple[PartType, ...]:
+        """The type in each of its looks, its own first; all share their vertices."""
+        others = (
+            replace(self, face_colors=look.face_colors, appearance=look.appearance, other_looks=())
+            for look in self.other_looks
+        )
+        return (self, *others)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,12 +135,14 @@ class Assembly:
     edges: contacts as pairs i < j in lexicographic order, int32 (m, 2)
     stretches: symmetric maps applied to each part's mesh in its own coordinates before its pose (substructures §5.2,
         §5.3), float64 (n, 3, 3), or None if no part is stretched
+    looks: index of each part's look in `PartType.looked`, int16 (n,), or None if that follows from the exemplars
     """
 
     types: TypeArray
     poses: FloatArray
     edges: IntArray
     stretches: FloatArray | None = None
+    looks: TypeArray | None = None
 
     def __len__(self) -> int:
         return len(self.types)
@@ -148,7 +161,8 @@ class Assembly:
         index_of[parts] = np.arange(len(parts))
         edges = index_of[self.edges]
         stretches = None if self.stretches is None else self.stretches[parts]
-        return Assembly(self.types[parts], self.poses[parts], edges[(edges >= 0).all(axis=1)], stretches)
+        looks = None if self.looks is None else self.looks[parts]
+        return Assembly(self.types[parts], self.poses[parts], edges[(edges >= 0).all(axis=1)], stretches, looks)
 
     @property
     def placements(self) -> FloatArray:
@@ -236,7 +250,10 @@ class Exemplar:
         """The assembly and its removed hubs, without the contacts of the latter, for pictures."""
         parts, hubs = self.assembly, self.removed_hubs
         types, poses = np.concatenate([parts.types, hubs.types]), np.concatenate([parts.poses, hubs.poses])
-        return Assembly(types, poses, parts.edges)
+        looks = parts.looks
+        if len(hubs) and looks is not None and hubs.looks is not None:
+            looks = np.concatenate([looks, hubs.looks])
+        return Assembly(types, poses, parts.edges, looks=looks)
 
 
 @dataclass(frozen=True)

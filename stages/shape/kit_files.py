@@ -12,6 +12,7 @@ import numpy as np
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes, read_shard
 from stages.shape.appearance import (
     Appearance,
+    Look,
     Material,
     TextureImage,
     describe_materials,
@@ -27,7 +28,7 @@ def kit_json(kit: Kit) -> dict[str, Any]:
     """Return the kit as readable JSON: types, exemplars, neighbourhoods by label, dockings by type name."""
     names, labels = kit.type_names(), kit.labels
     table = DockingTable.of(kit)
-    materials, _ = describe_materials(_looks(kit)[0])
+    materials, _ = describe_materials(_materials(kit)[0])
     return {
         "kit": kit.name,
         "up": kit.up,
@@ -44,6 +45,7 @@ def kit_json(kit: Kit) -> dict[str, Any]:
                 "triangles": len(kind.faces),
                 "diagonal": round(kind.diagonal, 6),
                 "symmetries": len(kind.symmetries),
+                **({"looks": len(kind.looked)} if kind.other_looks else {}),
             }
             for kind in kit.types
         ],
@@ -88,12 +90,14 @@ def _group_json(group: PartGroup) -> dict[str, Any]:
     return {"name": group.name, "parts": [part.name for part in group.parts], "poses": group.poses.tolist()}
 
 
-def _looks(kit: Kit) -> tuple[tuple[Material, ...], list[IntArray | None]]:
-    """Return the materials of all types, and for each type those of its faces, int32 (f,), or None."""
-    looks = [kind.appearance for kind in kit.types]
-    materials, places = shared_materials([look for look in looks if look is not None])
+def _materials(kit: Kit) -> tuple[tuple[Material, ...], list[list[IntArray | None]]]:
+    """Return the materials of all types, and for each look of each type those of its faces, int32 (f,), or None."""
+    looks = [[looked.appearance for looked in kind.looked] for kind in kit.types]
+    materials, places = shared_materials([look for of_type in looks for look in of_type if look is not None])
     place_of = iter(places)
-    return materials, [None if look is None else next(place_of)[look.face_material] for look in looks]
+    return materials, [
+        [None if look is None else next(place_of)[look.face_material] for look in of_type] for of_type in looks
+    ]
 
 
 def _contacts(kit: Kit, table: DockingTable, assembly: Assembly) -> list[list[int | str]]:
@@ -106,11 +110,11 @@ def _contacts(kit: Kit, table: DockingTable, assembly: Assembly) -> list[list[in
 def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
     """Write `kit` to two binary streams: the JSON of `kit_json` to `text`, the tar to `arrays`."""
     text.write(json.dumps(kit_json(kit), indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n")
-    materials, face_materials = _looks(kit)
+    materials, face_materials = _materials(kit)
     with ShardWriter(arrays) as writer:
         for index, image in enumerate(describe_materials(materials)[1]):
             writer.write(f"image-{index:04d}", {"pixels.npy": array_bytes(image.pixels)})
-        for index, (kind, face_material) in enumerate(zip(kit.types, face_materials, strict=True)):
+        for index, (kind, of_looks) in enumerate(zip(kit.types, face_materials, strict=True)):
             members = {
                 "vertices.npy": array_bytes(kind.vertices),
                 "faces.npy": array_bytes(kind.faces),
@@ -118,12 +122,16 @@ def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
                 "frame.npy": array_bytes(kind.frame),
                 "symmetries.npy": array_bytes(kind.symmetries),
             }
-            if kind.appearance is not None and face_material is not None:
-                members["materials.npy"] = array_bytes(face_material)
-                if kind.appearance.uv is not None:
-                    members["uv.npy"] = array_bytes(kind.appearance.uv)
-                if kind.appearance.normals is not None:
-                    members["normals.npy"] = array_bytes(kind.appearance.normals)
+            for number, (looked, face_material) in enumerate(zip(kind.looked, of_looks, strict=True)):
+                prefix = _look_prefix(number)
+                if number:
+                    members[f"{prefix}colors.npy"] = array_bytes(looked.face_colors)
+                if looked.appearance is not None and face_material is not None:
+                    members[f"{prefix}materials.npy"] = array_bytes(face_material)
+                    if looked.appearance.uv is not None:
+                        members[f"{prefix}uv.npy"] = array_bytes(looked.appearance.uv)
+                    if looked.appearance.normals is not None:
+                        members[f"{prefix}normals.npy"] = array_bytes(looked.appearance.normals)
             writer.write(f"type-{index:04d}", members)
         for index, exemplar in enumerate(kit.exemplars):
             members = {
@@ -134,6 +142,11 @@ def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
                 "hub-types.npy": array_bytes(exemplar.removed_hubs.types),
                 "hub-poses.npy": array_bytes(exemplar.removed_hubs.poses),
             }
+            looks, hub_looks = exemplar.assembly.looks, exemplar.removed_hubs.looks
+            if looks is not None and any(kind.other_looks for kind in kit.types):
+                members["looks.npy"] = array_bytes(looks)
+                if hub_looks is not None:
+                    members["hub-looks.npy"] = array_bytes(hub_looks)
             writer.write(f"exemplar-{index:04d}", members)
 
 
@@ -174,23 +187,36 @@ def _group(described: Mapping[str, Any], types: Mapping[str, PartType]) -> PartG
     return PartGroup(described["name"], parts, np.array(described["poses"]))
 
 
+def _look_prefix(number: int) -> str:
+    """Return what stands before the names of the members of a look, by its index in `PartType.looked`."""
+    return f"look{number}-" if number else ""
+
+
 def _part_type(name: str, meaning: str, members: Mapping[str, bytes], materials: tuple[Material, ...]) -> PartType:
-    look = None
-    if "materials.npy" in members:
-        uv, normals = (
-            bytes_array(members[member]) if member in members else None for member in ("uv.npy", "normals.npy")
-        )
-        look = Appearance(materials, bytes_array(members["materials.npy"]), uv, normals)
+    looks: list[Look] = []
+    while f"{_look_prefix(len(looks))}colors.npy" in members:
+        looks.append(_look(_look_prefix(len(looks)), members, materials))
     return PartType(
         name=name,
         vertices=bytes_array(members["vertices.npy"]),
         faces=bytes_array(members["faces.npy"]),
-        face_colors=bytes_array(members["colors.npy"]),
+        face_colors=looks[0].face_colors,
         frame=bytes_array(members["frame.npy"]),
         symmetries=bytes_array(members["symmetries.npy"]),
         meaning=meaning,
-        appearance=look,
+        appearance=looks[0].appearance,
+        other_looks=tuple(looks[1:]),
     )
+
+
+def _look(prefix: str, members: Mapping[str, bytes], materials: tuple[Material, ...]) -> Look:
+    colors = bytes_array(members[f"{prefix}colors.npy"])
+    if f"{prefix}materials.npy" not in members:
+        return Look(colors, None)
+    uv, normals = (
+        bytes_array(members[prefix + name]) if prefix + name in members else None for name in ("uv.npy", "normals.npy")
+    )
+    return Look(colors, Appearance(materials, bytes_array(members[f"{prefix}materials.npy"]), uv, normals))
 
 
 def _exemplar(members: Mapping[str, bytes]) -> Exemplar:
@@ -202,11 +228,13 @@ def _exemplar(members: Mapping[str, bytes]) -> Exemplar:
             types=bytes_array(members["types.npy"]),
             poses=bytes_array(members["poses.npy"]),
             edges=bytes_array(members["edges.npy"]),
+            looks=bytes_array(members["looks.npy"]) if "looks.npy" in members else None,
         ),
         removed_hubs=Assembly(
             types=bytes_array(members["hub-types.npy"]),
             poses=bytes_array(members["hub-poses.npy"]),
             edges=np.empty((0, 2), dtype=np.int32),
+            looks=bytes_array(members["hub-looks.npy"]) if "hub-looks.npy" in members else None,
         ),
     )
 

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from stages.shape.arrays import FloatArray, TypeArray
+from stages.shape.exemplar_looks import with_looks
 from stages.shape.kit import Assembly, Kit, LengthUnit, PartGroup, PartMesh
 from stages.shape.part_joint import PartJoint
 from stages.shape.stretch import StretchedMesh, bake, placements
@@ -97,8 +98,11 @@ class Shape:
 
 
 def kit_shape(kit: Kit, assembly: Assembly) -> Shape:
-    """Return the shape of an assembly of the kit's types; stretched parts have meshes of their own."""
-    meshes, baked = bake(kit.types, assembly)
+    """Return the shape of an assembly of the kit's types.
+
+    Stretched parts, and parts in another look than the first one of their type, have meshes of their own.
+    """
+    meshes, baked = bake(*with_looks(kit, assembly))
     return Shape(meshes, baked, kit.up, kit.labels, one_surface=kit.one_surface, unit=kit.unit, groups=kit.groups)
 
 

@@ -77,10 +77,10 @@ class _Places:
 
     def of_group(self, group: PartGroup) -> Iterator[frozenset[int]]:
         """Yield the sets of parts at the relative poses of a group."""
-        number = {id(mesh): index for index, mesh in enumerate(self.shape.meshes)}
-        kinds = [number.get(id(part), -1) for part in group.parts]
-        same = [np.flatnonzero(self.shape.assembly.types == kind) for kind in kinds]
-        if min(map(len, same)) == 0 or min(kinds) < 0:
+        # A type in another look is another mesh of the same vertices.
+        surfaces = np.array([id(mesh.vertices) for mesh in self.shape.meshes])[self.shape.assembly.types]
+        same = [np.flatnonzero(surfaces == id(part.vertices)) for part in group.parts]
+        if min(map(len, same)) == 0:
             return
         anchor = min(range(len(same)), key=lambda part: len(same[part]) * len(group.parts[part].symmetries))
         from_anchor = invert(group.poses[anchor])
