@@ -2,9 +2,9 @@
 
 python -m tests.stages.variations.substructures.oracle [--pairs 500] [--most 9]
 
-Pairs of random graphs, of such whose types follow a pattern, and of crops of the shipped kits and, where they lie
-next to the project, of real models. Pairs that fail are printed as they stand in tests/data/replacements.json, a corpus
-that is tried in every run.
+Pairs of random graphs, of such whose types follow a pattern, and of crops of shipped kits and of real models, whose
+graphs are in tests/data/shape_graphs.json. Pairs that fail are printed as they stand in tests/data/replacements.json,
+a corpus that is tried in every run. `--build-graphs` builds the graphs of the models again, for half a minute.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import argparse
 import json
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -31,6 +31,7 @@ from tests.stages.variations.substructures import brute_force
 from tests.stages.variations.substructures.graphs import code, crop, is_connected, patterned_graph, random_graph
 
 CORPUS = Path("tests/data/replacements.json")
+GRAPHS = Path("tests/data/shape_graphs.json")
 SHIPPED = Path("datasets/exemplars")
 SHIPPED_KITS = ("castle", "facade", "playground", "space-base", "temple")
 """Crops of their graphs need three operations in a row at most; one of a hub with eight leaves may need four."""
@@ -167,38 +168,43 @@ def _replacements(
 def pair_of(seed: int, most: int) -> tuple[str, OrderedGraph, OrderedGraph]:
     """What a pair is of, and two graphs of at most `most` nodes, which in half of the cases are one."""
     rng = np.random.default_rng(seed)
-    wholes = (shipped_graphs(), real_graphs())
     kind = seed % 4
-    if kind < 2 or not wholes[kind - 2]:
-        name, draw = (("random", random_graph), ("patterned", patterned_graph))[kind % 2]
+    if kind < 2:
+        name, draw = (("random", random_graph), ("patterned", patterned_graph))[kind]
         base = draw(rng, most)
         return name, base, base if rng.random() < 0.5 else draw(rng, most)
-    whole = wholes[kind - 2][int(rng.integers(len(wholes[kind - 2])))]
+    origin = ("shipped", "real")[kind - 2]
+    wholes = shape_graphs(origin)
+    whole = wholes[int(rng.integers(len(wholes)))]
     base = crop(rng, whole, most)
-    return ("shipped", "real")[kind - 2], base, base if rng.random() < 0.5 else crop(rng, whole, most)
+    return origin, base, base if rng.random() < 0.5 else crop(rng, whole, most)
 
 
 @cache
-def shipped_graphs() -> list[OrderedGraph]:
-    """The shape graphs of some shipped kits."""
-    return _shape_graphs([path for kit in SHIPPED_KITS for path in sorted((SHIPPED / kit).glob("*.glb"))])
+def shape_graphs(origin: str) -> list[OrderedGraph]:
+    """Return the shape graphs of models from an origin, `shipped` or `real`."""
+    graphs = json.loads(GRAPHS.read_text(encoding="utf-8"))[origin]
+    return [ordered_graph(types, orders) for types, orders in graphs.values()]
 
 
-@cache
-def real_graphs() -> list[OrderedGraph]:
-    """Return those of real models, none where they are not next to the project."""
-    return _shape_graphs([REAL / name / "model.glb" for name in REAL_MODELS] if REAL.is_dir() else [])
+def build_graphs() -> None:
+    """Write the shape graphs of the models, which must be next to the project."""
+    shipped = [path for kit in SHIPPED_KITS for path in sorted((SHIPPED / kit).glob("*.glb"))]
+    origins = {"shipped": shipped, "real": [REAL / name / "model.glb" for name in REAL_MODELS]}
+    built = {
+        origin: {f"{path.parent.name}/{path.stem}": _rows(_shape_graph(path)) for path in paths}
+        for origin, paths in origins.items()
+    }
+    text = json.dumps(built, separators=(",", ":")).replace(']]],"', ']]],\n"')  # a line for each graph
+    GRAPHS.write_text(text + "\n", encoding="utf-8")
 
 
-def _shape_graphs(paths: Sequence[Path]) -> list[OrderedGraph]:
-    graphs = []
-    for path in paths:
-        contact = ContactConfig(kinds=("point", "line", "face"))
-        config = KitConfig(name="oracle", shapes=(ShapeFile(path=path),), contact=contact)
-        kit, _ = build_kit(config.resolve(STRICTEST), [read_parts(path)])
-        whole = kit.exemplars[0].assembly
-        graphs.append(docking_graph(kit, whole, np.zeros_like(whole.edges)))
-    return graphs
+def _shape_graph(path: Path) -> OrderedGraph:
+    contact = ContactConfig(kinds=("point", "line", "face"))
+    config = KitConfig(name="oracle", shapes=(ShapeFile(path=path),), contact=contact)
+    kit, _ = build_kit(config.resolve(STRICTEST), [read_parts(path)])
+    whole = kit.exemplars[0].assembly
+    return docking_graph(kit, whole, np.zeros_like(whole.edges))
 
 
 def corpus() -> list[tuple[str, OrderedGraph, OrderedGraph]]:
@@ -212,10 +218,12 @@ def corpus() -> list[tuple[str, OrderedGraph, OrderedGraph]]:
 
 def described(base: OrderedGraph, giver: OrderedGraph) -> str:
     """A pair as it stands in the corpus."""
-    graphs = [base] if base is giver else [base, giver]
-    return json.dumps(
-        [[graph.types.tolist(), [graph.neighbours(node) for node in range(len(graph.types))]] for graph in graphs]
-    )
+    return json.dumps([_rows(graph) for graph in ([base] if base is giver else [base, giver])])
+
+
+def _rows(graph: OrderedGraph) -> list[list[object]]:
+    """The types of a graph's nodes and the neighbours of each in order, as they stand in files."""
+    return [graph.types.tolist(), [graph.neighbours(node) for node in range(len(graph.types))]]
 
 
 def main() -> None:
@@ -224,7 +232,10 @@ def main() -> None:
     parser.add_argument("--pairs", type=int, default=500)
     parser.add_argument("--most", type=int, default=9, help="most nodes of a graph")
     parser.add_argument("--seed", type=int, default=0, help="that of the first pair")
+    parser.add_argument("--build-graphs", action="store_true", help="write the graphs of the models")
     asked = parser.parse_args()
+    if asked.build_graphs:
+        build_graphs()
     totals: dict[str, Counter[str]] = {}
     greatest, failed, start = 0.0, 0, time.process_time()
     for seed in range(asked.seed, asked.seed + asked.pairs):
