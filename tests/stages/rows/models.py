@@ -1,8 +1,9 @@
-"""Shapes with rows of known lengths, built part by part."""
+"""Shapes with rows of known lengths, built part by part, each once."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 import trimesh
@@ -28,7 +29,8 @@ def layout(meshes: dict[str, trimesh.Trimesh], parts: Sequence[Placed]) -> tuple
     return kit, layout_of(kit, kit.exemplars[0])
 
 
-def shelf(boards: int = SHELF_BOARDS, crates: Sequence[int] = (), cans: Sequence[int] = ()) -> tuple[Kit, Layout]:
+@cache
+def shelf(boards: int = SHELF_BOARDS, crates: tuple[int, ...] = (), cans: tuple[int, ...] = ()) -> tuple[Kit, Layout]:
     """Two sides that hold boards; a crate or a can stands on the boards in `crates` and `cans`."""
     sides = [("side", pose(x, 1.0, 0.0)) for x in (-0.475, 0.475)]
     held = [("board", pose(0.0, 0.2 + BOARD_STEP * number, 0.0)) for number in range(boards)]
@@ -37,6 +39,7 @@ def shelf(boards: int = SHELF_BOARDS, crates: Sequence[int] = (), cans: Sequence
     return layout(MESHES, [*sides, *held, *lying])
 
 
+@cache
 def cabinet(stands_out: float = 0.0) -> tuple[Kit, Layout]:
     """Two sides under a top, with a shelf and a framed door between them.
 
@@ -53,6 +56,7 @@ def cabinet(stands_out: float = 0.0) -> tuple[Kit, Layout]:
     return layout(meshes, [*sides, ("top", pose(0.0, 1.025, 0.0)), *inside])
 
 
+@cache
 def table_of_boxes() -> tuple[Kit, Layout]:
     """A table with two boxes on it, each as long as half of it."""
     meshes = {"leg": box(0.1, 1.0, 0.1), "top": box(2.0, 0.05, 0.8), "box": box(0.9, 0.2, 0.6)}
@@ -61,6 +65,7 @@ def table_of_boxes() -> tuple[Kit, Layout]:
     return layout(meshes, [*legs, ("top", pose(0.0, 1.025, 0.0)), *boxes])
 
 
+@cache
 def rail(posts: int = 8) -> tuple[Kit, Layout]:
     """A bar on posts and pins that alternate."""
     meshes = MESHES | {"bar": box(posts * 0.5, 0.1, 0.1)}
@@ -68,6 +73,7 @@ def rail(posts: int = 8) -> tuple[Kit, Layout]:
     return layout(meshes, [("bar", pose(posts * 0.25, 1.05, 0.0)), *feet])
 
 
+@cache
 def leaning_frame(bars: int = 6) -> tuple[Kit, Layout]:
     """Two slanted posts with bars between them; everything is turned about x."""
     turn = trimesh.transformations.rotation_matrix(0.6, [1, 0, 0])
@@ -76,7 +82,8 @@ def leaning_frame(bars: int = 6) -> tuple[Kit, Layout]:
     return layout({"post": box(0.1, 3.0, 0.1), "bar": box(0.5, 0.06, 0.06)}, [*posts, *held])
 
 
-def frame_with_knobs(knobs: Sequence[float]) -> tuple[Kit, Layout]:
+@cache
+def frame_with_knobs(knobs: tuple[float, ...]) -> tuple[Kit, Layout]:
     """Two posts filled with bars half a unit apart, and knobs at other heights outside of one post."""
     posts = [("post", pose(x, 1.5, 0.0)) for x in (-0.3, 0.3)]
     bars = [("bar", pose(0.0, 0.25 + 0.5 * number, 0.0)) for number in range(6)]
@@ -110,6 +117,7 @@ def plate(xs: Sequence[float], ys: Sequence[float], depth: float, solid: np.ndar
     return trimesh.Trimesh(**trimesh.triangles.to_kwargs(np.array(triangles)))
 
 
+@cache
 def wall(columns: int = 3, storeys: int = 3) -> tuple[Kit, Layout]:
     """A wall in one piece with a hole for each window of a grid."""
     xs = [0.0, *(edge + 1.5 * number for number in range(columns) for edge in (0.7, 1.3)), 1.5 * columns + 0.5]
@@ -123,6 +131,7 @@ def wall(columns: int = 3, storeys: int = 3) -> tuple[Kit, Layout]:
     return layout({"wall": pierced, "window": box(0.6, 0.8, 0.1)}, [("wall", wall_pose), *windows])
 
 
+@cache
 def truss(bays: int = 5) -> tuple[Kit, Layout]:
     """Two chords, each with a knot at every joint and in one piece, with a bar at each joint."""
     xs = [edge + number for number in range(bays + 1) for edge in (-0.05, 0.05)]
@@ -134,6 +143,7 @@ def truss(bays: int = 5) -> tuple[Kit, Layout]:
     return layout({"chord": chord, "bar": box(0.05, 0.9, 0.05)}, [*chords, *bars])
 
 
+@cache
 def stair(steps: int = 6) -> tuple[Kit, Layout]:
     """Two slanted beams, prisms along the slope, that carry steps."""
     rise, run, length = 0.2, 0.3, 0.3 * (steps + 1)
@@ -147,6 +157,7 @@ def stair(steps: int = 6) -> tuple[Kit, Layout]:
     return layout({"beam": beam, "tread": box(0.2, 0.04, 0.95)}, [*beams, *treads])
 
 
+@cache
 def mirrored_row(pairs: int = 3) -> tuple[Kit, Layout]:
     """A bar with left and right brackets in turn, which are mirror images."""
     bracket = trimesh.Trimesh(
@@ -161,6 +172,7 @@ def mirrored_row(pairs: int = 3) -> tuple[Kit, Layout]:
     return layout(meshes, [("bar", pose(pairs * 1.0, -0.05, 0.0)), *brackets])
 
 
+@cache
 def round_temple(columns: int = 8) -> tuple[Kit, Layout]:
     """Columns, each with a base, between two round plates."""
     turns = [trimesh.transformations.rotation_matrix(2 * np.pi * number / columns, [0, 1, 0]) for number in
@@ -173,6 +185,7 @@ def round_temple(columns: int = 8) -> tuple[Kit, Layout]:
     return layout(meshes, [("plate", pose(0.0, 0.0, 0.0)), ("plate", pose(0.0, 1.2, 0.0)), *standing])
 
 
+@cache
 def framed_windows(count: int = 3) -> tuple[Kit, Layout]:
     """A wall with windows, each of two sides and a pane between them."""
     sides = [("side", pose(1.8 * number + x, 1.0, 0.0)) for number in range(count) for x in (0.0, 1.0)]
@@ -182,6 +195,7 @@ def framed_windows(count: int = 3) -> tuple[Kit, Layout]:
     return layout(meshes, [wall, *sides, *panes])
 
 
+@cache
 def two_pitches(ratio: float, pegs: int) -> tuple[Kit, Layout]:
     """Two sides that hold boards, and one of them pegs at another step, `ratio` times as far apart."""
     sides = [("side", pose(x, 1.0, 0.0)) for x in (-0.475, 0.475)]
@@ -190,6 +204,7 @@ def two_pitches(ratio: float, pegs: int) -> tuple[Kit, Layout]:
     return layout(MESHES | {"peg": box(0.1, 0.04, 0.04)}, [*sides, *held, *hung])
 
 
+@cache
 def fronts(tall: float = 0.7) -> tuple[Kit, Layout]:
     """A back with a tall front and two lower ones above it; each has a handle, and the handles are at equal steps."""
     heights = [tall, 0.38, 0.38]

@@ -100,7 +100,7 @@ def test_a_row_can_be_shortened_to_one() -> None:
 
 
 def test_what_occurs_once_stays_once() -> None:
-    kit, layout = models.shelf(crates=[2])
+    kit, layout = models.shelf(crates=(2,))
     tried = [*changes(find_rows(layout), 1), *changes(find_rows(layout), -1)]
     assert tried
     for change in tried:
@@ -111,7 +111,7 @@ def test_what_occurs_once_stays_once() -> None:
 
 def test_copies_do_not_lack_what_all_parts_of_a_row_have() -> None:
     """Each board carries something, and only two of the things are alike."""
-    kit, layout = models.shelf(4, crates=[0, 1], cans=[2, 3])
+    kit, layout = models.shelf(4, crates=(0, 1), cans=(2, 3))
     for change in changes(find_rows(layout), 1):
         changed = repeat(layout, change)
         held = counts(kit, changed)
@@ -161,7 +161,7 @@ def test_a_periodic_chord_keeps_its_knots() -> None:
 
 
 def test_a_slab_that_does_not_fit_says_why() -> None:
-    _, layout = models.shelf(crates=[2])
+    _, layout = models.shelf(crates=(2,))
     up = np.array([0.0, 1.0, 0.0])
     with pytest.raises(SlabError, match="occurs once is in the slab"):
         repeat(layout, RowChange(up, up * models.BOARD_STEP, 1.3, -1))
@@ -321,7 +321,7 @@ def test_draws_have_bays_where_they_are_asked_for_and_json_keeps_them() -> None:
 
 
 def test_a_part_gets_no_longer_where_its_other_row_would_leave_a_gap() -> None:
-    _, layout = models.frame_with_knobs([0.1, 1.0, 1.9, 2.85])
+    _, layout = models.frame_with_knobs((0.1, 1.0, 1.9, 2.85))
     heights = [float(row.shift[1]) for row in find_rows(layout) if len(row.insertions)]
     assert heights == pytest.approx([0.5] * len(heights)), "more knobs alone would need longer posts without bars"
 
