@@ -108,10 +108,12 @@ def view_light(renderer: ViewRenderer, supersample: int, lamp: Lamp | None) -> F
     base = sample_colors(scene, solid.triangles, solid.screen, solid.view.projection)
     light = shade(solid, renderer.moves, 1, lamp, base)
     for seen, colors in reversed(layers):
-        own = shade(seen, renderer.moves, 1, lamp, colors)
-        alpha = colors[:, :, 3:]
-        light[:, :, :3] = own[:, :, :3] * alpha + light[:, :, :3] * (1 - alpha)
-        light[:, :, 3:] = alpha + light[:, :, 3:] * (1 - alpha)
+        at = np.flatnonzero(seen.triangles >= 0)
+        own = shade(seen, renderer.moves, 1, lamp, colors).reshape(-1, 4)[at]
+        alpha, behind = colors.reshape(-1, 4)[at, 3:], light.reshape(-1, 4)[at]
+        own[:, :3] = own[:, :3] * alpha + behind[:, :3] * (1 - alpha)
+        own[:, 3:] = alpha + behind[:, 3:] * (1 - alpha)
+        light.reshape(-1, 4)[at] = own
     height, width = light.shape[0] // supersample, light.shape[1] // supersample
     mean: Float32Array = light.reshape(height, supersample, width, supersample, 4).mean(axis=(1, 3))
     return mean
@@ -130,7 +132,13 @@ def shade(
     scene, view = seen.scene, seen.view
     parts, faces = scene.triangle_part, scene.triangle_face
     by_sample = colors is not None
-    base = base_colors(scene) if colors is None else colors[:, :, :3].astype(np.float64).reshape(-1, 3)
+    if colors is None:
+        base = base_colors(scene)
+    else:
+        # Most layers are empty nearly everywhere, and memory that nobody writes to costs nothing.
+        at = np.flatnonzero(seen.triangles >= 0)
+        base = np.zeros((seen.triangles.size, 3))
+        base[at] = colors.reshape(-1, 4)[at, :3]
     if lamp is None:
         unlit: Float32Array = _unlit(seen.triangles, supersample, faces, base, by_sample)
         return unlit

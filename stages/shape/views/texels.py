@@ -50,8 +50,14 @@ def sample_look(
     face_colors: FloatArray,
 ) -> Float32Array:
     """Return the colours of a look as `sample_colors` does. face_colors: of faces without a material, float64 (f, 3)"""
-    colors: Float32Array = _sample(triangles, screen, projection, scene.triangle_face, face_colors, look)
-    return colors
+    owners = triangles.reshape(-1)
+    pixels = np.flatnonzero(owners >= 0)
+    colors = np.zeros((len(owners), 4), dtype=np.float32)
+    size = triangles.shape[1]
+    colors[pixels] = _sample_list(
+        pixels, owners[pixels], size, screen, projection, scene.triangle_face, face_colors, look
+    )
+    return colors.reshape(*triangles.shape, 4)
 
 
 def has_holes(scene: Scene) -> bool:
@@ -155,57 +161,41 @@ def _fragments(screen, chosen, width, height, bits, solid):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _sample(triangles, screen, projection, face_of, colors, look):
-    height, width = triangles.shape
-    out = np.zeros((height, width, 4), dtype=np.float32)
-    flat = out.reshape(-1, 4)
-    for row in range(height):
-        for column in range(width):
-            t = triangles[row, column]
-            if t >= 0:
-                n = row * width + column
-                _color(flat, n, t, column + 0.5, row + 0.5, screen, projection, face_of[t], colors, look)
-    return out
-
-
-@numba.njit(cache=True, error_model="numpy")
 def _sample_list(pixels, owners, width, screen, projection, face_of, colors, look):
+    """Return linear colour and alpha of samples, float32 (n, 4), each with the triangle that it shows."""
+    # Taking an array out of a tuple counts a reference, which for each sample costs more than all else. So does passing
+    # rows: what is called here is inlined and reads numbers.
+    face_material, uv, base, texture, mode, cutoff, texels, levels, level_first, wraps, nearest = look
     out = np.zeros((len(pixels), 4), dtype=np.float32)
     for n in range(len(pixels)):
         t, x, y = owners[n], pixels[n] % width + 0.5, pixels[n] // width + 0.5
-        _color(out, n, t, x, y, screen, projection, face_of[t], colors, look)
+        face = face_of[t]
+        material = face_material[face]
+        if material < 0:
+            red, green, blue, alpha = colors[face, 0] * 1.0, colors[face, 1] * 1.0, colors[face, 2] * 1.0, 1.0
+        else:
+            red, green, blue, alpha = base[material, 0], base[material, 1], base[material, 2], base[material, 3]
+            number = texture[material]
+            if number >= 0:
+                r, g, b, a = _texture_color(
+                    number, t, x, y, screen, projection, face, uv, texels, levels, level_first, wraps, nearest
+                )
+                if a > 0.0:
+                    red, green, blue = red * r / a, green * g / a, blue * b / a
+                alpha *= a
+            if mode[material] == MASK_MODE:
+                alpha = 1.0 if alpha >= cutoff[material] else 0.0
+            elif mode[material] != BLEND_MODE:
+                alpha = 1.0
+        out[n, 0], out[n, 1], out[n, 2], out[n, 3] = red, green, blue, alpha
     return out
 
 
-# What takes a sample's color is inlined and reads numbers, not rows: passing arrays and taking views of them cost more
-# than the arithmetic.
 @numba.njit(cache=True, error_model="numpy", inline="always")
-def _color(out, n, t, x, y, screen, projection, face, colors, look):
-    """Write linear colour and alpha of triangle t at a point of the screen as row n."""
-    material = look.face_material[face]
-    if material < 0:
-        red, green, blue, alpha = colors[face, 0] * 1.0, colors[face, 1] * 1.0, colors[face, 2] * 1.0, 1.0
-    else:
-        red, green, blue = look.base[material, 0], look.base[material, 1], look.base[material, 2]
-        alpha = look.base[material, 3]
-        number = look.texture[material]
-        if number >= 0:
-            r, g, b, a = _texture_color(number, t, x, y, screen, projection, face, look)
-            if a > 0.0:
-                red, green, blue = red * r / a, green * g / a, blue * b / a
-            alpha *= a
-        if look.mode[material] == MASK_MODE:
-            alpha = 1.0 if alpha >= look.cutoff[material] else 0.0
-        elif look.mode[material] != BLEND_MODE:
-            alpha = 1.0
-    out[n, 0], out[n, 1], out[n, 2], out[n, 3] = red, green, blue, alpha
-
-
-@numba.njit(cache=True, error_model="numpy", inline="always")
-def _texture_color(number, t, x, y, screen, projection, face, look):
+def _texture_color(number, t, x, y, screen, projection, face, corners, texels, levels, level_first, wraps, nearest):
     """Return linear colour times alpha, and alpha, of a texture where a point of the screen shows it."""
-    first, last = look.level_first[number], look.level_first[number + 1] - 1
-    wide, high = look.levels[first, 1], look.levels[first, 2]
+    first, last = level_first[number], level_first[number + 1] - 1
+    wide, high = levels[first, 1], levels[first, 2]
     ax, ay = screen[t, 1, 0] - screen[t, 0, 0], screen[t, 1, 1] - screen[t, 0, 1]
     bx, by = screen[t, 2, 0] - screen[t, 0, 0], screen[t, 2, 1] - screen[t, 0, 1]
     px, py = x - screen[t, 0, 0], y - screen[t, 0, 1]
@@ -214,7 +204,6 @@ def _texture_color(number, t, x, y, screen, projection, face, look):
     if projection[3, 3] == 0.0:
         d1, d2 = eye_depth(screen[t, 0, 2], projection), eye_depth(screen[t, 1, 2], projection)
         d3 = eye_depth(screen[t, 2, 2], projection)
-    corners = look.uv
     uv = (
         corners[face, 0, 0] * 1.0,
         corners[face, 0, 1] * 1.0,
@@ -238,10 +227,10 @@ def _texture_color(number, t, x, y, screen, projection, face, look):
             size *= 2.0
             level += 1
         share = min(step / size - 1.0, 1.0)
-    square = look.nearest[number] and step <= 1.0
-    r, g, b, a = _texel(look, level, number, u, v, square)
+    square = nearest[number] and step <= 1.0
+    r, g, b, a = _texel(texels, levels, level, wraps, number, u, v, square)
     if share > 0.0 and level < last:
-        r2, g2, b2, a2 = _texel(look, level + 1, number, u, v, False)
+        r2, g2, b2, a2 = _texel(texels, levels, level + 1, wraps, number, u, v, False)
         r, g, b, a = r + share * (r2 - r), g + share * (g2 - g), b + share * (b2 - b), a + share * (a2 - a)
     return r, g, b, a
 
@@ -278,17 +267,17 @@ def _wrapped(index, size, wrap):
     if wrap == 2:
         return min(max(index, 0), size - 1)
     if wrap == 0:
-        return index % size
+        # Most sizes are powers of two, whose remainders take no division.
+        return index & (size - 1) if size & (size - 1) == 0 else index % size
     at = index % (2 * size)
     return at if at < size else 2 * size - 1 - at
 
 
 @numba.njit(cache=True, error_model="numpy", inline="always")
-def _texel(look, level, number, u, v, square):
+def _texel(texels, levels, level, wraps, number, u, v, square):
     """Return the texel of a level at texture coordinates, or the mean of four by distance."""
-    first, wide, high = look.levels[level, 0], look.levels[level, 1], look.levels[level, 2]
-    wrap_u, wrap_v = look.wraps[number, 0], look.wraps[number, 1]
-    texels = look.texels
+    first, wide, high = levels[level, 0], levels[level, 1], levels[level, 2]
+    wrap_u, wrap_v = wraps[number, 0], wraps[number, 1]
     across, down = min(max(u, -1e6), 1e6) * wide, min(max(v, -1e6), 1e6) * high
     if square:
         column = _wrapped(np.int64(np.floor(across)), wide, wrap_u)
@@ -297,11 +286,12 @@ def _texel(look, level, number, u, v, square):
     across, down = across - 0.5, down - 0.5
     left, top = np.int64(np.floor(across)), np.int64(np.floor(down))
     share_x, share_y = across - left, down - top
+    near_column, far_column = _wrapped(left, wide, wrap_u), _wrapped(left + 1, wide, wrap_u)
     r, g, b, a = 0.0, 0.0, 0.0, 0.0
     for dy in range(2):
         row = _wrapped(top + dy, high, wrap_v)
         for dx in range(2):
-            n = first + row * wide + _wrapped(left + dx, wide, wrap_u)
+            n = first + row * wide + (far_column if dx else near_column)
             weight = (share_x if dx else 1.0 - share_x) * (share_y if dy else 1.0 - share_y)
             r, g, b, a = (
                 r + weight * texels[n, 0],
