@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,14 +12,16 @@ from pipeline.randomness import decision_rng
 from stages.autoconfig.lost_support import lost_support
 from stages.autoconfig.setting_search import MIN_USEFUL_GRAPHS
 from stages.autoconfig.settings import RANDOM_STREAM
-from stages.autoconfig.trial_search import TrialResult, TrialSearch, has_low_diversity
+from stages.autoconfig.trial_search import TrialResult, TrialSearch, has_low_diversity, type_counts
 from stages.rows.settings import RowsConfig
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.patterns import observed_patterns, unique_pattern_share
 from stages.shape.kit import Kit
 from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
 from stages.variations.report.advice import another_model, what_keeps
+from stages.variations.requirements.identity import lost_label_counts
 from stages.variations.search.variant import DUPLICATE, Variant
+from stages.variations.settings import SelectionConfig
 
 MAX_ESTIMATE_GRAPHS = 300
 """Distinct graphs at which the trial search of an estimate ends."""
@@ -63,10 +66,18 @@ class YieldEstimate:
         few = not self.trial.graphs or (self.layouts is not None and self.layouts < MIN_USEFUL_GRAPHS)
         return few or has_low_diversity(self.trial) or bool(self.lost_support)
 
-    @property
-    def all_variants(self) -> list[Variant]:
-        """The hits and the exemplars with other rows."""
-        return [*self.variants, *self.row_variants]
+    def likely_variants(self, kit: Kit) -> list[Variant]:
+        """The hits and the exemplars with other rows that a run would select: those that lack fewest part types, as
+        large a share of them as a run selects of its pool."""
+        found = [*self.variants, *self.row_variants]
+        counts = type_counts(kit, [variant.assembly.types for variant in found]).astype(np.int64)
+        lost = lost_label_counts(kit, counts)
+        if not lost.any():
+            return found
+        share = 0.0 if self.layouts is None else MAX_SAMPLES_REQUESTED / max(self.layouts, MAX_SAMPLES_REQUESTED)
+        share = max(share, 1 / SelectionConfig().oversample)
+        selected = np.argsort(lost, kind="stable")[: math.ceil(share * len(found))]
+        return [found[index] for index in selected.tolist()]
 
     @property
     def most_different(self) -> list[Variant]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -66,11 +66,12 @@ def forecast(kit: Kit, layouts: YieldEstimate | None, resizing: ResizeEstimate |
         return _of_resizing(resizing)
     if layouts is None or not layouts.variants:
         return Forecast({}, {}, {}, "")
-    kinds = [kind_of(variant) for variant in layouts.all_variants]
+    likely = layouts.likely_variants(kit)
+    kinds = [kind_of(variant) for variant in likely]
     total = (MAX_ESTIMATE_GRAPHS if layouts.layouts is None else layouts.layouts) + len(layouts.row_variants)
     shares = {kind: kinds.count(kind) / len(kinds) for kind in TITLES if kind in kinds}
     numbers = {kind: max(1, round(share * total)) for kind, share in shares.items()}
-    return Forecast(shares, numbers, dict.fromkeys(shares, True), _typical(kit, layouts))
+    return Forecast(shares, numbers, dict.fromkeys(shares, True), _typical(kit, likely))
 
 
 def _of_resizing(resizing: ResizeEstimate) -> Forecast:
@@ -88,13 +89,13 @@ def _of_resizing(resizing: ResizeEstimate) -> Forecast:
     return Forecast(shares, numbers, is_bound, "")
 
 
-def _typical(kit: Kit, layouts: YieldEstimate) -> str:
-    """Return the usual size of the hits, how much of an exemplar is whole in them, and which labels they lack."""
-    counts = type_counts(kit, [variant.assembly.types for variant in layouts.all_variants]).astype(np.int64)
+def _typical(kit: Kit, variants: Sequence[Variant]) -> str:
+    """Return the usual size of variants, how much of an exemplar is whole in them, and which labels they lack."""
+    counts = type_counts(kit, [variant.assembly.types for variant in variants]).astype(np.int64)
     sizes = " and ".join(str(len(exemplar.assembly)) for exemplar in kit.exemplars)
     median = float(np.median(counts.sum(axis=1)))
     sentences = [f"half have {median:.0f} parts or more, the exemplar{'s' * (len(kit.exemplars) > 1)} {sizes}"]
-    whole = [variant.lineage["copied"]["exemplar_share"] > NEAR_COPY_SHARE for variant in layouts.all_variants]
+    whole = [variant.lineage["copied"]["exemplar_share"] > NEAR_COPY_SHARE for variant in variants]
     if any(whole):
         sentences.append(f"{np.mean(whole):.0%} hold nearly a whole exemplar in one piece")
     present: FloatArray = np.mean(label_counts(kit, counts) > 0, axis=0)

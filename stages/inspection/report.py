@@ -165,9 +165,10 @@ def inspect_models(
         layouts = resolved.estimate(config, oracle, tries)
         rate = layouts.trial.graphs / max(time.process_time() - begun, 1e-6)
         stable = resolution.values[STABLE_KEY]
-        at_random = decision_rng(0, RANDOM_STREAM, "typical").permutation(len(layouts.all_variants)).tolist()
+        likely = layouts.likely_variants(built.kit)
+        at_random = decision_rng(0, RANDOM_STREAM, "typical").permutation(len(likely)).tolist()
         shapes = _example_shapes(built.kit, oracle, layouts.most_different, stable)
-        typical = _example_shapes(built.kit, oracle, [layouts.all_variants[index] for index in at_random], stable)
+        typical = _example_shapes(built.kit, oracle, [likely[index] for index in at_random], stable)
         fallback = resize_fallback(resolved, layouts, MAX_SHAPES_SHOWN)
         if fallback is not None:
             resizing, resolution, built = fallback.estimate, fallback.resolution, fallback.built

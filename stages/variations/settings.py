@@ -224,7 +224,8 @@ class VariantRequirements(StrictModel):
         "auto",
         description="Labels that every variant must have, in about their share in the exemplars: a race "
         "track keeps its track. true: all that occur in each exemplar, hubs aside; false: none. `auto`: true, without "
-        "those that a short search cannot keep; false if `search.sub_assemblies` are variants.",
+        "those that a short search cannot keep; false if `search.sub_assemblies` are variants. Unless false, variants "
+        "with all types that occur in each exemplar are selected first.",
     )
     share_factor: float = Field(
         DEFAULT_SHARE_FACTOR,
@@ -298,3 +299,8 @@ class VariationsConfig(StrictModel):
     splits: VariantSplitConfig = Field(
         default_factory=VariantSplitConfig, description="How samples are divided into splits and shards."
     )
+
+    @property
+    def keeps_identity(self) -> bool:
+        """Whether variants without a part type of every exemplar are worth less than others."""
+        return self.require.keep_types is not False and not self.search.sub_assemblies

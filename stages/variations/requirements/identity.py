@@ -65,6 +65,13 @@ def label_counts(kit: Kit, counts: np.ndarray) -> np.ndarray:
     return by_label
 
 
+def lost_label_counts(kit: Kit, counts: np.ndarray) -> np.ndarray:
+    """Return how many of the `common_labels` each of k shapes lacks, int64 (k,). counts: by type, int (k, types)"""
+    common = set(common_labels(kit))
+    missing: np.ndarray = (label_counts(kit, counts) == 0)[:, [label in common for label in kit.labels]].sum(axis=1)
+    return missing
+
+
 def _counts(kit: Kit, assemblies: Sequence[Assembly]) -> np.ndarray:
     """Return the parts of assemblies by label, int64 (k, labels)."""
     return np.array([np.bincount(kit.label_of[assembly.types], minlength=len(kit.labels)) for assembly in assemblies])

@@ -103,7 +103,7 @@ def run_assignment(task: Task) -> Outcome:
 def _by_graph(task: Task, kit: Kit, pool: PoolIndex, rng: np.random.Generator) -> SelectedSamples:
     """Choose the most diverse variants; those with equal canonical graphs go to one split."""
     config = task.config.section(VariationsConfig)
-    chosen = select_diverse(kit, pool.counts, pool.features, config.samples_per_kit, config.selection, rng)
+    chosen = select_diverse(kit, pool.counts, pool.features, config.samples_per_kit, config, rng)
     groups: dict[bytes, list[int]] = {}
     for row, variant in enumerate(chosen.tolist()):
         groups.setdefault(bytes(pool.digests[variant, 0]), []).append(row)

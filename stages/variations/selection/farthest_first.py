@@ -8,19 +8,21 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import Kit
 from stages.variations.novelty.features import AXES, FeatureExtractor
-from stages.variations.settings import SelectionConfig
+from stages.variations.requirements.identity import lost_label_counts
+from stages.variations.settings import VariationsConfig
 
 _SIZES = ("parts", "footprint", "height", "aspect")
 _SKIPPED = "dominant"
 
 
 def select_diverse(
-    kit: Kit, counts: np.ndarray, features: np.ndarray, wanted: int, config: SelectionConfig, rng: np.random.Generator
+    kit: Kit, counts: np.ndarray, features: np.ndarray, wanted: int, config: VariationsConfig, rng: np.random.Generator
 ) -> np.ndarray:
     """Return which of k variants are taken, int64 (min(wanted, k),), the most different first.
 
-    Each is the farthest from the kit's exemplars and from all taken before. Beyond `config.max_farthest_first` the rest
-    are drawn at random.
+    Each is the farthest from the kit's exemplars and from all taken before. Beyond `selection.max_farthest_first` the
+    rest are drawn at random. Variants without a part type of every exemplar come after all others, unless the config
+    lets variants lose types.
     counts: int32 (k, types), parts by type
     features: float32 (k, 10)
     """
@@ -31,10 +33,18 @@ def select_diverse(
     all_features = np.concatenate([features, known])
     all_counts = np.concatenate([counts, [np.bincount(shape.types, minlength=len(kit.types)) for shape in exemplars]])
     space = selection_space(all_counts, all_features)
-    near = min(wanted, config.max_farthest_first, len(counts))
-    taken = farthest_first(space[: len(counts)], space[len(counts) :], near)
-    left = np.setdiff1d(np.arange(len(counts)), taken)
-    return np.concatenate([taken, rng.permutation(left)[: max(wanted - near, 0)]])
+    lost = np.zeros(len(counts), dtype=np.int64)
+    if config.keeps_identity:
+        lost = lost_label_counts(kit, counts)
+    near = min(wanted, config.selection.max_farthest_first, len(counts))
+    taken = np.empty(0, dtype=np.int64)
+    for number in np.unique(lost):
+        rows = np.flatnonzero(lost == number)
+        starts = np.concatenate([space[len(counts) :], space[taken]])
+        taken = np.concatenate([taken, rows[farthest_first(space[rows], starts, min(near - len(taken), len(rows)))]])
+    left = rng.permutation(np.setdiff1d(np.arange(len(counts)), taken))
+    left = left[np.argsort(lost[left], kind="stable")]
+    return np.concatenate([taken, left[: max(wanted - near, 0)]])
 
 
 def selection_space(counts: np.ndarray, features: np.ndarray) -> FloatArray:

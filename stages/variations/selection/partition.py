@@ -50,7 +50,7 @@ def split_candidates(kit: Kit, pool: PoolIndex, config: VariationsConfig, rng: n
     count = min(math.ceil(config.selection.oversample * config.samples_per_kit), len(pool))
     if count == len(pool):
         return np.arange(count)
-    chosen: Indices = np.sort(select_diverse(kit, pool.counts, pool.features, count, config.selection, rng))
+    chosen: Indices = np.sort(select_diverse(kit, pool.counts, pool.features, count, config, rng))
     return chosen
 
 
@@ -71,10 +71,10 @@ def choose_by_family(
     )
     taken = [considered[cut.split_of == SPLITS.index(split)] for split in SPLITS]
     free = taken[0]
-    taken[0] = free[select_diverse(kit, pool.counts[free], pool.features[free], wanted["train"], config.selection, rng)]
+    taken[0] = free[select_diverse(kit, pool.counts[free], pool.features[free], wanted["train"], config, rng)]
     variants = np.concatenate(taken)
     split_of = np.repeat(np.arange(len(SPLITS)), [len(members) for members in taken])
-    order = select_diverse(kit, pool.counts[variants], pool.features[variants], len(variants), config.selection, rng)
+    order = select_diverse(kit, pool.counts[variants], pool.features[variants], len(variants), config, rng)
     variants, split_of = variants[order], split_of[order]
     nearness = nearness_of(shapes, np.searchsorted(considered, variants), split_of)
     return SelectedSamples(variants, split_of, int((cut.split_of == DISCARDED_SPLIT).sum()), nearness)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from stages.autoconfig.contact_analysis import ContactAnalysis, Setting, resolve
 from stages.autoconfig.resolve import REQUIREMENT_KEYS, Resolution, resolve_max_copied, resolve_settings, resolve_stable
 from stages.autoconfig.trial_search import TrialResult, TrialSearch
 from stages.autoconfig.up_axis import resolve_up_axis
-from stages.autoconfig.yield_estimate import estimate_yield
+from stages.autoconfig.yield_estimate import YieldEstimate, estimate_yield
 from stages.exemplars.build import build_kit
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
@@ -297,6 +298,14 @@ class TestYieldEstimate:
         assert estimate.sentence.endswith(
             f"; {whole:.0%} hold nearly a whole exemplar in one piece and look like it with more parts"
         )
+
+    def test_a_third_with_all_part_types_is_likely(self) -> None:
+        kit = self.kit([chain(3), chain(5)], CHAIN)
+        types = ([0, 0], [0, 1], [1, 1], [0, 0, 1])
+        hits: list[Any] = [SimpleNamespace(assembly=SimpleNamespace(types=np.array(listed))) for listed in types]
+        estimate = YieldEstimate(TrialResult(9, 4, 4, 0.0, 0.0), None, (2, 3), 0.0, "", hits)
+        assert estimate.likely_variants(kit) == [hits[1], hits[3]]
+        assert replace(estimate, variants=[hits[1]] * 3).likely_variants(kit) == [hits[1]] * 3
 
     def test_kit_without_repeats_gets_the_mend(self) -> None:
         meshes = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}

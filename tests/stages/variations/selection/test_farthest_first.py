@@ -7,7 +7,7 @@ import numpy as np
 from stages.variations.novelty.features import AXES, FeatureExtractor, material_shares
 from stages.variations.report.measures import growth, pool_measures
 from stages.variations.selection.farthest_first import farthest_first, select_diverse, selection_space
-from stages.variations.settings import NoveltyConfig, SelectionConfig
+from stages.variations.settings import NoveltyConfig, SelectionConfig, VariantRequirements, VariationsConfig
 from tests.stages.variations.search.test_search import search
 from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
@@ -28,8 +28,8 @@ def test_selection_is_deterministic_and_more_diverse_than_first_come() -> None:
     _, found = search(kit, tries=3000, max_size=3.0)
     counts = np.array([np.bincount(variant.assembly.types, minlength=len(kit.types)) for variant in found])
     features = np.array([variant.features for variant in found])
-    taken = select_diverse(kit, counts, features, 12, SelectionConfig(), np.random.default_rng(0))
-    again = select_diverse(kit, counts, features, 12, SelectionConfig(), np.random.default_rng(0))
+    taken = select_diverse(kit, counts, features, 12, VariationsConfig(), np.random.default_rng(0))
+    again = select_diverse(kit, counts, features, 12, VariationsConfig(), np.random.default_rng(0))
     assert taken.tolist() == again.tolist()
     space = selection_space(counts, features)
 
@@ -53,11 +53,24 @@ def test_samples_beyond_max_farthest_first_are_drawn_without_repetition() -> Non
     features = np.tile(pure, (20, 1))
     features[:, AXES.index("parts")] += np.arange(20)
     counts = np.tile(np.bincount(shape.types, minlength=2), (20, 1))
-    chosen = select_diverse(kit, counts, features, 15, SelectionConfig(max_farthest_first=4), np.random.default_rng(1))
+    config = VariationsConfig(selection=SelectionConfig(max_farthest_first=4))
+    chosen = select_diverse(kit, counts, features, 15, config, np.random.default_rng(1))
     assert len(set(chosen.tolist())) == 15
     assert chosen[0] == 19
-    everything = select_diverse(kit, counts, features, 50, SelectionConfig(), np.random.default_rng(1))
+    everything = select_diverse(kit, counts, features, 50, VariationsConfig(), np.random.default_rng(1))
     assert sorted(everything.tolist()) == list(range(20))
+
+
+def test_variants_with_all_types_of_the_exemplars_are_selected_first() -> None:
+    kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
+    counts = np.tile(np.array([5, 0]), (12, 1))
+    counts[[4, 9]] = [3, 2]
+    features = np.ones((12, len(AXES)), dtype=np.float32)
+    features[:, AXES.index("parts")] += np.arange(12)
+    chosen = select_diverse(kit, counts, features, 3, VariationsConfig(), np.random.default_rng(0))
+    assert sorted(chosen[:2].tolist()) == [4, 9]
+    indifferent = VariationsConfig(require=VariantRequirements(keep_types=False))
+    assert chosen.tolist() != select_diverse(kit, counts, features, 3, indifferent, np.random.default_rng(0)).tolist()
 
 
 def test_measures_of_a_set_counted_by_hand() -> None:
