@@ -4,7 +4,8 @@ python -m tests.bench.exemplars [--out FOLDER] [--minutes 10] [--template] MODEL
 
 A MODEL is a file, some files of one kit with spaces between them, as in MESH="a.glb b.glb", or a folder of models.
 Each goes through inspect, then through autoconfig, exemplars, variations and proportions, with one worker, as users do.
-Prints a row of a Markdown table for each as soon as it has ended. A folder in FOLDER holds its config, its pictures and
+Prints a row of a Markdown table for each as soon as it has ended, and then the mean error of the forecast: of the share
+of new plans, foretold against made. A folder in FOLDER holds its config, its pictures and
 a sheet of the most different variants, to be judged by eye.
 """
 
@@ -29,9 +30,9 @@ from pipeline.records import read_record
 from stages.inspection.config_text import dataset_name
 
 HEADER = (
-    "| model | parts / types | up, tolerance, kinds, grammar, hubs | yield estimate | chosen of pool | histograms | E "
-    "| copied | mixed | inspect, CPU s | making, CPU s | MB |\n"
-    "|---|---:|---|---|---|---:|---:|---:|---:|---:|---:|---:|"
+    "| model | parts / types | up, tolerance, kinds, grammar, hubs | yield estimate | new plans, foretold | made "
+    "| chosen of pool | histograms | E | copied | mixed | inspect, CPU s | making, CPU s | MB |\n"
+    "|---|---:|---|---|---:|---:|---|---:|---:|---:|---:|---:|---:|---:|"
 )
 STAGES = ("autoconfig", "exemplars", "variations", "proportions")
 TEMPLATE = """\
@@ -83,14 +84,14 @@ def run(arguments: Sequence[str], minutes: float) -> Ended:
     return Ended(seconds, after.ru_maxrss / 1024, stdout, stderr, late)
 
 
-def measured(models: Sequence[Path], folder: Path, minutes: float, template: bool) -> str:
-    """Return the row of one kit of models."""
+def measured(models: Sequence[Path], folder: Path, minutes: float, template: bool) -> tuple[str, float | None]:
+    """Return the row of one kit of models, and the error of the foretold share of new plans; None if none is made."""
     name = "-".join(dict.fromkeys(dataset_name([path]) for path in models))[:60]
     folder /= name  # the name of a kit must differ from that of its first model
     inspected = run(["pipeline", "inspect", "--json", "--out", str(folder / "inspect"), *map(str, models)], minutes)
     if not inspected.stdout:
         why = "took too long" if inspected.late else inspected.stderr.strip().splitlines()[-1]
-        return f"| {name} | | | {why} | | | | | | {inspected.seconds:.0f} | | {inspected.megabytes:.0f} |"
+        return f"| {name} | | | {why} | | | | | | | | {inspected.seconds:.0f} | | {inspected.megabytes:.0f} |", None
     inspection = json.loads(inspected.stdout)
     config = Path(inspection["files"]["config"])
     if template:
@@ -99,31 +100,35 @@ def measured(models: Sequence[Path], folder: Path, minutes: float, template: boo
         config.write_text(
             TEMPLATE.format(name=config.stem, shapes=json.dumps(list(map(str, models)))), encoding="utf-8"
         )
-    made, ends = _make(config, folder, minutes)
+    made, new_plans, ends = _make(config, folder, minutes)
     resolved, estimate = inspection["autoconfig"]["resolved"], inspection["yield_estimate"]
     settings = {
         key: value for key, value in resolved.items() if key != "disconnected" and not key.startswith("require.")
     }
+    foretold = float(estimate["kinds"]["shares"].get("new plan", 0.0))
     parts = sum(len(model["parts"]) for model in inspection.get("models", [inspection]))
     row = [
         name,
         f"{parts} / {len(inspection['types'])}",
         ", ".join(map(_setting, settings.values())),
         estimate["sentence"],
+        f"{foretold:.0%}",
+        "" if new_plans is None else f"{new_plans:.0%}",
         *ends,
         f"{inspected.seconds:.0f}",
         f"{made.seconds:.0f}",
         f"{max(inspected.megabytes, made.megabytes):.0f}",
     ]
-    return f"| {' | '.join(row)} |"
+    return f"| {' | '.join(row)} |", None if new_plans is None else abs(new_plans - foretold)
 
 
 def _setting(value: Any) -> str:
     return "+".join(value) if isinstance(value, list) else str(value)
 
 
-def _make(config: Path, folder: Path, minutes: float) -> tuple[Ended, list[str]]:
-    """Make the variants of a config; return how all its stages ended together, and the cells of a row."""
+def _make(config: Path, folder: Path, minutes: float) -> tuple[Ended, float | None, list[str]]:
+    """Make the variants of a config; return how all its stages ended together, the share of new plans, and the cells of
+    a row."""
     spent, peak, left = 0.0, 0.0, minutes
     for stage in STAGES:
         ended = run(["pipeline", "run", stage, "--config", str(config), "--out", str(folder), "--workers", "1"], left)
@@ -133,15 +138,15 @@ def _make(config: Path, folder: Path, minutes: float) -> tuple[Ended, list[str]]
     whole = Ended(spent, peak, ended.stdout, ended.stderr, ended.late)
     resized = read_record(DatasetPaths(folder, config.stem).stage("proportions").records / f"{config.stem}-choice.json")
     if resized is not None:
-        return whole, [f"{sum(resized.summary['shapes'].values()):,} in other proportions", *[""] * 4]
+        return whole, 0.0, [f"{sum(resized.summary['shapes'].values()):,} in other proportions", *[""] * 4]
     record = read_record(
         DatasetPaths(folder, config.stem).stage("variations").records / f"{config.stem}-assignment.json"
     )
     if record is None:
-        return whole, ["stopped at the limit" if ended.late else _why(ended), *[""] * 4]
+        return whole, None, ["stopped at the limit" if ended.late else _why(ended), *[""] * 4]
     (summary,) = record.summary["kits"].values()
     run(["pipeline", "sheets", "--config", str(config), "--out", str(folder)], minutes)
-    return whole, list(_cells(summary))
+    return whole, summary["new_plans"], list(_cells(summary))
 
 
 def _why(ended: Ended) -> str:
@@ -177,11 +182,16 @@ def main() -> None:
     parser.add_argument("--template", action="store_true", help="the README's config instead of the one of inspect")
     options = parser.parse_args()
     print(HEADER, flush=True)
+    errors: list[float] = []
     # one process for each, since the peak of memory is that of all children of a process
     with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as one_by_one:
         for models in [kit for text in options.models for kit in kits(text)]:
-            row = one_by_one.submit(measured, models, options.out, options.minutes, options.template)
-            print(row.result(), flush=True)
+            job = one_by_one.submit(measured, models, options.out, options.minutes, options.template)
+            row, error = job.result()
+            print(row, flush=True)
+            errors += [] if error is None else [error]
+    if errors:
+        print(f"\nmean error of the foretold share of new plans: {sum(errors) / len(errors):.0%} of {len(errors)} kits")
 
 
 if __name__ == "__main__":
