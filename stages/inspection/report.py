@@ -113,11 +113,13 @@ class InspectionReport:
         lines += self.forecast.lines()
         if self.layouts is not None:
             trial = self.layouts.trial
-            lines += [
-                ("search", f"{trial_text(trial)}, {self.variants_per_second:.3g} variants a CPU second"),
-                ("copied", f"half of the hits have {trial.copied_share:.0%} or more in one piece of an exemplar"),
-                ("patterns", f"{self.layouts.unique_pattern_share:.0%} of the parts have a pattern that occurs once"),
-            ]
+            rate = f", {self.variants_per_second:.3g} variants a CPU second" if trial.graphs else ""
+            lines.append(("search", f"{trial_text(trial)}{rate}"))
+            if trial.graphs:
+                share = f"{trial.copied_share:.0%}"
+                lines.append(("copied", f"half of the hits have {share} or more in one piece of an exemplar"))
+            once = f"{self.layouts.unique_pattern_share:.0%} of the parts have a pattern that occurs once"
+            lines.append(("patterns", once))
         return lines
 
     def table_cells(self) -> dict[str, str]:

@@ -320,8 +320,10 @@ class TestYieldEstimate:
     def test_other_cuts_are_named_if_pieces_of_a_mesh_yield_nothing(self, parts: str, segmentation: str) -> None:
         shape = [("link", pose(0, 0, 0)), ("cap", pose(0.75, 0, 0))]
         models = [replace(model, segmentation=segmentation) for model in models_of(CHAIN, [shape])]
-        sentence = inspect_models(auto_config([shape], parts=parts), models, 50).sentence
+        report = inspect_models(auto_config([shape], parts=parts), models, 50)
+        sentence = report.sentence
         assert "nothing: every part is its own type" in sentence
+        assert "copied" not in dict(report.lines()), "of no hits"
         assert ("`parts: sections`" in sentence) == (parts == "auto" and segmentation == "components")
 
 
