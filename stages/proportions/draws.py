@@ -66,7 +66,7 @@ def drawn_layouts(
     own = DrawnLayout((), shapes.unwarped(exemplar, ()), _distinct(shapes.unwarped(exemplar, ()), config))
     if rows is None:
         return [own]
-    draws = LayoutDraws(shapes.layout(exemplar), rows, bays=True)
+    draws = LayoutDraws(shapes.layout(exemplar), rows, is_alone=True)
     found: list[DrawnLayout] = []
     known = {draws.exemplar.key}
     has_rows = bool(draws.rows or draws.circles)

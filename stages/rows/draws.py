@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.rows.changes import Change
 from stages.rows.layout import Layout
-from stages.rows.rows import Row, find_rows
+from stages.rows.rows import TOO_SMALL, Row, find_rows, is_visible
 from stages.rows.settings import RowsConfig
 from stages.rows.slabs import RowChange, SlabError, repeat
 from stages.rows.steps import bays_of, longest_row, steps_of
@@ -26,10 +26,14 @@ TRIES_PER_CHANGE = 6
 class LayoutDraws:
     """Draws layouts of one exemplar. What it remembers saves time and never changes a result."""
 
-    def __init__(self, layout: Layout, config: RowsConfig, bays: bool = False) -> None:
-        """Find the rows of a layout. bays: whether its bays are inserted and removed too."""
-        self.exemplar, self.config = layout, config
-        self.steps = [*steps_of(layout), *(bays_of(layout) if bays else ())]
+    def __init__(self, layout: Layout, config: RowsConfig, is_alone: bool = False) -> None:
+        """Find the rows of a layout.
+
+        is_alone: whether nothing but rows makes layouts: then bays are inserted and removed too, and rows that are too
+            small to be seen stay as they are
+        """
+        self.exemplar, self.config, self._is_alone = layout, config, is_alone
+        self.steps = [*steps_of(layout), *(bays_of(layout) if is_alone else ())]
         self.refused = Counter[str]()  # places of the exemplar's rows that were left out, by reason
         self._rows: dict[bytes, list[Row]] = {}
         self._limits = [self._limits_of(step.count) for step in self.steps]
@@ -122,7 +126,11 @@ class LayoutDraws:
             if len(self._rows) >= MAX_LAYOUTS_REMEMBERED:
                 self._rows.clear()
             counted = self.refused if layout is self.exemplar else Counter[str]()
-            self._rows[key] = find_rows(layout, self.steps, lambda reason: counted.update([reason]))
+            rows = find_rows(layout, self.steps, lambda reason: counted.update([reason]))
+            if self._is_alone:
+                counted.update([TOO_SMALL] * sum(not is_visible(self.exemplar, row) for row in rows))
+                rows = [row for row in rows if is_visible(self.exemplar, row)]
+            self._rows[key] = rows
         return self._rows[key]
 
 

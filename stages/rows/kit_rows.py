@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.rows.layout import Layout, layout_of
-from stages.rows.rows import Row, find_rows
+from stages.rows.rows import Row, find_rows, is_visible
 from stages.rows.steps import bay_ends, bays_of
 from stages.rows.turns import Circle, find_circles
 from stages.shape.kit import Kit
@@ -46,13 +46,15 @@ class KitRow:
 
 
 def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
-    """Return the rows of all exemplars of a kit: circles, then the longest rows along each direction, then bays."""
+    """Return the rows of all exemplars of a kit that can be seen: circles, then the longest along each direction, then
+    bays."""
     found: list[KitRow] = []
     for exemplar in kit.exemplars:
         layout = layout_of(kit, exemplar)
         circles = [_turning(kit, exemplar.name, layout, circle) for circle in find_circles(layout)]
-        rows = [_described(kit, exemplar.name, row) for row in _main_rows(layout)]
-        bays = [_described_bay(kit, exemplar.name, layout, row) for row in find_rows(layout, bays_of(layout))]
+        rows = [_described(kit, exemplar.name, row) for row in _main_rows(layout) if is_visible(layout, row)]
+        along_bays = [row for row in find_rows(layout, bays_of(layout)) if is_visible(layout, row)]
+        bays = [_described_bay(kit, exemplar.name, layout, row) for row in along_bays]
         found += dict.fromkeys([*circles, *rows, *bays])
     return tuple(found)
 

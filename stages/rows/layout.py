@@ -77,6 +77,11 @@ class Layout:
         return np.stack([np.stack([points.min(axis=0), points.max(axis=0)]) for points in self.points])
 
     @cached_property
+    def areas(self) -> FloatArray:
+        """Area of each part's surface, float64 (n,)."""
+        return np.array([mesh.area for mesh in self.meshes])
+
+    @cached_property
     def anchors(self) -> FloatArray:
         """Centroid of each part's surface, float64 (n, 3); translates of each other have translated anchors."""
         return np.stack(

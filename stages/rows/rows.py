@@ -18,6 +18,9 @@ MIN_TORN_ROW = 3
 TORN_ROW = "a row with another step would be torn apart"
 MIN_BAYS_SHORTENED = 3
 """Parts of a row from which a bay between two of them can be removed."""
+MIN_AREA_SHARE = 0.005
+"""Share of the surface of an exemplar from which the parts of a row can be seen; balusters of a house cannot."""
+TOO_SMALL = "its parts are too small to be seen"
 MAX_PLANES = 160
 """Ends of slabs that are tried for each step and normal."""
 
@@ -78,6 +81,12 @@ def find_rows(
             ends = _bay_ends_along(layout, normal, steps, all_mates)
             rows += _rows_along(layout, number, step, count, normal, mates, others, ends, refuse)
     return [row for row in rows if not any(_splits_units(layout, row, whole) for whole in rows)]
+
+
+def is_visible(exemplar: Layout, row: Row) -> bool:
+    """Return whether the parts of a row have at least MIN_AREA_SHARE of the surface of an exemplar."""
+    period = sum(float(exemplar.areas[exemplar.types == kind].mean()) for kind in row.copied)
+    return row.count * period >= MIN_AREA_SHARE * float(exemplar.areas.sum())
 
 
 def _bay_ends_along(

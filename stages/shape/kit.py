@@ -68,6 +68,11 @@ class PartMesh:
         return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
 
     @cached_property
+    def area(self) -> float:
+        """Area of the surface, in squared units."""
+        return float(triangle_areas(self.vertices[self.faces]).sum())
+
+    @cached_property
     def centroid(self) -> FloatArray:
         """Area-weighted centroid of the surface, float64 (3,); every symmetry of the part preserves it."""
         corners = self.vertices[self.faces]

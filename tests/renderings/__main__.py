@@ -121,7 +121,7 @@ def _variants(kit: Kit) -> Iterator[tuple[str, Shape]]:
         yield f"exchange {number}", variant
     rng, number = np.random.default_rng(1), 0
     for exemplar in kit.exemplars:
-        draws = LayoutDraws(layout_of(kit, exemplar), RowsConfig(), bays=True)
+        draws = LayoutDraws(layout_of(kit, exemplar), RowsConfig(), is_alone=True)
         for _ in range(MAX_DRAWS):
             drawn = draws.draw(rng)
             if drawn is not None and number < VARIANTS_A_WAY:

@@ -25,6 +25,7 @@ from stages.shape.appearance import Appearance
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Kit, PartMesh
 from tests.stages.rows import models
+from tests.toy_kits.chains_and_rings import box, pose
 
 MODELS: dict[str, Callable[[], tuple[Kit, Layout]]] = {
     "shelf": models.shelf,
@@ -309,7 +310,7 @@ def test_a_bay_is_removed_while_every_type_stays() -> None:
 def test_draws_have_bays_where_they_are_asked_for_and_json_keeps_them() -> None:
     kit, layout = models.cabinet()
     assert not LayoutDraws(layout, RowsConfig()).rows
-    draws = LayoutDraws(layout, RowsConfig(), bays=True)
+    draws = LayoutDraws(layout, RowsConfig(), is_alone=True)
     drawn = [draws.draw(np.random.default_rng(seed)) for seed in range(20)]
     found = [result for result in drawn if result is not None]
     assert {counts(kit, longer)["side"] for _, longer in found} == {3, 4}
@@ -340,3 +341,15 @@ def test_a_table_becomes_no_longer_beyond_its_legs() -> None:
                 layout.boxes[:4, 1].max(axis=0)[[0, 2]] - layout.boxes[:, 1].max(axis=0)[[0, 2]],
             )
     assert any(row.is_bay for row in found)
+
+
+def test_rows_too_small_to_be_seen_make_no_layouts_of_their_own() -> None:
+    walls = [("wall", pose(-0.6, 1.5, 0.0)), ("thin wall", pose(0.6, 1.5, 0.0))]
+    bars = [("bar", pose(0.0, 0.25 + 0.5 * number, 0.0)) for number in range(6)]
+    meshes = {"wall": box(1.0, 3.0, 1.0), "thin wall": box(1.0, 3.0, 0.9), "bar": box(0.2, 0.01, 0.01)}
+    kit, layout = models.layout(meshes, [*walls, *bars])
+    assert LayoutDraws(layout, RowsConfig()).rows
+    alone = LayoutDraws(layout, RowsConfig(), is_alone=True)
+    assert not alone.rows
+    assert alone.refused["its parts are too small to be seen"] > 0
+    assert not rows_of_kit(kit)
