@@ -34,6 +34,10 @@ def ring(folder: Path, name: str = "ring.obj") -> Path:
     return write_obj(folder / name, {f"cube.{k:03d}": box(at=at) for k, at in enumerate(corners)})
 
 
+WHOLE = ("--parts", "objects")
+"""Nothing is searched for repetitions, which takes a single object three CPU seconds."""
+
+
 def single(folder: Path, name: str = "one.obj") -> Path:
     """Write one cube: a run refuses it, so that no new shapes are drawn, which takes seconds."""
     return write_obj(folder / name, {"only": box()})
@@ -173,7 +177,7 @@ class TestText:
 
     def test_several_models_have_separate_columns(self, tmp_path: Path, capsys: Any) -> None:
         both = f"{single(tmp_path)} {single(tmp_path, 'again.obj')}"  # as in MESH="one.obj again.obj"
-        assert inspect(both, "--out", tmp_path / "out", "--tries", "100") == 0
+        assert inspect(both, "--out", tmp_path / "out", "--tries", "100", *WHOLE) == 0
         text = " ".join(capsys.readouterr().out.split())
         assert "type in 1 in 2 triangles symmetries only 1 1 12 24" in text
 
@@ -197,7 +201,7 @@ class TestWrongInput:
 
     def test_unwritable_output_folder_is_refused(self, tmp_path: Path, capsys: Any) -> None:
         path = single(tmp_path)
-        assert inspect(path, "--out", path, "--tries", "100") == 2
+        assert inspect(path, "--out", path, "--tries", "100", *WHOLE) == 2
         assert "cannot be written" in capsys.readouterr().err
 
     @pytest.mark.parametrize(
@@ -212,7 +216,8 @@ class TestWrongInput:
 def test_command_prints_one_json_object_and_nothing_else(tmp_path: Path) -> None:
     path = single(tmp_path)
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "pipeline", "inspect", str(path), "--json", "--tries", "100", "--out", str(out)]
+    options = ["--json", "--tries", "100", "--out", str(out), *WHOLE]
+    command = [sys.executable, "-m", "pipeline", "inspect", str(path), *options]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert json.loads(done.stdout)["files"]["picture"] == str(out / "one.png")
     assert (out / "one.png").stat().st_size > 10_000
@@ -236,7 +241,8 @@ def test_written_config_keeps_textures_that_the_models_have(textured: bool, tmp_
         scene.delete_geometry("brick1")
         path = tmp_path / "one.glb"
         scene.export(path)
-    result = inspected(capsys, path, "--out", tmp_path / "report")
+    parts = ("--parts", "nodes") if textured else WHOLE
+    result = inspected(capsys, path, "--out", tmp_path / "report", *parts)
     written = yaml.safe_load((tmp_path / "report/one.yaml").read_text(encoding="utf-8"))
     assert written["exemplars"]["kits"][0].get("appearance") == ("textures" if textured else None)
     assert not any("read as opaque colours" in warning for warning in result["warnings"])
