@@ -7,6 +7,8 @@ import re
 import zipfile
 from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +19,7 @@ from stages.exemplars.model import pack_model, unpack_model
 from stages.exemplars.read import parse_parts, read_parts
 from stages.exemplars.settings import Segmentation
 from stages.model_files.limits import ReadLimits
-from tests.hostile.corpus import LIMITS, outcomes
+from tests.hostile.corpus import LIMITS, Outcome, outcomes
 from tests.hostile.good import write_good
 from tests.stages.exemplars.model_files import BOX_FACES, Glb, box, textured_dae, textured_glb, write_obj
 
@@ -233,9 +235,17 @@ def test_good_files_are_read_without_warnings(tmp_path: Path) -> None:
         assert model.warnings == (), path
 
 
+def mutated(folder: Path) -> list[Outcome]:
+    """Return the results of mutated files, which are made in a folder."""
+    return list(outcomes(folder, 110, seed=1))
+
+
 @pytest.mark.slow
 def test_mutated_files_are_read_or_refused(tmp_path: Path) -> None:
-    results = list(outcomes(tmp_path, 110, seed=1))
+    # Each file is read in a fork: of a process that has run other tests it takes ten times as long as of a small one.
+    with ProcessPoolExecutor(1, get_context("spawn")) as small:
+        results = small.submit(mutated, tmp_path).result()
+    assert len(results) == 110
     assert [outcome.message for outcome in results if outcome.end == "escaped"] == []
     assert [outcome.message for outcome in results if outcome.end == "stopped"] == []
     assert Counter(outcome.end for outcome in results)["read"] >= 20
