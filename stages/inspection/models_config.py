@@ -33,15 +33,18 @@ def models_of(paths: Sequence[Path]) -> list[Path]:
 def config_with_models(config: Path, paths: Sequence[Path]) -> tuple[str, bytes]:
     """Return the name and the YAML of a config with one kit of all models that paths name, in place of its kits.
 
-    The name of the dataset is that of the config and of the first path. Raises ConfigError as `models_of` does, and for
-    a file that is no YAML.
+    The name of the dataset is that of the config and of the first path. The first kit's `appearance` stays. Raises
+    ConfigError as `models_of` does, and for a file that is no YAML.
     """
     models = models_of(paths)
     values, _ = read_yaml(config)
     kit = dataset_name([paths[0]])
     name = f"{values.get('name', config.stem)}-{kit}"
-    exemplars = {**(values.get("exemplars") or {}), "kits": [{"name": kit, "shapes": [str(path) for path in models]}]}
-    values = {**values, "name": name, "exemplars": exemplars}
+    exemplars = values.get("exemplars") or {}
+    replaced = (exemplars.get("kits") or [{}])[0]
+    look = {key: value for key, value in replaced.items() if key == "appearance"}
+    kits = [{"name": kit, "shapes": [str(path) for path in models], **look}]
+    values = {**values, "name": name, "exemplars": {**exemplars, "kits": kits}}
     text = yaml.safe_dump(values, sort_keys=False, allow_unicode=True, width=100)
     note = f"# Written from {config} for the models of MESH, and again by each `make dataset` of both."
     return name, f"{note}\n{text}".encode()

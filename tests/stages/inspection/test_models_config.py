@@ -46,7 +46,14 @@ def test_models_take_the_place_of_the_kits_and_all_else_stays(models: Path, tmp_
     assert values["seed"] == 7
     assert values["exemplars"]["limits"] == {"parts": 99}
     (kit,) = values["exemplars"]["kits"]
+    assert "appearance" not in kit
     assert kit["shapes"] == [str(models / f"rack{shelves}.glb") for shelves in (2, 3, 4)]
+
+
+def test_textures_stay_asked_for(models: Path) -> None:
+    _, content = config_with_models(FEW_SHOT, [models])
+    (kit,) = yaml.safe_load(content)["exemplars"]["kits"]
+    assert kit["appearance"] == "textures"
 
 
 def test_missing_path_and_folder_without_models_are_refused(tmp_path: Path) -> None:
