@@ -45,10 +45,13 @@ def pyrender_pictures(path: Path, up: str, camera: Mapping[str, Any]) -> tuple[B
     drawer = pyrender.OffscreenRenderer(camera["width"], camera["height"])
     skip = pyrender.RenderFlags.SKIP_CULL_FACES
     lit, depth = drawer.render(scene, flags=skip)
-    for mesh in scene.meshes:  # without light, pyrender shows linear factors as if they were sRGB
+    # Without light, pyrender shows linear factors as if they were sRGB. Of OBJ, trimesh takes `Kd` as factor.
+    is_linear = path.suffix.lower() != ".obj"
+    for mesh in scene.meshes:
         for primitive in mesh.primitives:
             factor = np.asarray(primitive.material.baseColorFactor, dtype=float)
-            primitive.material.baseColorFactor = [*(linear_to_srgb(factor[:3]) / 255.0), *factor[3:]]
+            shown = linear_to_srgb(factor[:3]) / 255.0 if is_linear else factor[:3]
+            primitive.material.baseColorFactor = [*shown, *factor[3:]]
     unlit, _ = drawer.render(scene, flags=skip | pyrender.RenderFlags.FLAT)
     drawer.delete()
     return lit[:, :, :3], unlit[:, :, :3], depth > 0
