@@ -2,15 +2,16 @@
 
 python -m tests.renderings --out FOLDER [--as-inspected] [--blender PYTHON] MODEL...
 
-The variants are exchanges and growth of the parts, and longer and shorter rows, as GLB files. Writes
+The variants are exchanges and growth of the parts, and longer and shorter rows, as GLB files. With --as-inspected the
+model goes through inspect, its config is run as it is, and the variants are samples of that. Writes
 FOLDER/<model>/sheet.png and prints a table: the share of the pixels of the shape that both renderers cover, and how far
 their unlit colours differ. PYTHON has the package bpy; without one there are no pictures by Blender.
-With --as-inspected the model also goes through inspect, and its config is run as it is.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import subprocess
 import sys
@@ -20,16 +21,20 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.paths import DatasetPaths
 from stages.api import read_kit, vary
+from stages.exemplars.language import dataset_kits
 from stages.inspection.config_text import dataset_name
 from stages.model_files.read import read_model
 from stages.model_files.scene import ModelScene
 from stages.package.glb import glb_bytes
+from stages.proportions.text import ProportionShapes, shape_of_text
 from stages.rows.draws import LayoutDraws
 from stages.rows.layout import layout_of
 from stages.rows.settings import RowsConfig
 from stages.shape.kit import Assembly, Kit, PartMesh
-from stages.shape.shape import Shape, upright
+from stages.shape.sample import read_samples
+from stages.shape.shape import Shape, kit_shape, upright
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from tests.bench.exemplars import STAGES
 from tests.renderings.peers import blender_pictures, pyrender_pictures
@@ -59,7 +64,7 @@ def main() -> None:
     parser.add_argument("models", nargs="+", type=Path, metavar="MODEL")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--blender", type=Path, help="a Python with bpy")
-    parser.add_argument("--as-inspected", action="store_true", help="run the config of inspect as it is, too")
+    parser.add_argument("--as-inspected", action="store_true", help="show samples of the config of inspect")
     options = parser.parse_args()
     print(HEADER, flush=True)
     for model in options.models:
@@ -71,12 +76,10 @@ def main() -> None:
 def compared(model: Path, folder: Path, name: str, as_inspected: bool, blender: Path | None) -> Iterator[Sequence[str]]:
     """Write the sheet of a model; yield the cells of a row for each shape."""
     folder.mkdir(parents=True, exist_ok=True)
-    if as_inspected:
-        _run_inspected(model, folder)
     kit = read_kit(model, **KIT_SETTINGS)
     scene = read_model(model, texture_size=512)
     shapes = [("source", model, upright(_whole(scene, kit.up)), kit.up)]
-    for label, variant in _variants(kit):
+    for label, variant in _inspected(model, folder) if as_inspected else _variants(kit):
         path = folder / f"{label.replace(' ', '-')}.glb"
         path.write_bytes(glb_bytes(upright(variant)))
         shapes.append((label, path, _whole(read_model(path, texture_size=512), "y"), "y"))
@@ -106,13 +109,24 @@ def _run(*arguments: object) -> str:
     return done.stdout
 
 
-def _run_inspected(model: Path, folder: Path) -> None:
-    """Write the config of inspect, and sheets of what it makes."""
+def _inspected(model: Path, folder: Path) -> Iterator[tuple[str, Shape]]:
+    """Run the config of inspect; yield a caption and a shape for the first samples of each way."""
     inspected = _run("inspect", "--json", "--out", folder / "inspect", model)
     config = Path(json.loads(inspected)["files"]["config"])
     for stage in STAGES:
         _run("run", stage, "--config", config, "--out", folder, "--workers", 1)
     _run("sheets", "--config", config, "--out", folder)
+    paths = DatasetPaths(folder, config.stem)
+    shapes = {name: ProportionShapes(kit) for name, kit in dataset_kits(paths).items()}
+    for stage in STAGES[2:]:
+        shards = sorted(paths.stage(stage).root.glob(f"{config.stem}-train-*.tar"))
+        samples = itertools.islice((sample for shard in shards for sample in read_samples(shard)), VARIANTS_A_WAY)
+        for number, sample in enumerate(samples, start=1):
+            of_kit = shapes[sample.kit]
+            if sample.text:
+                yield f"{stage} {number}", shape_of_text(of_kit, sample.text)
+            else:
+                yield f"{stage} {number}", kit_shape(of_kit.kit, sample.assembly)
 
 
 def _variants(kit: Kit) -> Iterator[tuple[str, Shape]]:
