@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+
+Corners = Sequence[Sequence[float]]
+"""Points in a plane, as Python's numbers: one at a time, those of an array take five times as long."""
 
 FLAT_AREA = 1e-9
 """Smaller areas count as zero, so that the last bits of a sine never choose a diagonal."""
@@ -66,26 +70,27 @@ def triangulate(points: FloatArray, loops: Sequence[Sequence[int]]) -> list[tupl
     The ear with the shortest diagonal is cut first. Raises ValueError for a loop that crosses itself or runs the wrong
     way round.
     """
+    corners: Corners = points.tolist()
     ring = list(loops[0])
-    holes = sorted(loops[1:], key=lambda hole: (-max(round(float(points[i][0]), 6) for i in hole), list(hole)))
+    holes = sorted(loops[1:], key=lambda hole: (-max(round(corners[i][0], 6) for i in hole), list(hole)))
     for hole in holes:
-        ring = _bridged(points, ring, hole, holes)
+        ring = _bridged(corners, ring, hole, holes)
     triangles: list[tuple[int, int, int]] = []
     while len(ring) > 3:
-        ears = [k for k in range(len(ring)) if _is_ear(points, ring, k)]
+        ears = [k for k in range(len(ring)) if _is_ear(corners, ring, k)]
         if not ears:
             raise ValueError("the outline crosses itself or runs clockwise")
         size = len(ring)
-        best = min(ears, key=lambda k: (round(_gap(points, ring[k - 1], ring[(k + 1) % size]), 6), k))
+        best = min(ears, key=lambda k: (round(_gap(corners, ring[k - 1], ring[(k + 1) % size]), 6), k))
         triangles.append((ring[best - 1], ring[best], ring[(best + 1) % size]))
         del ring[best]
-    if _side(points, *ring) < -FLAT_AREA:
+    if _side(corners, *ring) < -FLAT_AREA:
         raise ValueError("the outline crosses itself or runs clockwise")
     triangles.append((ring[0], ring[1], ring[2]))
     return triangles
 
 
-def _bridged(points: FloatArray, ring: list[int], hole: Sequence[int], holes: Sequence[Sequence[int]]) -> list[int]:
+def _bridged(points: Corners, ring: list[int], hole: Sequence[int], holes: Sequence[Sequence[int]]) -> list[int]:
     """Connect a ring to a hole along the shortest segment that crosses nothing."""
     loops = [ring, *holes]
     sides = [(loop[k - 1], loop[k]) for loop in loops for k in range(len(loop))]
@@ -102,7 +107,7 @@ def _bridged(points: FloatArray, ring: list[int], hole: Sequence[int], holes: Se
     raise ValueError("a hole cannot be reached from the outline")
 
 
-def _is_ear(points: FloatArray, ring: list[int], k: int) -> bool:
+def _is_ear(points: Corners, ring: list[int], k: int) -> bool:
     a, b, c = ring[k - 1], ring[k], ring[(k + 1) % len(ring)]
     if _side(points, a, b, c) <= FLAT_AREA:
         return False
@@ -113,7 +118,7 @@ def _is_ear(points: FloatArray, ring: list[int], k: int) -> bool:
     return True
 
 
-def _crosses(points: FloatArray, a: int, b: int, c: int, d: int) -> bool:
+def _crosses(points: Corners, a: int, b: int, c: int, d: int) -> bool:
     """Return whether the open segment a-b meets c-d; sides that end in a or b do not count."""
     if a in (c, d) or b in (c, d):
         return False
@@ -122,11 +127,11 @@ def _crosses(points: FloatArray, a: int, b: int, c: int, d: int) -> bool:
     return (first > FLAT_AREA) != (second > FLAT_AREA) and (third > FLAT_AREA) != (fourth > FLAT_AREA)
 
 
-def _side(points: FloatArray, a: int, b: int, c: int) -> float:
+def _side(points: Corners, a: int, b: int, c: int) -> float:
     """Return twice the signed area of the triangle a, b, c."""
     p, q, r = points[a], points[b], points[c]
-    return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
+    return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
 
 
-def _gap(points: FloatArray, a: int, b: int) -> float:
-    return float(np.hypot(points[a][0] - points[b][0], points[a][1] - points[b][1]))
+def _gap(points: Corners, a: int, b: int) -> float:
+    return math.dist(points[a], points[b])

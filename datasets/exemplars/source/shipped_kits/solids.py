@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -96,6 +97,10 @@ class Solid:
 
     def mesh(self) -> tuple[FloatArray, IntArray, ByteArray]:
         """Return vertices float64 (v, 3), faces int32 (f, 3) and face colours uint8 (f, 3)."""
+        return self._mesh
+
+    @cached_property
+    def _mesh(self) -> tuple[FloatArray, IntArray, ByteArray]:
         points = np.round(self.points, COORDINATE_DECIMALS) + 0.0
         triangles: list[tuple[int, int, int]] = []
         colors: list[Color] = []
