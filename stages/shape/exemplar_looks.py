@@ -23,10 +23,10 @@ MAX_ROTATION_DIFFERENCE = 0.02
 """Largest difference of two entries of rotations that count as equal."""
 POSE_TOLERANCES = 4.0
 """Parts that a piece misses by up to this many pose tolerances belong to it."""
-MAX_PAIRS = 60_000
-"""Pairs of parts with a symmetry that are looked at; types with few of them come first."""
-MAX_PIECES = 2_000
-"""Pieces of an exemplar that are looked at, the largest ones."""
+MAX_PAIRS = 20_000
+"""Pairs of parts with a symmetry from which rotations and translations are taken; of more, parts are left out."""
+MAX_PIECES = 300
+"""Pieces of an exemplar that are looked at, those with most pairs."""
 
 
 def with_looks(kit: Kit, assembly: Assembly) -> tuple[tuple[PartType, ...], Assembly]:
@@ -115,37 +115,38 @@ def _pieces(kit: Kit, assembly: Assembly, whole: Assembly) -> Iterator[tuple[int
     near = cKDTree(keyed).query_pairs(reach, output_type="ndarray")
     graph = coo_matrix((np.ones(len(near), np.int8), (near[:, 0], near[:, 1])), shape=(len(kept), len(kept)))
     piece_of = connected_components(graph, directed=False)[1]
-    order = np.lexsort((images, parts, piece_of))
-    pieces = np.split(order, 1 + np.flatnonzero(np.diff(piece_of[order])))
-    for rows in sorted(pieces, key=len, reverse=True)[:MAX_PIECES]:
+    # Types are far apart in a fourth coordinate.
+    spread = 4.0 * (reach + float(np.abs(shifts).max()))
+    tree = cKDTree(np.column_stack([assembly.poses[:, :3, 3], assembly.types * spread]))
+    firsts, counts = np.unique(piece_of, return_index=True, return_counts=True)[1:]
+    for first in firsts[np.argsort(-counts, kind="stable")][:MAX_PIECES].tolist():
+        rotation = int(rotation_of[kept[first]])
+        places = np.einsum("ij,qj->qi", chosen[rotation], whole.poses[:, :3, 3]) + shifts[first]
+        gaps, found = tree.query(np.column_stack([places, whole.types * spread]), distance_upper_bound=reach)
         image = np.full(len(assembly), -1, dtype=np.int32)
-        image[parts[rows[::-1]]] = images[rows[::-1]]
+        image[found[np.isfinite(gaps)][::-1]] = np.flatnonzero(np.isfinite(gaps))[::-1]
         if (image >= 0).sum() > 1:
-            yield int(rotation_of[kept[rows[0]]]), image
+            yield rotation, image
 
 
 def _pairs(kit: Kit, assembly: Assembly, whole: Assembly) -> _Pairs:
-    """Return the ways to lay parts on parts of an exemplar without reflection, types with few ways first."""
+    """Return ways to lay parts on parts of an exemplar without reflection."""
     handed, theirs = (_handed(poses[:, :3, :3]) for poses in (assembly.poses, whole.poses))
     found: list[_Pairs] = []
-    for kind in np.intersect1d(assembly.types, whole.types).tolist():
+    kinds = np.intersect1d(assembly.types, whole.types).tolist()
+    for kind in kinds:
         symmetries = kit.types[kind].symmetries[:, :3, :3]
         mine, its = np.flatnonzero(assembly.types == kind), np.flatnonzero(whole.types == kind)
+        room = max(MAX_PAIRS // (len(kinds) * len(its) * len(symmetries)), 1)
+        mine = mine[np.unique(np.linspace(0, len(mine) - 1, min(room, len(mine))).astype(np.int64))]
         p, q, s = (grid.ravel() for grid in np.meshgrid(mine, its, np.arange(len(symmetries)), indexing="ij"))
         proper = handed[p] * theirs[q] * _handed(symmetries)[s] > 0
         p, q, s = p[proper], q[proper], s[proper]
         turned = np.einsum("kij,kjl->kil", assembly.poses[p, :3, :3], symmetries[s])
         found.append(_Pairs(p, q, np.einsum("kij,klj->kil", turned, whole.poses[q, :3, :3])))
-    found.sort(key=lambda pairs: len(pairs.parts))
-    kept: list[_Pairs] = []
-    total = 0
-    for pairs in found:
-        total += len(pairs.parts)
-        if not kept or total <= MAX_PAIRS:
-            kept.append(pairs)
-    if not kept:
+    if not found:
         return _Pairs(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3, 3)))
-    return _Pairs(*(np.concatenate(columns) for columns in zip(*kept, strict=True)))
+    return _Pairs(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
 
 
 def _handed(rotations: FloatArray) -> np.ndarray:

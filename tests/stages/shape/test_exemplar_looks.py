@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import time
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -153,3 +154,19 @@ def test_looks_of_a_type_share_their_arrays_in_the_glb(tmp_path: Path) -> None:
         assert look is not None
         names.append(look.materials[look.face_material[0]].name)
     assert [name for name in names if name != "wood"] == list(NAMES)
+
+
+def test_a_wall_of_many_equal_bricks_is_found_again_in_moderate_time() -> None:
+    kit = shelves()
+    jar = kit.type_names().index("jar")
+    rng = np.random.default_rng(1)
+    poses = np.tile(np.eye(4), (400, 1, 1))
+    poses[:, 0, 3], poses[:, 1, 3] = np.arange(400) % 20, np.arange(400) // 20
+    no_edges = np.empty((0, 2), np.int32)
+    wall = Assembly(np.full(400, jar, np.int16), poses, no_edges, looks=rng.integers(0, JARS, 400).astype(np.int16))
+    kit = replace(kit, exemplars=(Exemplar("wall", wall, ("brick",) * 400),))
+    start = time.process_time()
+    found = exemplar_looks(kit, without_looks(wall))
+    assert time.process_time() - start < 5.0
+    assert wall.looks is not None
+    assert found.tolist() == wall.looks.tolist()
