@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -21,6 +22,8 @@ from stages.package.layout import MANIFEST
 from stages.package.manifest import config_sections
 from stages.package.versions import code_version, library_versions
 from stages.shape.collection.discovery import producers
+from stages.shapeassembly.extraction.readers.source import HierarchyKind, HierarchySource
+from stages.shapeassembly.sources import source_digest
 
 
 class _Shard(BaseModel):
@@ -140,7 +143,10 @@ def _split_at_collection(config: Config, stages: Mapping[str, Stage]) -> tuple[l
 
 
 def _models(manifest: _Manifest, folders: Sequence[Path]) -> dict[str, str]:
-    """Return the path of each model by the name that the manifest's config has for it: its folder's and its own."""
+    """Return the path of each input by the name that the manifest's config has for it: its folder's and its own.
+
+    An input is a model, an archive or weights, or a folder or a file of programs or hierarchies.
+    """
     found: dict[str, str] = {}
     digests: dict[str, str] = {}
     for origin in manifest.origins:
@@ -148,8 +154,8 @@ def _models(manifest: _Manifest, folders: Sequence[Path]) -> dict[str, str]:
         if digests.setdefault(name, digest) != digest:
             raise ConfigError(f"two models of the dataset are called {name}: its manifest does not tell which is where")
         for folder in folders:
-            near = (path for path in sorted(folder.rglob(Path(name).name)) if path.is_file())
-            match = next((path for path in near if file_digest(path) == digest), None)
+            near = sorted(folder.rglob(Path(name).name))
+            match = next((path for path in near if digest in _digests(path)), None)
             if match is not None:
                 found[name] = str(match)
                 break
@@ -157,6 +163,14 @@ def _models(manifest: _Manifest, folders: Sequence[Path]) -> dict[str, str]:
             places = ", ".join(map(str, folders))
             raise ConfigError(f"{name}, sha256 {digest}, is not below {places}; name its folder with --models")
     return found
+
+
+def _digests(path: Path) -> Iterator[str]:
+    """Yield what a manifest may state of a file or folder: of its bytes, its programs, or its hierarchies."""
+    yield file_digest(path) if path.is_file() else source_digest(path)
+    for kind in get_args(HierarchyKind):
+        if kind != "grass" or path.is_file():
+            yield HierarchySource(path, kind, "auto").digest(0, sys.maxsize)
 
 
 def _located(value: Any, models: Mapping[str, str]) -> Any:

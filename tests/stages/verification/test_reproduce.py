@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,10 @@ import pytest
 import yaml
 
 from tests.command import shapemill
+from tests.stages.shapeassembly.extraction.test_shards import tables
 
+PROGRAMS = Path("datasets/exemplars/programs")
+CREDIT = {"author": "A", "license": "MIT"}
 HUT = hashlib.sha256(b"hut").hexdigest()
 
 
@@ -35,6 +39,37 @@ def test_bytes_that_differ_and_what_may_be_why_are_said(tmp_path: Path) -> None:
     assert code == 1
     assert "vases-1_0_0-train-000000.tar has other bytes now" in printed
     assert "it was made with numpy 1.0, and this is " in printed
+
+
+def test_folders_of_programs_and_files_of_hierarchies_are_found_by_what_is_in_them(tmp_path: Path) -> None:
+    published, here = tmp_path / "published", tmp_path / "here"
+    for folder in (published, here):
+        (folder / "chairs").mkdir(parents=True)
+        for name in ("stool-tripod.txt", "bench-garden.txt"):
+            shutil.copy(PROGRAMS / name, folder / "chairs" / name)
+        (tables(folder / "tables") / "9.json").rename(folder / "table.json")
+    config = {
+        "name": "chairs",
+        "shapeassembly": {
+            "programs": [{"name": "chairs", "path": str(published / "chairs"), "credit": CREDIT}],
+            "hierarchies": [
+                {"name": name, "path": str(published / path), "kind": "structurenet", "credit": CREDIT}
+                for name, path in (("tables", "tables"), ("one", "table.json"))
+            ],
+            "splits": {"val": 0, "test": 0, "shards": 1},
+        },
+        **dict.fromkeys(("points", "sketches", "strings"), False),
+    }
+    (tmp_path / "chairs.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
+    code, printed = shapemill("run", "--config", tmp_path / "chairs.yaml", "--out", tmp_path / "out", "--workers", 1)
+    assert code == 0, printed
+    shutil.rmtree(published)
+    command = ("reproduce", "train-000000", tmp_path / "out" / "chairs", "--workers", 1, "--models")
+    code, printed = shapemill(*command, here)
+    assert code == 0, printed
+    (here / "chairs" / "stool-tripod.txt").unlink()
+    code, printed = shapemill(*command, here)
+    assert (code, "published/chairs, sha256 " in printed) == (2, True), printed
 
 
 MANIFEST: dict[str, Any] = {
