@@ -13,6 +13,7 @@ from jsonschema.exceptions import best_match
 
 from pipeline.paths import file_digest
 from stages.package.layout import CHECKSUMS, CLASSES, CROISSANT, INDEX, MANIFEST, SCHEMA
+from stages.package.schema import validator_of
 from stages.verification.findings import Findings
 
 SampleRow = tuple[str, str, str, str, str, str]
@@ -84,12 +85,13 @@ def read_schema(folder: Path, findings: Findings) -> str:
     document = read_document(folder / SCHEMA, findings)
     if document is None:
         return "{}"
+    schema = json.dumps(document)
     try:
-        Draft202012Validator.check_schema(document)
+        validator_of(schema)
     except SchemaError as error:
         findings.fault("manifest", SCHEMA, f"is no JSON schema: {error.message}")
         return "{}"
-    return json.dumps(document)
+    return schema
 
 
 def check_splits(manifest: Mapping[str, Any], rows: Sequence[SampleRow], findings: Findings) -> None:
