@@ -20,6 +20,7 @@ from stages.package.schema import schema_faults, validator_of
 from stages.shape.collection.classes import read_labels
 from stages.shape.collection.discovery import audits, languages
 from stages.shape.collection.discovery import members as declared_members
+from stages.shape.collection.language import RebuildShape
 from stages.shape.collection.packaged import PackagedSample
 from stages.verification.files import ClassCounts, SampleRow
 from stages.verification.findings import Findings
@@ -50,7 +51,7 @@ def check_shard(
     """
     findings, rows, tally, path = Findings(), list[SampleRow](), ClassCounts(), str(shard["path"])
     paths = DatasetPaths(folder.resolve().parent, folder.resolve().name)
-    rebuild = {name: language.rebuild(paths) for name, language in languages().items()}
+    rebuild = _Rebuilders(paths)
     validator = validator_of(schema)
     labels = read_labels(folder / CLASSES)
     wanted = [member["name"] for member in manifest["members"]]
@@ -97,6 +98,18 @@ def check_shard(
     if count != shard["samples"]:
         findings.fault("samples", path, f"has {count} samples, the manifest counts {shard['samples']}")
     return findings, rows, tally
+
+
+class _Rebuilders(dict[str, RebuildShape]):
+    """Functions that rebuild the shapes of records, by language; each reads its kits when it is first asked for."""
+
+    def __init__(self, paths: DatasetPaths) -> None:
+        super().__init__()
+        self._paths = paths
+
+    def __missing__(self, language: str) -> RebuildShape:
+        self[language] = languages()[language].rebuild(self._paths)
+        return self[language]
 
 
 def shard_samples(path: Path) -> Iterator[tuple[str, int, dict[str, bytes]]]:
