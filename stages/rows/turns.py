@@ -116,7 +116,11 @@ def turned(layout: Layout, turn: Turn) -> Layout:
 
 
 def _orbits_about(layout: Layout, axis: int) -> Iterator[tuple[FloatArray, np.ndarray]]:
-    """Yield centre and parts, by angle, of each set of congruent parts at equal angles about a line along an axis."""
+    """Yield centre and parts, by angle, of each set of congruent parts at equal angles about a line along an axis.
+
+    Parts that are at equal angles in groups alone, such as two screws of each blade of a fan, make a set for each place
+    in the group.
+    """
     across = [other for other in range(3) if other != axis]
     for kind in np.flatnonzero(np.bincount(layout.types) >= MIN_SECTORS).tolist():
         parts = np.flatnonzero(layout.types == kind)
@@ -135,11 +139,14 @@ def _orbits_about(layout: Layout, axis: int) -> Iterator[tuple[FloatArray, np.nd
                 continue
             angles = np.arctan2(arms[:, 1], arms[:, 0])
             by_angle = np.argsort(angles, kind="stable")
-            pitch = 2 * np.pi / len(members)
-            gaps = np.diff(angles[by_angle])
-            orbit = members[by_angle]
-            if (np.abs(gaps - pitch) * radii.max() <= tolerance).all() and _are_turned_copies(layout, axis, orbit):
-                yield centre, orbit
+            for sectors in (len(members) // size for size in range(1, len(members)) if len(members) % size == 0):
+                places = by_angle.reshape(sectors, -1).T
+                gaps = np.diff(angles[places], axis=1) - 2 * np.pi / sectors
+                if sectors < MIN_SECTORS or (np.abs(gaps) * radii.max() > tolerance).any():
+                    continue
+                if all(_are_turned_copies(layout, axis, members[orbit]) for orbit in places):
+                    yield from ((centre, members[orbit]) for orbit in places)
+                    break
 
 
 def _are_turned_copies(layout: Layout, axis: int, orbit: np.ndarray) -> bool:

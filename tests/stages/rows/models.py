@@ -186,6 +186,20 @@ def round_temple(columns: int = 8) -> tuple[Kit, Layout]:
 
 
 @cache
+def fan(blades: int = 3) -> tuple[Kit, Layout]:
+    """Blades on a round plate, each with two screws."""
+    turns = [trimesh.transformations.rotation_matrix(2 * np.pi * number / blades, [0, 1, 0]) for number in
+             range(blades)]  # fmt: skip
+    plate = trimesh.creation.cylinder(0.5, 0.1, sections=64).apply_transform(
+        trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0])
+    )
+    meshes = {"plate": plate, "blade": box(1.0, 0.05, 0.2), "screw": box(0.04, 0.02, 0.03)}
+    of_blade = (("blade", 0.9, 0.075, 0.0), ("screw", 0.6, 0.11, 0.05), ("screw", 0.6, 0.11, -0.05))
+    held = [(name, turn @ pose(x, y, z)) for turn in turns for name, x, y, z in of_blade]
+    return layout(meshes, [("plate", pose(0.0, 0.0, 0.0)), *held])
+
+
+@cache
 def framed_windows(count: int = 3) -> tuple[Kit, Layout]:
     """A wall with windows, each of two sides and a pane between them."""
     sides = [("side", pose(1.8 * number + x, 1.0, 0.0)) for number in range(count) for x in (0.0, 1.0)]

@@ -223,6 +223,17 @@ def test_columns_about_an_axis_change_their_number(count: int) -> None:
     assert read_change(change_json(circle.turn(count))).count == count  # type: ignore[union-attr]
 
 
+def test_groups_of_parts_about_an_axis_change_their_number() -> None:
+    kit, layout = models.fan()
+    (circle,) = find_circles(layout)
+    assert (circle.axis, circle.sectors, len(circle.orbits)) == (1, 3, 3)
+    other = turned(layout, circle.turn(5))
+    assert counts(kit, other) == {"plate": 1, "blade": 5, "screw": 10}
+    check(kit, other)
+    (again,) = find_circles(other)
+    assert turned(other, again.turn(3)).key == layout.key
+
+
 def test_rows_are_described() -> None:
     kit, layout = models.shelf()
     assert rows_of_kit(kit)[0].sentence == "5 times board, along y"
