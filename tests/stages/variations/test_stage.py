@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -24,23 +25,38 @@ from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, chain, pose, ri
 
 pytestmark = pytest.mark.slow
 
+SEARCH = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 1.0}
 
-def make(folder: Path, out: str, workers: int, **variations: object) -> str:
-    """Run both stages; everything that was printed."""
+
+def write_config(folder: Path, **variations: object) -> Path:
     kits = []
     for name, meshes, shapes in (("chain", CHAIN, [chain(3), chain(5)]), ("road", ROAD, [ring(1, 1), ring(2, 3)])):
         paths = [write_model(folder / f"{name}{k}.glb", meshes, shape) for k, shape in enumerate(shapes)]
         kits.append(stated({"name": name, "shapes": paths, "contact": {"kinds": ["face"]}, "parts": "nodes"}))
     config = {"name": "toy", "seed": 5, "exemplars": {"kits": kits}, "variations": variations}
-    (folder / "toy.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
-    printed = ""
-    for stage in ("exemplars", "variations"):
-        code, said = shapemill(
-            "run", stage, "--config", folder / "toy.yaml", "--out", folder / out, "--workers", workers
-        )
-        assert code == 0, said
-        printed += said
-    return printed
+    path = folder / "toy.yaml"
+    path.write_text(yaml.safe_dump(config), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def kits(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the models of all configs here, and `out` with their kits."""
+    folder = tmp_path_factory.mktemp("kits")
+    code, said = shapemill(
+        "run", "exemplars", "--config", write_config(folder), "--out", folder / "out", "--workers", 1
+    )
+    assert code == 0, said
+    return folder
+
+
+def make(kits: Path, out: Path, workers: int, **variations: object) -> str:
+    """Make variants of the kits in `out`; everything that was printed."""
+    shutil.copytree(kits / "out", out)
+    config = write_config(kits, **variations)
+    code, said = shapemill("run", "variations", "--config", config, "--out", out, "--workers", workers)
+    assert code == 0, said
+    return said
 
 
 def collection(folder: Path, out: str) -> list[Path]:
@@ -50,10 +66,9 @@ def collection(folder: Path, out: str) -> list[Path]:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+def made(kits: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("toy")
-    search = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 1.0}
-    return folder, make(folder, "one", 1, samples_per_kit=2000, search=search)
+    return folder, make(kits, folder / "one", 1, samples_per_kit=2000, search=SEARCH)
 
 
 def test_search_of_a_finite_language_ends_with_a_reason(made: tuple[Path, str]) -> None:
@@ -114,15 +129,17 @@ def test_parents_are_in_the_same_split_and_splits_share_little(
             assert not shapes.shares(place, others, 0.8).any()
 
 
-def test_split_by_graph_assigns_everything_found(tmp_path: Path) -> None:
-    search = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 1.0}
-    make(tmp_path, "one", 1, samples_per_kit=2000, search=search, splits={"by": "graph", "val": 0.2, "test": 0.3})
+def test_split_by_graph_assigns_everything_found(kits: Path, tmp_path: Path) -> None:
+    make(
+        kits, tmp_path / "one", 1, samples_per_kit=2000, search=SEARCH, splits={"by": "graph", "val": 0.2, "test": 0.3}
+    )
     root = tmp_path / "one" / ".work" / "toy" / "variations"
-    kits = json.loads((root / "records" / "toy-assignment.json").read_text(encoding="utf-8"))["summary"]["kits"]
+    record = json.loads((root / "records" / "toy-assignment.json").read_text(encoding="utf-8"))
+    summary = record["summary"]["kits"]
     by_key = {sample.key: sample for shard in collection(tmp_path, "one") for sample in read_samples(shard)}
     every_key = []
     for kit in ("chain", "road"):
-        keys = [f"{kit}-{place:06d}" for place in range(kits[kit]["pool"])]
+        keys = [f"{kit}-{place:06d}" for place in range(summary[kit]["pool"])]
         groups: dict[str, list[int]] = {}
         for row, key in enumerate(keys):
             groups.setdefault(by_key[key].graph, []).append(row)
@@ -131,12 +148,11 @@ def test_split_by_graph_assigns_everything_found(tmp_path: Path) -> None:
         assert [by_key[key].split for key in keys] == [SPLITS[split] for split in expected]
         every_key += keys
     assert sorted(by_key) == sorted(every_key)
-    assert {kit: found["discarded"] for kit, found in kits.items()} == {"chain": 0, "road": 0}
+    assert {kit: found["discarded"] for kit, found in summary.items()} == {"chain": 0, "road": 0}
 
 
-def test_variants_beyond_max_copied_share_are_rejected_and_counted(tmp_path: Path) -> None:
-    search = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 1.0}
-    make(tmp_path, "one", 1, samples_per_kit=2000, search=search, require={"max_copied_share": 0.6})
+def test_variants_beyond_max_copied_share_are_rejected_and_counted(kits: Path, tmp_path: Path) -> None:
+    make(kits, tmp_path / "one", 1, samples_per_kit=2000, search=SEARCH, require={"max_copied_share": 0.6})
     samples = [sample for shard in collection(tmp_path, "one") for sample in read_samples(shard)]
     assert samples
     assert max(sample.lineage["copied"]["share"] for sample in samples) <= 0.6
@@ -163,17 +179,16 @@ def test_collection_shard_records_both_files_of_its_kits(
     assert len(records) > 2
 
 
-def test_two_workers_make_the_same_bytes(made: tuple[Path, str]) -> None:
+def test_two_workers_make_the_same_bytes(made: tuple[Path, str], kits: Path) -> None:
     folder, _ = made
-    search = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 1.0}
-    make(folder, "two", 2, samples_per_kit=2000, search=search)
+    make(kits, folder / "two", 2, samples_per_kit=2000, search=SEARCH)
     assert digests(folder, "one") == digests(folder, "two")
 
 
-def test_two_workers_make_the_same_bytes_by_replacement(tmp_path: Path) -> None:
+def test_two_workers_make_the_same_bytes_by_replacement(kits: Path, tmp_path: Path) -> None:
     search = {"method": "substructures", "tries_per_round": 300, "max_rounds": 2}
     for out, workers in (("one", 1), ("two", 2)):
-        make(tmp_path, out, workers, samples_per_kit=40, search=search)
+        make(kits, tmp_path / out, workers, samples_per_kit=40, search=search)
     assert digests(tmp_path, "one") == digests(tmp_path, "two")
     methods = {sample.lineage["method"] for shard in collection(tmp_path, "one") for sample in read_samples(shard)}
     assert methods == {"rows", "substructures"}
