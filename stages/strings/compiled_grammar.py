@@ -66,8 +66,9 @@ def _with_consequences(patterns: GrammarPatterns, partial: bool, cycles: int) ->
     )
 
     def completed(kind: int, *neighbours: int) -> int:
-        counts = np.bincount(np.array(neighbours, dtype=np.int64), minlength=types)
-        return int(tokens_to_complete(rules, kind, counts, 0, False))
+        # With the types of a state of the mask, so that it is compiled once.
+        counts = np.bincount(np.array(neighbours, dtype=np.int64), minlength=types).astype(np.int16)
+        return int(tokens_to_complete(rules, np.int16(kind), counts, np.int16(0), False))
 
     adjacent = np.array(
         [[completed(kind, other) < NO_COMPLETION for other in range(types)] for kind in range(types)], np.bool_

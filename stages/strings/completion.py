@@ -6,6 +6,7 @@ Numba compiles this module when it is imported: import it inside functions.
 from __future__ import annotations
 
 import numba
+import numpy as np
 
 NO_COMPLETION = 1 << 28
 """Tokens to complete a node that cannot be completed."""
@@ -15,12 +16,12 @@ NO_COMPLETION = 1 << 28
 def tokens_to_complete(grammar, kind, counts, pending, finished):
     """Return the fewest tokens of the children that a node still needs, with parentheses, or NO_COMPLETION.
 
-    counts: int64 (types,), its neighbours by type; pending: its open cycles; finished: it gets no more children.
+    counts: int16 (types,), its neighbours by type; pending: its open cycles; finished: it gets no more children.
     """
     best = NO_COMPLETION
     types = len(counts)
     for p in range(grammar.first[kind], grammar.first[kind + 1]):
-        total, missing = 0, 0
+        total, missing = 0, np.int64(0)
         fits = True
         for t in range(types):
             if counts[t] > grammar.high[p, t]:

@@ -8,6 +8,7 @@ Numba compiles this module when it is imported: import it inside functions.
 from __future__ import annotations
 
 import numba
+import numpy as np
 
 from stages.strings.completion import NO_COMPLETION, tokens_to_complete
 from stages.strings.mask_state import NO_NODE, NODE, not_joined, open_cycles
@@ -96,14 +97,14 @@ def _closing_node_of_type(grammar, state, i, origin, other, goal):
             if arc < 0 or not (grammar.closes_below[arc, goal] if node == origin else grammar.closes[arc, goal]):
                 continue
             counts[child] += 1
-            fits = tokens_to_complete(grammar, kind, counts, state.pending[i, node], False) < NO_COMPLETION
+            fits = tokens_to_complete(grammar, kind, counts, state.pending[i, node], np.bool_(False)) < NO_COMPLETION
             counts[child] -= 1
             if fits:
                 return node
     if state.previous[i] == NODE and state.kind[i, current] == other and not_joined(state, i, origin):
         state.counts[i, current, state.kind[i, origin]] += 1
-        counts, pending = state.counts[i, current], state.pending[i, current]
-        fits = tokens_to_complete(grammar, other, counts, pending, False) < NO_COMPLETION
+        kind, counts, pending = state.kind[i, current], state.counts[i, current], state.pending[i, current]
+        fits = tokens_to_complete(grammar, kind, counts, pending, np.bool_(False)) < NO_COMPLETION
         state.counts[i, current, state.kind[i, origin]] -= 1
         if fits:
             return AT_CURRENT

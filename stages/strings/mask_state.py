@@ -151,4 +151,4 @@ def can_leave(grammar, state, i):
     """Return whether the current node is complete but for its open cycles."""
     node = state.current[i]
     kind, counts, pending = state.kind[i, node], state.counts[i, node], state.pending[i, node]
-    return tokens_to_complete(grammar, kind, counts, pending, True) < NO_COMPLETION
+    return tokens_to_complete(grammar, kind, counts, pending, np.bool_(True)) < NO_COMPLETION

@@ -351,7 +351,7 @@ def _join(across, down, shares, kinds_of):
             # A number is -1 or not negative: so all four are -1.
             if (across[r, c] & across[r + 1, c] & down[r, c] & down[r, c + 1]) == -1:
                 continue
-            size = 0
+            size = np.int64(0)
             for side in range(4):
                 row, column = r + (side == 1), c + (side == 3)
                 number = across[row, column] if side < 2 else down[row, column]

@@ -223,7 +223,7 @@ def _next(rng, problem, s):
                     best, least = node, size
         before = s.domain_size[best]
         if method.closes and before > 1 and graph.core[best]:
-            _prune_unclosable(problem, s, best)
+            _prune_unclosable(problem, s, np.int64(best))
             if s.domain_size[best] == 0:
                 s.weights[best] += 1.0
                 return Outcome.CONFLICT, best
@@ -248,10 +248,10 @@ def _random_next(rng, problem, s):
                     count += 1
                     if rng.random() * count < 1.0:
                         chosen, parent = graph.ends[k], node
-    if not _open_domain(problem, s, chosen, parent):
+    if not _open_domain(problem, s, np.int64(chosen), np.int64(parent)):
         return Outcome.NO_ROOM, chosen
     if method.closes and graph.core[chosen]:
-        _prune_unclosable(problem, s, chosen)
+        _prune_unclosable(problem, s, np.int64(chosen))
     return (Outcome.OK if s.domain_size[chosen] > 0 else Outcome.CONFLICT), chosen
 
 

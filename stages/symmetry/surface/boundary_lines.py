@@ -74,7 +74,7 @@ def boundary_lines(surface, goes_on):
                 continue
             times, crossed = _crossings(start, way, surface.origin, size, times)
             beyond = start + PROBE_CELLS * size * np.cross(way / length, surface.normals[face])
-            filled = 0
+            filled = np.int64(0)
             for piece in range(crossed - 1):
                 near, far = times[piece], times[piece + 1]
                 if far <= near:

@@ -322,7 +322,7 @@ def propagate(problem, state):
             counts[N_NEWLY_BLOCKED] -= 1
             if not _prune_all_with(state, newly_blocked[counts[N_NEWLY_BLOCKED]]):
                 return Outcome.CONFLICT
-        part, forced = 0, -1
+        part, forced = np.int64(0), -1
         while part < counts[N_GROWN_PARTS] and forced < 0:
             if dirty[part]:
                 forced = _forced(state, part)

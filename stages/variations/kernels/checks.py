@@ -163,7 +163,7 @@ def connect(kit, contacts, ws):
     outcome = _add_contacts(kit, contacts, ws, pairs)
     if outcome != Outcome.OK:
         return outcome
-    return Outcome.OK if _grammar_holds(kit, ws, 0) else Outcome.GRAMMAR
+    return Outcome.OK if _grammar_holds(kit, ws, np.int64(0)) else Outcome.GRAMMAR
 
 
 @numba.njit(cache=True)

@@ -104,7 +104,7 @@ def _enumerate(graph, darts, same, by_docking, violations):
                 meetings += pairs_met * regions
                 if violations > 0:
                     is_whole &= tail < MAX_WAITING
-                    waiting, tail = _wait(waiting, tail, d, e, nowhere)
+                    waiting, tail = _wait(waiting, np.int64(tail), d, e, nowhere)
             lift(graph, over, 0)
     plain, limit, taken = filled[LISTED], over.counts[WORK] + MAX_DUMMY_WORK, 0
     while taken < tail and over.counts[WORK] < limit:
@@ -127,7 +127,7 @@ def _enumerate(graph, darts, same, by_docking, violations):
                     if depth + 1 < violations:
                         is_whole &= tail < MAX_WAITING
                         further = np.concatenate((passed.ravel(), dummy)).reshape((depth + 1, 4))
-                        waiting, tail = _wait(waiting, tail, waiting[taken, 0], waiting[taken, 1], further)
+                        waiting, tail = _wait(waiting, np.int64(tail), waiting[taken, 0], waiting[taken, 1], further)
             lift(graph, over, matched)
             over.counts[DEFECTS] = defects
         lift(graph, over, 0)

@@ -127,7 +127,7 @@ def lay_over(graph, d, e, by_docking, passed, over):
     order is breadth first, so that where a way round leads elsewhere the nearer match stays.
     """
     over.counts[CONFLICTS] = over.counts[DEFECTS] = over.counts[MATCHED] = 0
-    total = _extend(graph, d, e, -1, 0, by_docking, over)
+    total = _extend(graph, d, e, np.int64(-1), np.int64(0), by_docking, over)
     for k in range(len(passed)):
         more = go_on(graph, passed[k], by_docking, over)
         if more == 0:
@@ -165,7 +165,7 @@ def _extend(graph, d, e, side, place, by_docking, over):
                 continue
             back, ahead = graph.twins[x], graph.twins[y]
             if over.partner[back] != ahead:
-                _match(graph, back, ahead, -1, 0, over)
+                _match(graph, back, ahead, np.int64(-1), np.int64(0), over)
     return total
 
 

@@ -91,7 +91,7 @@ def _find_rows(graph, by_docking, over):
 @numba.njit(cache=True)
 def _begin(graph, over):
     """Reach what the rows lead to; return how many nodes were reached."""
-    reached, rows, row_of, lines = 0, over.rows, over.row_of, over.lines
+    reached, rows, row_of, lines = np.int64(0), over.rows, over.row_of, over.lines
     for row in range(over.counts[ROWS]):
         lines[row, LEADER] = row
         lines[row, FIRST] = -1
