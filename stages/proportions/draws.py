@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,11 +36,15 @@ MIN_COMPRESSION = 0.25
 
 @dataclass(frozen=True)
 class DrawnLayout:
-    """A layout of an exemplar with the warps of it that were accepted."""
+    """A layout of an exemplar with the warps of it that were accepted.
+
+    stiff: axes along which lengths stay although there are no changes: an exemplar whose spokes change stays round
+    """
 
     changes: tuple[Change, ...]
     unwarped: Unwarped
     distinct: DistinctWarps
+    stiff: frozenset[int] = frozenset()
 
     def is_new(self, warp: Warp) -> bool:
         """Return whether a warp differs enough from those accepted and, for the exemplar's own layout, from none."""
@@ -93,7 +97,10 @@ def drawn_layouts(
             reject(f"row: {fault}", 1)
             continue
         found.append(DrawnLayout(changes, unwarped, _distinct(unwarped, config)))
-    return found if len(found) >= MIN_OTHER_LAYOUTS else [own, *found]
+    if len(found) >= MIN_OTHER_LAYOUTS:
+        return found
+    turns = [change for layout in found for change in layout.changes if isinstance(change, Turn)]
+    return [replace(own, stiff=frozenset(_stiff_axes(turns))), *found]
 
 
 def _distinct(unwarped: Unwarped, config: ProportionsConfig) -> DistinctWarps:
@@ -112,7 +119,8 @@ def draw_proportions(
     lattice = layout.unwarped.lattice
     warp = lattice.draw(rng, config.log_std, config.max_factor)
     if not layout.changes:
-        return Proportions(exemplar, warp)
+        x, y, z = (np.ones(len(factors)) if axis in layout.stiff else factors for axis, factors in enumerate(warp))
+        return Proportions(exemplar, (x, y, z))
     stiff = _stiff_axes(layout.changes) if rows.size == "keep" and rng.random() >= PLAIN_SHARE else {0, 1, 2}
     x, y, z = (np.ones(len(factors)) if axis in stiff else factors for axis, factors in enumerate(warp))
     warp = x, y, z
