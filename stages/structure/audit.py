@@ -40,7 +40,7 @@ def structure_faults(sample: PackagedSample) -> Iterator[str]:
 def recomputed_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
     """Yield a sentence for a hierarchy or a symmetry that the shape does not have."""
     config = StructureConfig.model_validate(sample.sections.get("structure", {}))
-    language = described_language(sample.record["language"], sample.record["text"])
+    language = described_language(sample.record["language"], sample.record.get("text", ""))
     fields = structure_fields(sample.shape, language, config)
     if HIERARCHY in fields and fields[HIERARCHY] != sample.record[HIERARCHY]:
         yield "its hierarchy is not that of its text"

@@ -177,3 +177,10 @@ def test_damaged_records_are_found(damage: Callable[[dict[str, Any]], object], f
     assert [*AUDIT.faults(sample), *AUDIT.recheck(sample, paths)] == []
     damage(record)
     assert any(fault in sentence for sentence in [*AUDIT.faults(sample), *AUDIT.recheck(sample, paths)])
+
+
+def test_samples_without_a_text_are_rechecked() -> None:
+    shape = plates((0.8, 0.5, 0.7), (-0.8, 0.5, 0.7))
+    paths: Any = None
+    sample = PackagedSample("a", {"language": "kit"}, {}, {}, shape, {})
+    assert list(AUDIT.recheck(sample, paths)) == []
