@@ -4,6 +4,7 @@ App. E)."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from torch.nn.functional import binary_cross_entropy_with_logits
 from eval.engine.table import Cell
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import frame_of, subsample
-from stages.training.recovery.trained import PRETRAINED_FOLDER, find_models
+from stages.training.recovery.trained import PRETRAINED_FOLDER, TrainedRecovery, find_models
 
 FEATURES = ("chair", "points")
 """The pretrained recovery model whose encoder gives the features; it was trained on curve chairs alone."""
@@ -51,7 +52,7 @@ def features_of(clouds: FloatArray, folder: Path = PRETRAINED_FOLDER) -> FloatAr
 
     d: the widths of the encoder's embedding, its maximum and its mean.
     """
-    network = find_models(folder)[0].get(FEATURES)
+    network = _network(folder)
     if network is None:
         return None
     rng = np.random.default_rng(0)
@@ -62,6 +63,12 @@ def features_of(clouds: FloatArray, folder: Path = PRETRAINED_FOLDER) -> FloatAr
             normalized = torch.from_numpy(frame_of(points).normalized(points)[None]).float()
             features.append(network.module.encoder(normalized)[0].double().numpy())
     return np.stack(features)
+
+
+@lru_cache(maxsize=1)
+def _network(folder: Path) -> TrainedRecovery | None:
+    """Return the network of the features, read once: all models of the folder are read to find it."""
+    return find_models(folder)[0].get(FEATURES)
 
 
 def frechet_distance(first: FloatArray, second: FloatArray) -> float:
