@@ -115,7 +115,6 @@ def _inspected(model: Path, folder: Path) -> Iterator[tuple[str, Shape]]:
     config = Path(json.loads(inspected)["files"]["config"])
     for stage in STAGES:
         _run("run", stage, "--config", config, "--out", folder, "--workers", 1)
-    _run("sheets", "--config", config, "--out", folder)
     paths = DatasetPaths(folder, config.stem)
     shapes = {name: ProportionShapes(kit) for name, kit in dataset_kits(paths).items()}
     for stage in STAGES[2:]:
