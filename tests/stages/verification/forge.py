@@ -1,6 +1,6 @@
 """A forger: changes one thing in a finished dataset and updates every checksum, offset and count.
 
-    python -m tests.stages.verification.forge datasets/castle --count 30 --seed 0
+    python -m tests.stages.verification.forge datasets/castle --samples 30 --seed 0
 
 copies the dataset with the files of the work folder that `make verify` needs, applies each forgery to a random sample,
 verifies the copy by `make verify` and by the dataset's own verifier alone, and prints a table of what each finds. It
