@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -131,6 +131,8 @@ class ProportionShapes:
 
 
 def shape_of_text(shapes: ProportionShapes, text: str) -> Shape:
-    """Return the shape of a text. Raises ProportionError."""
+    """Return the shape of a text, with the contacts of the exemplar or of its layout. Raises ProportionError."""
     proportions = read_proportions(text)
-    return shapes.warped(shapes.unwarped(proportions.exemplar, proportions.changes), proportions.warp)
+    unwarped = shapes.unwarped(proportions.exemplar, proportions.changes)
+    shape = shapes.warped(unwarped, proportions.warp)
+    return replace(shape, assembly=replace(shape.assembly, edges=unwarped.assembly.edges))

@@ -67,7 +67,7 @@ def recomputed_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
         if wrong:
             yield f"its json says {name}: {recorded[name]}, and statics {value}"
     if not languages()[sample.record["language"]].graphs:
-        touching = judge.contacts(shape.assembly).tolist()
+        touching = judge.contacts(shape.assembly, sample.record["contact_tolerance"]).tolist()
         if touching != sample.contacts.tolist():
             missing = [pair for pair in touching if pair not in sample.contacts.tolist()]
             named = f"parts {missing[0]} touch and are not" if missing else "parts that do not touch are"

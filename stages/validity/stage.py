@@ -40,21 +40,21 @@ def run_shard(task: Task) -> Outcome:
         judge = judge_of(shape.meshes, shape.up, config)
         # a shape graph defines its contacts; those of a shape made from a text are computed here
         graphs = language_of(sample.producer).graphs
-        known = shape.assembly.edges if graphs else judge.contacts(assembly)
+        touching = collection.decoder.sources[sample.kit].contact_tolerance
+        if not graphs:
+            touching = judge.contact_tolerance(assembly, touching)
+        known = shape.assembly.edges if graphs else judge.contacts(assembly, touching)
         try:
             validity = judge.validity(assembly)
         except ValueError as error:
             raise Rejected("no body to judge", str(error)) from error
-        touching, connected = judge.tolerances(assembly)
-        if graphs:
-            touching = collection.decoder.sources[sample.kit].contact_tolerance
         physics = physical_fields(validity)
         if config.falls:
             physics |= fall_fields(judge.fall(assembly, validity.joints))
         fields = {
             "physics": physics,
             "contact_tolerance": _short(touching),
-            "joint_tolerance": _short(connected),
+            "joint_tolerance": _short(judge.joint_tolerance(assembly)),
         }
         counts.update(name for name in COUNTED_FIELDS if physics.get(name))
         return {

@@ -23,7 +23,7 @@ class Source:
     labels: part labels of its shapes, in a fixed order
     colors: sRGB of each label; if empty, a class has the colour of its first part
     sentence: short description for the card
-    contact_tolerance: for shape graphs, the largest distance of parts in contact, in the units of the shapes
+    contact_tolerance: of a kit, the largest distance of parts in contact, in the units of the shapes
     shares_classes: whether a label is one class with the equal labels of all other sources that share classes
     """
 

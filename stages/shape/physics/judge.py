@@ -24,6 +24,8 @@ NEVER_FALLS_DEGREES = 90.0
 """Tilt in records of a shape that no tilt brings to another height."""
 TIPPING_TOLERANCE_DEGREES = 1e-4
 """A shape that just stands may seem to be this far beyond tipping."""
+TOLERANCE_STEP = 1.25
+"""Factor between the contact tolerances that are tried."""
 
 
 @dataclass(frozen=True)
@@ -111,13 +113,30 @@ class Judge:
         first = int(tilts.argmin())
         return Fall(float(tilts[first]), int((pieces == first).argmax()) if np.isfinite(tilts[first]) else -1)
 
-    def contacts(self, assembly: Assembly) -> IntArray:
+    def contacts(self, assembly: Assembly, tolerance: float = 0.0) -> IntArray:
         """Return the pairs of parts that touch or overlap, int32 (m, 2), i < j in lexicographic order.
 
-        These are the assembly's edges and the pairs at most `config.touching` apart.
+        These are the assembly's edges and the pairs at most `config.touching` or `tolerance` apart.
+
+        tolerance: in the units of the shape
         """
         placed = self._placed(assembly)
-        return self._touch.connected(placed, self.config.touching * placed.diagonal, assembly.edges)
+        return self._touch.connected(placed, max(self.config.touching * placed.diagonal, tolerance), assembly.edges)
+
+    def contact_tolerance(self, assembly: Assembly, tolerance: float) -> float:
+        """Return a distance at which all edges of an assembly are contacts: `contacts` without edges has them all.
+
+        It is the larger one of `config.touching` and `tolerance`, or a multiple of it where edges became longer, as in
+        stretched shapes.
+        """
+        placed = self._placed(assembly)
+        distance = max(self.config.touching * placed.diagonal, tolerance)
+        wanted, none = set(map(tuple, assembly.edges.tolist())), np.empty((0, 2), dtype=np.int32)
+        while wanted and distance < placed.diagonal:
+            if wanted <= set(map(tuple, self._touch.connected(placed, distance, none).tolist())):
+                break
+            distance *= TOLERANCE_STEP
+        return distance
 
     def validity(self, assembly: Assembly) -> Validity:
         """Return the whole verdict. Raises ValueError for a shape without parts, extent or weight."""
@@ -144,10 +163,9 @@ class Judge:
             joints=connected,
         )
 
-    def tolerances(self, assembly: Assembly) -> tuple[float, float]:
-        """Return `config.touching` and `config.connected` in the units of the shape."""
-        diagonal = self._placed(assembly).diagonal
-        return self.config.touching * diagonal, self.config.connected * diagonal
+    def joint_tolerance(self, assembly: Assembly) -> float:
+        """Return `config.connected` in the units of the shape."""
+        return self.config.connected * self._placed(assembly).diagonal
 
     def _placed(self, assembly: Assembly) -> PlacedParts:
         # Several questions follow each other about one assembly.

@@ -8,12 +8,14 @@ from pathlib import Path
 import pytest
 import yaml
 
+from stages.package.reader import Dataset
 from stages.shape.sample import Sample, read_samples
 from tests.command import shapemill
 from tests.stages.proportions.stools import MESHES, STOOL
 from tests.stated import stated
 from tests.toy_kits.chains_and_rings import box, pose, write_model
 
+LOOSE = {"tolerance": 0.01, "kinds": ["point", "line", "face"]}
 STAGES = ("autoconfig", "exemplars", "proportions")
 
 
@@ -63,6 +65,10 @@ def test_rows_of_a_shelf_become_samples_that_verify(tmp_path: Path) -> None:
     run(config, tmp_path / "out", "validity", "points", "sketches", "package")
     code, said = shapemill("verify", "--config", config, "--out", tmp_path / "out")
     assert code == 0, said
+    records = [sample.record for sample in Dataset.open(tmp_path / "out" / "stools")]
+    for record in records:
+        boards = sum(part["name"].startswith("board") for part in record["parts"])
+        assert (record["counts"]["pieces"], record["counts"]["contacts"]) == (1, 2 * boards)
 
 
 def test_every_layout_is_one_shape_where_parts_keep_their_sizes(tmp_path: Path) -> None:
@@ -73,7 +79,8 @@ def test_every_layout_is_one_shape_where_parts_keep_their_sizes(tmp_path: Path) 
 
 
 def write_shelf_config(folder: Path, **rows: object) -> Path:
-    meshes = {"side": box(0.05, 3.6, 0.4), "board": box(0.9, 0.04, 0.4)}
+    """Boards between two sides, 9 mm from each: in contact by the kit's tolerance, not by `validity.touching`."""
+    meshes = {"side": box(0.05, 3.6, 0.4), "board": box(0.882, 0.04, 0.4)}
     boards = [("board", pose(0.0, 0.2 + 0.4 * number, 0.0)) for number in range(8)]
     sides = [("side", pose(x, 1.8, 0.0)) for x in (-0.475, 0.475)]
     shape = write_model(folder / "shelf.glb", meshes, [*sides, *boards])
@@ -82,7 +89,7 @@ def write_shelf_config(folder: Path, **rows: object) -> Path:
         "name": "stools",
         "seed": 3,
         "license": "MIT",
-        "exemplars": {"kits": [stated({"name": "shelf", "shapes": [shape]})]},
+        "exemplars": {"kits": [stated({"name": "shelf", "shapes": [shape], "contact": LOOSE})]},
         "variations": {"samples_per_kit": 0, "rows": {"use": True, **rows}},
         "proportions": {
             "samples_per_kit": 12,
