@@ -57,6 +57,8 @@ def load_dataset(
     context: typer.Context, config: Path, out: Path, seed: int | None = None
 ) -> tuple[dict[str, Stage], Config, DatasetPaths]:
     """Return the stages, the dataset's config, checked by every stage, and its folders. Raises ConfigError."""
+    if out.is_file():
+        raise ConfigError(f"{out} is a file; name a folder to write datasets to with --out or OUT")
     stages = find_stages(context.obj)
     overrides = {} if seed is None else {"seed": seed}
     loaded = load_config(config, {name: stage.config for name, stage in stages.items()}, overrides)

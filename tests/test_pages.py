@@ -143,7 +143,7 @@ def test_finished_dataset_is_read_sample_by_sample(run: Any, tmp_path: Path) -> 
         "points.npy": array_bytes(points),
         "normals.npy": array_bytes(points),
         "labels.npy": array_bytes(labels),
-        "json": json_bytes({"stable": True}),
+        "json": json_bytes({"physics": {"stable": True}}),
     }
     with open(folder / "data/test/a.tar", "wb") as stream, ShardWriter(stream) as writer:
         writer.write("blocks-000003", members)

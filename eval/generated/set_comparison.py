@@ -62,7 +62,8 @@ def comparison_table(
         f"Clouds of {points:,} points, uniform by area. {scale} CD: squared distances, both directions summed. EMD: "
         f"optimal assignment of {emd_points} points. Nearest shapes are the best of {CANDIDATES_PER_SET} candidates. "
         "Both sets have the size of the smaller.",
-        "1-NNA: 50 means that the sets cannot be told apart, 100 that they are separate. COV: share of reference "
+        "1-NNA: 50 means that the sets cannot be told apart, 100 that they are separate, 0 that they are copies; fewer "
+        "than 100 shapes say little. COV: share of reference "
         f"shapes that are nearest to a generated one. JSD: bits, {JSD_CELLS}³ cells. Fréchet: of distances within a "
         "shape and of heights, not of a network. Novel: farther from the reference than "
         f"{NOVELTY_PERCENTILE:g} % of it from each other.",

@@ -151,7 +151,7 @@ class DatasetSample:
 
         return read_views(self.members, self.record.get("views", []))
 
-    def export_views(self, folder: Path) -> None:
+    def export_views(self, folder: Path | str) -> None:
         """Write the images of all views and `transforms.json` into a folder, as NeRF tools read them.
 
         Raises KeyError for a sample without colour images, and ValueError for one with orthographic cameras.
@@ -165,7 +165,7 @@ class DatasetSample:
         colors = [f"color{index}.{suffix}" for index in range(len(cameras))]
         files = {name: content for name, content in self.members.items() if name.endswith(VIEW_SUFFIXES)}
         for name, content in {**files, "transforms.json": transforms_bytes(cameras, colors)}.items():
-            write_file(folder / name, content)
+            write_file(Path(folder) / name, content)
 
     @cached_property
     def captions(self) -> dict[str, str]:

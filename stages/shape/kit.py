@@ -88,7 +88,7 @@ class PartType(PartMesh):
     frame: extremal-point coordinate frame (strings §6) in part coordinates, float64 (4, 4)
     symmetries: rigid transforms that map the part onto itself, the identity first, float64 (k, 4, 4)
     meaning: label that it shares with other surfaces; if empty, its name is its label
-    other_looks: looks that congruent parts have beside its own
+    other_looks: looks that congruent parts have next to its own
     """
 
     frame: FloatArray

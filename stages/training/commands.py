@@ -36,11 +36,15 @@ def train(
     cluster: ClusterOption = "",
 ) -> None:
     """Train the models of a config, after making the samples that they learn from."""
+    from pipeline.errors import ConfigError
     from pipeline.package_groups import require_group
     from pipeline.registry import upstream
+    from stages.training.settings import TrainingConfig
 
     require_group("models")
     stages, loaded, paths = load_dataset(context, config, out, seed)
+    if not loaded.section(TrainingConfig).models:
+        raise ConfigError(f"{config}: has no training.models to train; stages/training/README.md has an example")
     if stages["training"].uses_input(loaded, only):
         samples = [name for name in upstream(stages, "training") if name != "training"]
         run_or_exit(samples, stages, loaded, paths, workers, stall_minutes=stall_timeout, cluster=cluster)

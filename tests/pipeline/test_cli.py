@@ -27,6 +27,12 @@ def test_stages_are_found_by_folder_and_ordered_by_inputs() -> None:
     assert [name for name in stages if name != "salt"] == ["grain", "flour", "bread"]
 
 
+def test_a_file_for_the_datasets_folder_is_refused(tmp_path: Path, write_config: WriteConfig) -> None:
+    (tmp_path / "out").write_text("mine", encoding="utf-8")
+    done = shapemill("run", "--config", write_config(), "--out", tmp_path / "out")
+    assert (done.returncode, "out is a file; name a folder" in done.stderr) == (2, True), done.stderr
+
+
 def test_run_with_nothing_to_make_loads_no_library_of_workers_and_kernels(
     tmp_path: Path, write_config: WriteConfig
 ) -> None:

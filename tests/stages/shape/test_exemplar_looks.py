@@ -26,11 +26,11 @@ from stages.shape.shape import Z_TO_Y, Shape, kit_shape
 from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose
 
 NAMES = ("pepper", "basil", "curry", "thyme")
-JARS = 4
+JARS_PER_SHELF = 4
 SHELF: list[Placed] = [
     ("board", pose(1.5, 0.05, 0.0)),
     ("post", pose(-0.6, 0.6, 0.0)),
-    *(("jar", pose(float(place), 0.3, 0.0)) for place in range(JARS)),
+    *(("jar", pose(float(place), 0.3, 0.0)) for place in range(JARS_PER_SHELF)),
 ]
 
 
@@ -50,7 +50,7 @@ def shelves(count: int = 1) -> Kit:
     exemplars = []
     for number in range(count):
         looks_of = np.zeros(len(exemplar.assembly), np.int16)
-        looks_of[exemplar.assembly.types == jar] = np.arange(JARS)[:: 1 if number == 0 else -1]
+        looks_of[exemplar.assembly.types == jar] = np.arange(JARS_PER_SHELF)[:: 1 if number == 0 else -1]
         assembly = replace(exemplar.assembly, looks=looks_of)
         exemplars.append(Exemplar(f"shelf{number}", assembly, exemplar.part_names))
     return replace(kit, types=tuple(types), exemplars=tuple(exemplars))
@@ -114,10 +114,10 @@ def test_rows_copy_the_looks_of_their_parts() -> None:
         first = int(np.flatnonzero(layout.types == longer.types[jars[0]])[0])
         assert spices(longer.shape(kit)) == [NAMES[part - first] for part in longer.origins[jars].tolist()]
         lengths.add(len(jars))
-    assert max(lengths) > JARS
+    assert max(lengths) > JARS_PER_SHELF
 
 
-def test_jars_outside_of_all_pieces_are_mixed_the_same_way_each_time() -> None:
+def test_jars_outside_of_all_pieces_are_always_mixed_in_the_same_way() -> None:
     kit = shelves()
     jar = kit.type_names().index("jar")
     poses = np.tile(np.eye(4), (12, 1, 1))
@@ -163,7 +163,9 @@ def test_a_wall_of_many_equal_bricks_is_found_again_in_moderate_time() -> None:
     poses = np.tile(np.eye(4), (400, 1, 1))
     poses[:, 0, 3], poses[:, 1, 3] = np.arange(400) % 20, np.arange(400) // 20
     no_edges = np.empty((0, 2), np.int32)
-    wall = Assembly(np.full(400, jar, np.int16), poses, no_edges, looks=rng.integers(0, JARS, 400).astype(np.int16))
+    wall = Assembly(
+        np.full(400, jar, np.int16), poses, no_edges, looks=rng.integers(0, JARS_PER_SHELF, 400).astype(np.int16)
+    )
     kit = replace(kit, exemplars=(Exemplar("wall", wall, ("brick",) * 400),))
     start = time.process_time()
     found = exemplar_looks(kit, without_looks(wall))
