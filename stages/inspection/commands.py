@@ -115,7 +115,9 @@ def inspect(
         return
     print(*observation_lines(observation, report.config), "", sep="\n")
     _print_rows(report.lines())
-    _print_rows(write_report_files(folder, paths, report))
+    with ticking("inspect", "drawing the sheets"):
+        written_rows = list(write_report_files(folder, paths, report))
+    _print_rows(written_rows)
     if len(read) == 1 and may_have_grammar(read[0], parts):
         _print_rows(write_grammar_report(folder, name, paths[0], report.config.resolved().up, limits))
 

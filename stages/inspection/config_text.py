@@ -40,6 +40,7 @@ def config_text(
     reasons: Mapping[str, str],
     section: Sequence[str],
     estimate: str,
+    is_refused: bool = False,
 ) -> str:
     """Return the YAML of a dataset of one kit.
 
@@ -47,7 +48,9 @@ def config_text(
     reasons: by key.
     section: the lines of the section that says what is made of the kit.
     estimate: the yield estimate, a sentence.
+    is_refused: whether a run refuses the models.
     """
+    state = "change the models first" if is_refused else "ready for `make dataset CONFIG=` this file"
     settings, keep = config.resolved(), config.appearance.keep
     segmentation = ", ".join(dict.fromkeys(model.segmentation for model in models))
     why = "; ".join(dict.fromkeys(model.why for model in models))
@@ -69,7 +72,7 @@ def config_text(
         (3, "disconnected", settings.disconnected, reasons.get("disconnected", "")),
     ]
     lines = [
-        "# Written by `make inspect`; ready for `make dataset CONFIG=` this file. Every key is in configs/README.md.",
+        f"# Written by `make inspect`; {state}. Every key is in configs/README.md.",
         f"# Expected: {estimate}.",
         f"name: {name}",
         "seed: 1",

@@ -40,7 +40,9 @@ def write_report_files(folder: Path, paths: Sequence[Path], report: InspectionRe
         require = {key: resolution.values[key] for key in REQUIREMENT_KEYS}
         layouts = report.layouts.layouts if report.layouts is not None else 0
         section = variations_section(report.config, resolution.reasons, require, layouts)
-    text = config_text(name, report.config, report.models, resolution.reasons, section, report.sentence)
+    text = config_text(
+        name, report.config, report.models, resolution.reasons, section, report.sentence, bool(report.built.refusals)
+    )
     yield "config", write_file(folder / f"{name}.yaml", text.encode())
 
 

@@ -36,6 +36,8 @@ def test_config_of_resized_exemplars_asks_for_no_layouts_and_says_why(has_rows: 
     shapes = [ring(1, 1)]
     lines = proportions_section(90, True, "it does", "nothing: every part is its own type", has_rows)
     text = config_text("toy", config_of(shapes), models_of(ROAD, shapes), {}, lines, "hundreds")
+    refused = config_text("toy", config_of(shapes), models_of(ROAD, shapes), {}, lines, "nothing", is_refused=True)
+    assert ("ready for `make dataset" in text, "ready for" in refused) == (True, False)
     written = yaml.safe_load(text)
     assert written["variations"] == {"samples_per_kit": 0, **({"rows": {"use": True}} if has_rows else {})}
     assert written["proportions"] == {"samples_per_kit": 90, "require": {"stable": True}}
