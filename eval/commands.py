@@ -50,7 +50,7 @@ def make_tables(
 
     values = read_settings(settings or ())
     if files:
-        print_table_of_files(table, files, out, values)
+        print_table_of_files(table, files, out, values, workers)
         return
     run = load_dataset_run(config, out, workers)
     if table == ALL_TABLES:

@@ -90,12 +90,14 @@ def table_options(name: str, model: type[StrictModel], values: Mapping[str, obje
         raise ConfigError(f"{name}: {wrong}; {known}") from error
 
 
-def print_table_of_files(name: str, files: Sequence[Path], out: Path, values: Mapping[str, object]) -> None:
+def print_table_of_files(
+    name: str, files: Sequence[Path], out: Path, values: Mapping[str, object], workers: int
+) -> None:
     """Print a table about files; keep only its figures, in `OUT/eval`. Raises ConfigError if it is not about files."""
     table = find_table(name)
     if table.compute_from_files is None:
         raise ConfigError(f"{name} is a table about datasets, not about files; leave out {files[0]}")
-    result = table.compute_from_files(files, table_options(name, table.options, values))
+    result = table.compute_from_files(files, table_options(name, table.options, values), workers)
     print(markdown(result), end="")
     for figure in result.figures:
         print(f"\n{figure.title}: {write_file(out / 'eval' / f'{name}_{figure.name}.png', figure.png)}")

@@ -76,8 +76,8 @@ class Evaluation:
     """On one core."""
     compute: Callable[[DatasetRun, Any], TableResult]
     """From a run that meets all requirements, and the options."""
-    compute_from_files: Callable[[Sequence[Path], Any], TableResult] | None = None
-    """From files instead of a dataset."""
+    compute_from_files: Callable[[Sequence[Path], Any, int], TableResult] | None = None
+    """From files instead of a dataset, the options, and the number of worker processes."""
     options: type[StrictModel] = NoOptions
     in_report: bool = True
     """Whether the report of all tables has it; a table that takes longer than the others together is made alone."""

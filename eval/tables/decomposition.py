@@ -28,7 +28,7 @@ def _compute(run: DatasetRun, options: DecompositionOptions) -> TableResult:
     raise ConfigError(f"this table takes {FILES}")
 
 
-def _compute_from_files(paths: Sequence[Path], options: DecompositionOptions) -> TableResult:
+def _compute_from_files(paths: Sequence[Path], options: DecompositionOptions, _: int) -> TableResult:
     from eval.engine.shapes import model_kits
     from eval.grammars.decomposition import decomposition_table
     from eval.grammars.grammar_recall import grammar_table

@@ -12,7 +12,6 @@ from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import Evaluation, TableResult
 from eval.engine.requirements import FINISHED_DATASET
 from pipeline.config import StrictModel
-from pipeline.options import DEFAULT_WORKERS
 
 if TYPE_CHECKING:
     from stages.shape.arrays import FloatArray
@@ -42,14 +41,14 @@ def _compute(run: DatasetRun, options: GenerationOptions) -> TableResult:
     return _compared(names, sets, options, run.workers)
 
 
-def _compute_from_files(paths: Sequence[Path], options: GenerationOptions) -> TableResult:
+def _compute_from_files(paths: Sequence[Path], options: GenerationOptions, workers: int) -> TableResult:
     from eval.generated.shape_sets import clouds_of_path
     from pipeline.errors import ConfigError
 
     if len(paths) != 2:
         raise ConfigError(f"generation compares two sets, such as generated/ and reference/; got {len(paths)}")
     sets = [clouds_of_path(path, options.max_shapes, options.points) for path in paths]
-    return _compared([path.name for path in paths], sets, options, DEFAULT_WORKERS)
+    return _compared([path.name for path in paths], sets, options, workers)
 
 
 def _compared(

@@ -42,7 +42,7 @@ def _compute(run: DatasetRun, options: PhysicalOptions) -> TableResult:
     return TableResult([table], [_margins(results)], [weakest])
 
 
-def _compute_from_files(paths: Sequence[Path], options: PhysicalOptions) -> TableResult:
+def _compute_from_files(paths: Sequence[Path], options: PhysicalOptions, _: int) -> TableResult:
     from eval.dataset.physical_validity import PUBLISHED, judge_by_name, physical_table
     from eval.engine.shapes import box_shapes, model_shapes
     from stages.shape.physics.settings import PhysicsConfig

@@ -29,7 +29,7 @@ def _compute(run: DatasetRun, options: RadiusSweepOptions) -> TableResult:
     raise ConfigError(f"this table takes {FILES}")
 
 
-def _compute_from_files(paths: Sequence[Path], options: RadiusSweepOptions) -> TableResult:
+def _compute_from_files(paths: Sequence[Path], options: RadiusSweepOptions, _: int) -> TableResult:
     from eval.grammars.radius_sweep import extractions, radius_figure, radius_table
     from stages.grammars.settings import MAX_RADIUS_SHARE, MIN_RADIUS_SHARE
 

@@ -56,7 +56,7 @@ def _exemplars(run: DatasetRun) -> dict[str, list[FloatArray]]:
     return triangles
 
 
-def _compute_from_files(paths: Sequence[Path], options: SimilarityOptions) -> TableResult:
+def _compute_from_files(paths: Sequence[Path], options: SimilarityOptions, _: int) -> TableResult:
     from eval.engine.shapes import model_shapes
     from eval.grammars.similarity import similarity_row, similarity_table, triangles_of
     from pipeline.errors import ConfigError

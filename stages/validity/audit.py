@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -67,7 +68,11 @@ def recomputed_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
         if wrong:
             yield f"its json says {name}: {recorded[name]}, and statics {value}"
     if not languages()[sample.record["language"]].graphs:
-        touching = judge.contacts(shape.assembly, sample.record["contact_tolerance"]).tolist()
+        alone = replace(shape.assembly, edges=np.empty((0, 2), dtype=np.int32))
+        touching = judge.contacts(alone, sample.record["contact_tolerance"]).tolist()
+        lost = [pair for pair in shape.assembly.edges.tolist() if pair not in touching]
+        if lost:
+            yield f"parts {lost[0]} keep a contact and are farther apart than its contact tolerance"
         if touching != sample.contacts.tolist():
             missing = [pair for pair in touching if pair not in sample.contacts.tolist()]
             named = f"parts {missing[0]} touch and are not" if missing else "parts that do not touch are"

@@ -39,11 +39,9 @@ def run_shard(task: Task) -> Outcome:
         assembly = replace(shape.assembly, poses=rounded(shape.assembly.poses))
         judge = judge_of(shape.meshes, shape.up, config)
         # a shape graph defines its contacts; those of a shape made from a text are computed here
-        graphs = language_of(sample.producer).graphs
-        touching = collection.decoder.sources[sample.kit].contact_tolerance
-        if not graphs:
-            touching = judge.contact_tolerance(assembly, touching)
-        known = shape.assembly.edges if graphs else judge.contacts(assembly, touching)
+        known, touching = shape.assembly.edges, collection.decoder.sources[sample.kit].contact_tolerance
+        if not language_of(sample.producer).graphs:
+            known, touching = judge.kept_contacts(assembly, touching)
         try:
             validity = judge.validity(assembly)
         except ValueError as error:

@@ -123,20 +123,20 @@ class Judge:
         placed = self._placed(assembly)
         return self._touch.connected(placed, max(self.config.touching * placed.diagonal, tolerance), assembly.edges)
 
-    def contact_tolerance(self, assembly: Assembly, tolerance: float) -> float:
-        """Return a distance at which all edges of an assembly are contacts: `contacts` without edges has them all.
+    def kept_contacts(self, assembly: Assembly, tolerance: float) -> tuple[IntArray, float]:
+        """Return the contacts of an assembly at a distance at which all its edges are contacts, and that distance.
 
         It is the larger one of `config.touching` and `tolerance`, or a multiple of it where edges became longer, as in
         stretched shapes.
         """
         placed = self._placed(assembly)
         distance = max(self.config.touching * placed.diagonal, tolerance)
-        wanted, none = set(map(tuple, assembly.edges.tolist())), np.empty((0, 2), dtype=np.int32)
-        while wanted and distance < placed.diagonal:
-            if wanted <= set(map(tuple, self._touch.connected(placed, distance, none).tolist())):
-                break
+        wanted, no_edges = set(map(tuple, assembly.edges.tolist())), np.empty((0, 2), dtype=np.int32)
+        while True:
+            found = self._touch.connected(placed, distance, no_edges)
+            if distance >= placed.diagonal or wanted <= set(map(tuple, found.tolist())):
+                return found, distance
             distance *= TOLERANCE_STEP
-        return distance
 
     def validity(self, assembly: Assembly) -> Validity:
         """Return the whole verdict. Raises ValueError for a shape without parts, extent or weight."""

@@ -9,6 +9,7 @@ import numpy as np
 import trimesh
 
 from stages.rows.layout import Layout, layout_of
+from stages.shape.arrays import FloatArray
 from stages.shape.kit import Kit
 from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose
 
@@ -172,30 +173,35 @@ def mirrored_row(pairs: int = 3) -> tuple[Kit, Layout]:
     return layout(meshes, [("bar", pose(pairs * 1.0, -0.05, 0.0)), *brackets])
 
 
+def turns_about_y(count: int) -> list[FloatArray]:
+    """Rotations (4, 4) by equal angles."""
+    return [trimesh.transformations.rotation_matrix(2 * np.pi * number / count, [0, 1, 0]) for number in range(count)]
+
+
+def round_plate(radius: float) -> trimesh.Trimesh:
+    """A plate of height 0.1 that lies level."""
+    upright = trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0])
+    return trimesh.creation.cylinder(radius, 0.1, sections=64).apply_transform(upright)
+
+
 @cache
 def round_temple(columns: int = 8) -> tuple[Kit, Layout]:
     """Columns, each with a base, between two round plates."""
-    turns = [trimesh.transformations.rotation_matrix(2 * np.pi * number / columns, [0, 1, 0]) for number in
-             range(columns)]  # fmt: skip
-    plate = trimesh.creation.cylinder(1.2, 0.1, sections=64).apply_transform(
-        trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0])
-    )
-    standing = [(name, turn @ pose(1.0, y, 0.0)) for turn in turns for name, y in (("base", 0.1), ("column", 0.65))]
-    meshes = {"plate": plate, "base": box(0.3, 0.1, 0.2), "column": box(0.2, 1.0, 0.1)}
+    standing = [
+        (name, turn @ pose(1.0, y, 0.0))
+        for turn in turns_about_y(columns)
+        for name, y in (("base", 0.1), ("column", 0.65))
+    ]
+    meshes = {"plate": round_plate(1.2), "base": box(0.3, 0.1, 0.2), "column": box(0.2, 1.0, 0.1)}
     return layout(meshes, [("plate", pose(0.0, 0.0, 0.0)), ("plate", pose(0.0, 1.2, 0.0)), *standing])
 
 
 @cache
 def fan(blades: int = 3) -> tuple[Kit, Layout]:
     """Blades on a round plate, each with two screws."""
-    turns = [trimesh.transformations.rotation_matrix(2 * np.pi * number / blades, [0, 1, 0]) for number in
-             range(blades)]  # fmt: skip
-    plate = trimesh.creation.cylinder(0.5, 0.1, sections=64).apply_transform(
-        trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0])
-    )
-    meshes = {"plate": plate, "blade": box(1.0, 0.05, 0.2), "screw": box(0.04, 0.02, 0.03)}
+    meshes = {"plate": round_plate(0.5), "blade": box(1.0, 0.05, 0.2), "screw": box(0.04, 0.02, 0.03)}
     of_blade = (("blade", 0.9, 0.075, 0.0), ("screw", 0.6, 0.11, 0.05), ("screw", 0.6, 0.11, -0.05))
-    held = [(name, turn @ pose(x, y, z)) for turn in turns for name, x, y, z in of_blade]
+    held = [(name, turn @ pose(x, y, z)) for turn in turns_about_y(blades) for name, x, y, z in of_blade]
     return layout(meshes, [("plate", pose(0.0, 0.0, 0.0)), *held])
 
 
