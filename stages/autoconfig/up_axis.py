@@ -30,6 +30,8 @@ MIN_FOOT_AREA, MIN_MIRROR_DISTANCE = 3e-3, 2e-3
 """Noise levels of feet and of distances, as shares of a model's size (squared, for feet)."""
 GLTF_SUFFIXES = (".glb", ".gltf")
 GLTF_REASON = "glTF is y up by its specification"
+WRITERS_THAT_KEEP_AXES = ("trimesh",)
+"""Programs that write coordinates to glTF as they were given, without a turn to y up; found in the stated generator."""
 MIN_EVIDENCE = 0.1
 """Sum of log odds from which the evidence decides."""
 MIN_EVIDENCE_AGAINST_GLTF = 1.5
@@ -57,7 +59,8 @@ def resolve_up_axis(models: Sequence[Model], identified: IdentifiedParts) -> tup
     """Return the axis that points up in `models`, whose parts are `identified`, and the reason as a sentence.
 
     A format in which a file states its axis is believed (COLLADA). glTF is y up by its specification, which only strong
-    evidence from the shapes overrules; the reason then says how to overrule it back. Other formats say nothing.
+    evidence from the shapes overrules; the reason then says how to overrule it back. Other formats say nothing, and so
+    does glTF by WRITERS_THAT_KEEP_AXES: of 29 such models 13 are z up.
 
     Four kinds of evidence are weighed. Would the models fall over, their centre not being above the hull of their
     lowest points? Along which axis is the foot larger? Along which axis do the models differ more from their mirror
@@ -71,13 +74,13 @@ def resolve_up_axis(models: Sequence[Model], identified: IdentifiedParts) -> tup
             return axis_in_file, "the file states it"
     evidence = list(map(_evidence, models))
     odds = {reason: float(np.mean([of_model[reason] for of_model in evidence])) for reason in REASONS}
-    if all(model.path.suffix.lower() in GLTF_SUFFIXES for model in models):
+    if all(_is_turned_to_y(model) for model in models):
         return _axis_of_gltf(odds)
     total = sum(odds.values())
     if abs(total) >= MIN_EVIDENCE:
         sign = 1.0 if total > 0 else -1.0
         strongest = max(REASONS, key=lambda reason: sign * odds[reason])
-        return ("y" if sign > 0 else "z"), REASONS[strongest]
+        return ("y" if sign > 0 else "z"), REASONS[strongest] + _unturned(models)
     turns = _turns(identified)
     for axis, index in _AXES.items():
         if turns[index] > MIN_TURN_MAJORITY * (turns[1] + turns[2]):
@@ -94,6 +97,18 @@ def _axis_of_gltf(odds: Mapping[str, float]) -> tuple[Literal["y", "z"], str]:
         return "y", f"{GLTF_REASON}; set `up: z` if the model lies on its side"
     strongest = REASONS[min(odds, key=lambda reason: odds[reason])]
     return "z", f"{strongest}, although {GLTF_REASON}; set `up: y` to keep to it"
+
+
+def _unturned(models: Sequence[Model]) -> str:
+    """Return why the specification of glTF was not asked, as the end of a sentence."""
+    kept = [writer for writer in WRITERS_THAT_KEEP_AXES if any(writer in model.writer for model in models)]
+    return f"; {kept[0]} wrote the file, which does not turn models to y up" if kept else ""
+
+
+def _is_turned_to_y(model: Model) -> bool:
+    """Return whether a model is a glTF file of a program that turns models to y up."""
+    is_gltf = model.path.suffix.lower() in GLTF_SUFFIXES
+    return is_gltf and not any(writer in model.writer for writer in WRITERS_THAT_KEEP_AXES)
 
 
 def _evidence(model: Model) -> dict[str, float]:

@@ -52,6 +52,7 @@ class Model:
     up: the axis that points up as the file states it, if its format lets files choose.
     unit: metres of one unit of the coordinates, if the format or the file says.
     nodes: the node tree, parents before their children; empty for formats without one.
+    writer: the program that wrote the file, as the file states it, else empty.
     """
 
     path: Path
@@ -62,6 +63,7 @@ class Model:
     up: Literal["y", "z"] | None = None
     unit: float | None = None
     nodes: tuple[SceneNode, ...] = ()
+    writer: str = ""
 
     @property
     def shows_more_than_colors(self) -> bool:
@@ -95,6 +97,7 @@ def pack_model(model: Model) -> bytes:
         model.up,
         model.unit,
         model.nodes,
+        writer=model.writer,
     )
     return pack_scene(scene, segmentation=model.segmentation, why=model.why)
 
@@ -114,5 +117,6 @@ def unpack_model(path: Path, content: bytes) -> Model:
         for part, mesh in ((placement, meshes[placement.surface]) for placement in scene.placements)
     ]
     return Model(
-        *(path, tuple(parts), stated["segmentation"], stated["why"], scene.warnings, scene.up, scene.unit, scene.nodes)
+        *(path, tuple(parts), stated["segmentation"], stated["why"], scene.warnings, scene.up, scene.unit, scene.nodes),
+        writer=scene.writer,
     )

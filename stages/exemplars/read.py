@@ -91,7 +91,8 @@ def parse_parts(
     check_size(path, segmented, limits)
     parts, warnings = rigid_parts(path, segmented)
     return Model(
-        path, parts, source, why, first_warnings([*scene.warnings, *warnings]), scene.up, scene.unit, scene.nodes
+        *(path, parts, source, why, first_warnings([*scene.warnings, *warnings])),
+        *(scene.up, scene.unit, scene.nodes, scene.writer),
     )
 
 

@@ -102,6 +102,7 @@ class _Reader:
             unit=1.0,
             nodes=tuple(self.tree),
             not_kept=tuple(dict.fromkeys(self.not_kept)),
+            writer=str(self.header.get("asset", {}).get("generator", "")),
         )
 
     def walk(self) -> Iterator[tuple[int, FloatArray, int]]:

@@ -48,6 +48,7 @@ def pack_scene(scene: ModelScene, **more: Any) -> bytes:
         "unit": scene.unit,
         "nodes": [[node.name, node.parent] for node in scene.nodes],
         "not_kept": scene.not_kept,
+        "writer": scene.writer,
         "more": more,
     }
     no_material, no_paint = np.empty(0, np.int32), np.empty((0, 3), np.uint8)
@@ -146,6 +147,7 @@ def unpack_scene(content: bytes) -> tuple[ModelScene, dict[str, Any]]:
         header["unit"],
         nodes,
         tuple(header["not_kept"]),
+        header["writer"],
     )
     return scene, header["more"]
 

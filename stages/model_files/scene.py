@@ -99,6 +99,7 @@ class ModelScene:
     unit: metres of one unit of the coordinates, if the format or the file says; DAE files are converted to metres.
     nodes: the node tree, parents before their children; empty for formats without one.
     not_kept: what materials of the file have that no appearance holds, a sentence each.
+    writer: the program that wrote the file, as the file states it, else empty.
     """
 
     kind: Literal["nodes", "objects"]
@@ -109,6 +110,7 @@ class ModelScene:
     unit: float | None = None
     nodes: tuple[SceneNode, ...] = ()
     not_kept: tuple[str, ...] = ()
+    writer: str = ""
 
 
 def type_label(name: str) -> str:

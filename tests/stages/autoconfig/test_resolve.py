@@ -91,6 +91,16 @@ class TestUpAxis:
         axis, reason = resolve_up_axis(models, identify_parts(models, config_of([shape])))
         assert (axis, "set `up: y` to keep to it" in reason) == ("z", True)
 
+    def test_specification_of_gltf_says_nothing_of_files_of_trimesh(self) -> None:
+        shape = turned(ring(2, 3))
+        models = models_of(ROAD, [shape])
+        axes = []
+        for writer in ("https://github.com/mikedh/trimesh", "Khronos glTF Blender I/O v4.2.57"):
+            written = [replace(model, writer=writer) for model in models]
+            axes.append(resolve_up_axis(written, identify_parts(written, config_of([shape]))))
+        assert [axis for axis, _ in axes] == ["z", "y"]
+        assert "trimesh wrote the file, which does not turn models" in axes[0][1]
+
     def test_axis_stated_by_the_file_is_believed(self) -> None:
         models = [replace(model, up="z") for model in models_of(ROAD, [ring(2, 3)])]
         assert resolve_up_axis(models, identify_parts(models, config_of([ring(2, 3)]))) == ("z", "the file states it")

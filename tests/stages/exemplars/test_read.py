@@ -93,6 +93,7 @@ class TestFormats:
         model = read_parts(tmp_path / "m.glb")
         check_boxes(model)
         assert [part.name for part in model.parts] == list(BOXES)
+        assert "trimesh" in model.writer
 
     def test_obj_gives_its_objects(self, tmp_path: Path) -> None:
         model = read_parts(write_obj(tmp_path / "m.obj", BOXES))
