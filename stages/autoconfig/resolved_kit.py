@@ -10,6 +10,7 @@ from pipeline.errors import ConfigError
 from stages.autoconfig.resolve import Resolution, resolve_settings
 from stages.autoconfig.yield_estimate import YieldEstimate, estimate_yield
 from stages.exemplars.build import Observation, observe_parts
+from stages.exemplars.diagnostics import single_part_refusal
 from stages.exemplars.identify import IdentifiedParts, identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.read import read_parts
@@ -59,9 +60,15 @@ class ResolvedKit:
 
 
 def read_and_resolve(config: KitConfig, limits: ReadLimits, tries: int, require: Sequence[str]) -> ResolvedKit:
-    """Read the models of a kit and resolve its `auto` keys, as `resolve_settings` and `use_sections_if_empty` do."""
+    """Read the models of a kit and resolve its `auto` keys, as `resolve_settings` and `use_sections_if_empty` do.
+
+    Raises ConfigError before any search for models of one part that sections cannot cut.
+    """
     texture_size = config.appearance.kept_texture_size
     models = [read_parts(shape.path, config.parts, limits, config.units, texture_size) for shape in config.shapes]
+    single = [model for model in models if len(model.parts) < 2 and not model.why.endswith(NOT_CUT)]
+    if single:
+        raise ConfigError("\n".join(map(single_part_refusal, single)))
     return resolve_models(config, models, limits, tries, require)
 
 

@@ -62,11 +62,7 @@ def refusals(
     for model, exemplar in zip(models, kit.exemplars, strict=True):
         assembly = exemplar.assembly
         if len(model.parts) < 2:
-            mend = "set `parts: auto`, or " if model.why == STATED_IN_CONFIG else ""
-            yield (
-                f"{model.path}: has {len(model.parts)} part by {model.segmentation} ({model.why}), an exemplar needs "
-                f"at least 2; {mend}split the model into one scene node a part in the modelling tool"
-            )
+            yield single_part_refusal(model)
         elif connected_pieces(assembly).any():
             without = f" without its hubs {listed_names(hub_names)}" if hub_names else ""
             yield f"{model.path}: the exemplar{without} falls into {_falls_apart(kit, exemplar, tolerance)}"
@@ -84,6 +80,16 @@ def refusals(
                 "make it a kit of its own, set `types: meaning` if its parts have the same names, or raise "
                 "`congruence_tolerance` if they are meant to be alike"
             )
+
+
+def single_part_refusal(model: Model) -> str:
+    """Say why a model of fewer than two parts is no exemplar, and what helps."""
+    mend = "set `parts: auto`, " if model.why == STATED_IN_CONFIG else ""
+    return (
+        f"{model.path}: has {len(model.parts)} part by {model.segmentation} ({model.why}), an exemplar needs "
+        f"at least 2; {mend}split the model into one scene node a part in the modelling tool, or name it in the "
+        "section `grammars`, which needs no parts (configs/sections/grammars.md)"
+    )
 
 
 def kit_warnings(kit: Kit) -> Iterator[str]:

@@ -13,7 +13,7 @@ import pytest
 from pipeline.errors import ConfigError
 from stages.autoconfig import resolved_kit
 from stages.autoconfig.resolve import Resolution
-from stages.autoconfig.resolved_kit import ResolvedKit, use_sections_if_empty
+from stages.autoconfig.resolved_kit import ResolvedKit, read_and_resolve, use_sections_if_empty
 from stages.autoconfig.trial_search import TrialResult
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
@@ -21,7 +21,7 @@ from stages.exemplars.segmentation import NOT_CUT
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig
 from stages.model_files.limits import ReadLimits
 from stages.shape.kit import Kit
-from tests.toy_kits.chains_and_rings import CHAIN, Placed, chain, models_of
+from tests.toy_kits.chains_and_rings import CHAIN, Placed, chain, models_of, write_model
 
 LUMP: list[Placed] = chain(2)[1:2]
 
@@ -83,7 +83,6 @@ def test_mesh_without_results_is_cut_into_sections_under_the_strictest_rules(
 def test_parts_with_results_or_by_the_author_are_not_cut(searched: list[KitConfig], changed: dict[str, Any]) -> None:
     first = read_first(**changed)
     assert cut(first) is first
-    assert not searched
 
 
 def test_mesh_whose_cut_by_symmetry_failed_is_cut_into_sections(searched: list[KitConfig]) -> None:
@@ -97,7 +96,6 @@ def test_sections_without_repeats_are_not_searched(searched: list[KitConfig], mo
     monkeypatch.setattr(resolved_kit, "read_parts", lambda *_: models_of(CHAIN, [chain(1)[:2]])[0])
     first = read_first()
     assert cut(first) is first
-    assert not searched
 
 
 def test_impossible_or_useless_sections_change_nothing(
@@ -147,3 +145,11 @@ def test_observation_is_cached_by_values() -> None:
     built = first.observe(values)
     assert first.observe(dict(values)) is built
     assert first.observe({**values, "up": "z"}) is not built
+
+
+def test_model_of_one_part_is_refused_before_a_search(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(resolved_kit, "resolve_settings", lambda *_: pytest.fail("searched"))
+    lump = write_model(tmp_path / "lump.glb", CHAIN, LUMP)
+    config = KitConfig(name="toy", shapes=(Path(lump),), parts="nodes")
+    with pytest.raises(ConfigError, match=r"lump\.glb: has 1 part by nodes .*; set `parts: auto`, split .* `grammars`"):
+        read_and_resolve(config, ReadLimits(), 10, ())
