@@ -30,7 +30,7 @@ SEED    ?=
 STALL_TIMEOUT ?=
 ## CLUSTER  scheduler of a cluster whose workers make the shards, tcp://...; WORKERS of this machine if empty
 CLUSTER ?=
-## MESH     a model, or several of one kit, for `make inspect`; these or a folder of them for `make dataset`
+## MESH     a model, or several of one kit, for `make inspect`; these or a folder for `make dataset` and some tables
 MESH    ?=
 ## PROGRAM  shape program for `make inspect` and `recover`: a name, such as chair, or a module
 PROGRAM ?=
@@ -174,7 +174,7 @@ inspect: setup  ## Show what can be made of MESH and write a config for it, or w
 	@[ -z "$$PROGRAM" ] || $(SHAPEMILL) programs inspect --out "$$OUT/inspect" -- "$$PROGRAM"
 	@[ -z "$$MESH" ] || $(SHAPEMILL) inspect --out "$$OUT/inspect" -- "$$MESH"
 eval: setup-models  ## Print TABLE about the finished dataset and keep it; all: every table, and a report; empty: list them
-	@$(SHAPEMILL) eval $(DATASET) --workers "$$WORKERS" -- "$$TABLE"
+	@$(SHAPEMILL) eval $(DATASET) --workers "$$WORKERS" -- "$$TABLE" $${MESH:+"$$MESH"}
 paper: setup-models  ## Make what the tables and figures of PAPER need at SCALE, and one report of them
 	@$(SHAPEMILL) paper --scale "$$SCALE" --out "$$OUT" --workers "$$WORKERS" -- "$$PAPER"
 cluster: setup-cluster  ## Start a cluster of WORKERS workers on this machine, and print the CLUSTER of its scheduler

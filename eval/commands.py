@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -25,7 +24,7 @@ COMMANDS = typer.Typer()
 @COMMANDS.command("eval", rich_help_panel=EVALUATION)
 def make_tables(
     table: Annotated[str, typer.Argument(help="its name, or all; without, tables are listed")] = "",
-    files: Annotated[list[Path] | None, typer.Argument(help="models or boxes instead of the dataset")] = None,
+    files: Annotated[list[str] | None, typer.Argument(help="models or boxes instead of the dataset")] = None,
     settings: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="option of a table")] = None,
     config: ConfigOption = DEFAULT_CONFIG,
     out: OutOption = DEFAULT_OUT,
@@ -47,10 +46,12 @@ def make_tables(
         print_table_of_files,
         read_settings,
     )
+    from stages.inspection.files import model_paths
 
     values = read_settings(settings or ())
     if files:
-        print_table_of_files(table, files, out, values, workers)
+        paths = [path for text in files for path in model_paths(text)]
+        print_table_of_files(table, paths, out, values, workers)
         return
     run = load_dataset_run(config, out, workers)
     if table == ALL_TABLES:

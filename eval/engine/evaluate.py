@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import Evaluation, TableResult
-from eval.engine.registry import find_tables
+from eval.engine.registry import read_tables
 from pipeline.config import StrictModel, nearest_word
 from pipeline.errors import ConfigError
 from pipeline.paths import write_file
@@ -24,8 +24,11 @@ REPORT_FILE = "report.html"
 
 
 def list_tables(run: DatasetRun) -> str:
-    """Describe every table: its question, its options, and what is missing or how long it takes."""
-    tables = find_tables()
+    """Describe every table: its question, its options, and what is missing or how long it takes.
+
+    A table whose file cannot be read has a line that says why.
+    """
+    tables, faults = read_tables()
     dataset = f"{run.folder}, {run.samples:,} shapes" if run.manifest else f"nothing in {run.folder} yet"
     lines = [f"Tables about {run.config.name} ({dataset}):", ""]
     width = max(map(len, tables)) + 2
@@ -42,6 +45,7 @@ def list_tables(run: DatasetRun) -> str:
         if table.options.model_fields:
             lines.append(f"  {'':<{width}}options: {_options_text(table.options)}")
         lines.append("")
+    lines += [f"  {name:<{width}}cannot be read: {fault}\n" for name, fault in faults.items()]
     lines.append(f"make eval TABLE=<name> prints one; TABLE={ALL_TABLES} makes all that can be made, and {REPORT_FILE}")
     return "\n".join(lines) + "\n"
 
@@ -58,8 +62,10 @@ def _options_text(model: type[StrictModel]) -> str:
 
 
 def find_table(name: str) -> Evaluation:
-    """Return a table by name. Raises ConfigError with the nearest name for an unknown one."""
-    tables = find_tables()
+    """Return a table by name. Raises ConfigError for a file that cannot be read, and for an unknown name."""
+    tables, faults = read_tables()
+    if name in faults:
+        raise ConfigError(f"table {name} cannot be read: {faults[name]}")
     if name not in tables:
         close = nearest_word(name, tables)
         raise ConfigError(f"there is no table {name}; " + (f"did you mean {close}?" if close else ", ".join(tables)))
@@ -94,9 +100,13 @@ def print_table_of_files(
     name: str, files: Sequence[Path], out: Path, values: Mapping[str, object], workers: int
 ) -> None:
     """Print a table about files; keep only its figures, in `OUT/eval`. Raises ConfigError if it is not about files."""
+    about_files = [known for known, table in read_tables()[0].items() if table.compute_from_files]
+    remedy = f"leave out {files[0]} (MESH), or name a table about files: {', '.join(about_files)}"
+    if name in ("", ALL_TABLES):
+        raise ConfigError(f"a table is about files where it is named; {remedy}")
     table = find_table(name)
     if table.compute_from_files is None:
-        raise ConfigError(f"{name} is a table about datasets, not about files; leave out {files[0]}")
+        raise ConfigError(f"{name} is a table about datasets, not about files; {remedy}")
     result = table.compute_from_files(files, table_options(name, table.options, values), workers)
     print(markdown(result), end="")
     for figure in result.figures:
@@ -129,14 +139,16 @@ def make_all_tables(run: DatasetRun, values: Mapping[str, object]) -> int:
     """
     from eval.engine.report import FinishedTable, report_html
 
-    tables = find_tables()
+    tables, faults = read_tables()
     known = {key for table in tables.values() for key in table.options.model_fields}
     unknown = sorted(values.keys() - known)
     if unknown:
         raise ConfigError(f"no table has the option {unknown[0]}; options are {', '.join(sorted(known))}")
     finished: list[FinishedTable] = []
-    unmade: dict[str, str] = {}
-    failed, started = 0, datetime.now(UTC)
+    unmade = {name: f"it cannot be read: {fault}" for name, fault in faults.items()}
+    for name, fault in unmade.items():
+        print(f"{name}: {fault}")
+    failed, started = len(faults), datetime.now(UTC)
     for name, table in tables.items():
         own = {key: value for key, value in values.items() if key in table.options.model_fields}
         options = table_options(name, table.options, own)

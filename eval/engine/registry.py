@@ -3,17 +3,46 @@
 from __future__ import annotations
 
 import importlib
+import traceback
+from pathlib import Path
 from pkgutil import iter_modules
 
 from eval.engine.evaluation import Evaluation
+from pipeline.package_groups import missing_group
 
 
 def find_tables(package: str = "eval.tables") -> dict[str, Evaluation]:
-    """Return the `TABLE` of each `eval/tables/<name>.py`, by name. Raises TypeError for a module without one."""
+    """Return the `TABLE` of each `eval/tables/<name>.py` that can be read, by name."""
+    return read_tables(package)[0]
+
+
+def read_tables(package: str = "eval.tables") -> tuple[dict[str, Evaluation], dict[str, str]]:
+    """Return the `TABLE` of each `eval/tables/<name>.py`; and for a file without one, its line and what is wrong."""
     tables: dict[str, Evaluation] = {}
-    for name in sorted(module.name for module in iter_modules(importlib.import_module(package).__path__)):
-        table = getattr(importlib.import_module(f"{package}.{name}"), "TABLE", None)
-        if not isinstance(table, Evaluation):
-            raise TypeError(f"{package.replace('.', '/')}/{name}.py must hold TABLE = Evaluation(...)")
-        tables[name] = table
-    return tables
+    faults: dict[str, str] = {}
+    for module in sorted(iter_modules(importlib.import_module(package).__path__), key=lambda module: module.name):
+        path = Path(getattr(module.module_finder, "path", ""), f"{module.name}.py")
+        try:
+            table = getattr(importlib.import_module(f"{package}.{module.name}"), "TABLE", None)
+        except Exception as error:
+            if missing_group(error):
+                raise
+            faults[module.name] = _fault(path, error)
+            continue
+        if isinstance(table, Evaluation):
+            tables[module.name] = table
+        else:
+            faults[module.name] = f"{path} must hold TABLE = Evaluation(...)"
+    return tables, faults
+
+
+def _fault(path: Path, error: Exception) -> str:
+    """Say in which line of a table's file, or of what it imports, an error is."""
+    where = f"{path}"
+    if isinstance(error, SyntaxError):
+        where = f"{error.filename or path}:{error.lineno}"
+    else:
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+        where = f"{path}:{lines[-1]}" if lines else where
+    reason = error.msg if isinstance(error, SyntaxError) else error
+    return f"{where}: {type(error).__name__}: {reason}"

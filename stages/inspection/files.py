@@ -47,8 +47,8 @@ def write_report_files(folder: Path, paths: Sequence[Path], report: InspectionRe
 
 
 def model_paths(text: str) -> list[Path]:
-    """Return the models that one argument names: a file, or several with spaces between, as in MESH="a.glb b.glb"."""
+    """Return the paths that one argument names: a path, or several with spaces between, as in MESH="a.glb folder/"."""
     several = [Path(word) for word in text.split()]
-    if Path(text).exists() or not all(path.suffix.lower() in READERS for path in several):
+    if Path(text).exists() or not all(path.suffix.lower() in READERS or path.exists() for path in several):
         return [Path(text)]
     return several

@@ -10,11 +10,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from eval.engine.dataset_run import DatasetRun, load_dataset_run
 from eval.engine.evaluation import Evaluation
-from eval.engine.registry import find_tables
+from eval.engine.registry import find_tables, read_tables
 from eval.engine.requirements import FINISHED_DATASET, KITS, STRING_VAE
 from eval.engine.table import ReferenceRow, Table
 from tests.command import shapemill
@@ -32,14 +33,21 @@ def test_every_module_is_a_table_with_question_and_requirements() -> None:
         assert table.requirements
 
 
-def test_module_without_table_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unreadable_tables_are_reported_and_others_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "stray").mkdir()
     (tmp_path / "stray" / "__init__.py").touch()
-    (tmp_path / "stray" / "wrong.py").write_text("TABLE = 3\n", encoding="utf-8")
+    faulty = {"unnamed": "import math\nmath.nothing\n", "unparsed": "import math\n\ndef (\n", "wrong": "TABLE = 3\n"}
+    for name, text in faulty.items():
+        (tmp_path / "stray" / f"{name}.py").write_text(text, encoding="utf-8")
+    (tmp_path / "stray" / "sound.py").write_text("from eval.tables.physical import TABLE\n", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(TypeError, match=r"stray/wrong\.py must hold TABLE"):
-        find_tables("stray")
-    for name in ("stray", "stray.wrong"):
+    tables, faults = read_tables("stray")
+    assert list(tables) == ["sound"]
+    assert list(faults) == list(faulty)
+    assert "stray/wrong.py must hold TABLE" in faults["wrong"]
+    assert "stray/unparsed.py:3: SyntaxError: " in faults["unparsed"]
+    assert "stray/unnamed.py:2: AttributeError: " in faults["unnamed"]
+    for name in ("stray", *(f"stray.{name}" for name in (*faulty, "sound"))):
         sys.modules.pop(name, None)
 
 
@@ -91,6 +99,25 @@ def test_table_about_datasets_refuses_files(tmp_path: Path) -> None:
     code, printed = shapemill("eval", "near_duplicates", str(tmp_path / "a.glb"))
     assert code == 2
     assert "not about files" in printed
+    assert f"leave out {tmp_path / 'a.glb'} (MESH), or name a table about files: decomposition, generation" in printed
+
+
+@pytest.mark.parametrize("table", ["", "all"])
+def test_files_need_the_name_of_a_table(tmp_path: Path, table: str) -> None:
+    code, printed = shapemill("eval", "--", table, str(tmp_path / "a.glb"))
+    assert code == 2
+    assert "a table is about files where it is named" in printed
+
+
+def test_table_reads_two_sets_from_one_value_of_mesh(tmp_path: Path) -> None:
+    clouds = np.random.default_rng(0).normal(size=(3, 80, 3))
+    paths = [tmp_path / name for name in ("generated.npy", "reference.npy")]
+    for path in paths:
+        np.save(path, clouds)
+    options = ("--set", "points=64", "--set", "emd_points=16", "--workers", "1")
+    code, printed = shapemill("eval", *options, "--", "generation", f"{paths[0]} {paths[1]}")
+    assert code == 0, printed
+    assert "generated.npy" in printed
 
 
 def test_reference_rows_follow_ours_with_their_source_in_every_format() -> None:
