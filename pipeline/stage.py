@@ -180,3 +180,7 @@ class Stage:
     publishes_incomplete: bool = False
     keep_output: bool = False
     uses_input: Callable[[Config, str], bool] = _always
+
+    def may_make_samples(self, config: Config) -> bool:
+        """Return False for a producer from which `config` requests nothing."""
+        return self.requested_samples is _no_samples or any(self.requested_samples(config))

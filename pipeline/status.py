@@ -19,8 +19,8 @@ _HEADER = ("stage", "done", "failed", "samples", "rejects", "time", "left", "mem
 def status_lines(config: Config, stages: Mapping[str, Stage], paths: DatasetPaths, workers: int) -> Iterator[str]:
     """Yield a table with a row for each stage, then rejects by reason, the stages' reports and quarantined shards.
 
-    Columns: `time` is worker time, `left` the estimate for `workers` workers from the mean of the finished shards,
-    `memory` the largest amount that a worker of the stage has held.
+    A stage that has nothing to make under this config has no row. Columns: `time` is worker time, `left` the estimate
+    for `workers` workers from the mean of the finished shards, `memory` the largest amount that a worker has held.
     """
     inventory = Inventory(config, stages, paths)
     rows: list[tuple[str, ...]] = [_HEADER]
@@ -28,12 +28,15 @@ def status_lines(config: Config, stages: Mapping[str, Stage], paths: DatasetPath
     for name, stage in stages.items():
         unfinished = [read for read in stage.inputs if not inventory.complete(read)]
         if unfinished:
-            rows.append((name, f"waits for {unfinished[0]}", *[""] * 7))
+            if stage.may_make_samples(config):
+                wanted = [read for read in unfinished if stages[read].may_make_samples(config)]
+                rows.append((name, f"waits for {(wanted or unfinished)[0]}", *[""] * 7))
             continue
         state = inventory.stage(name)
         failures = _failures(state)
         rejects = sum((Counter(record.rejects) for record in state.records.values()), Counter[str]())
-        rows.append(_row(state, len(failures), sum(rejects.values()), workers))
+        if state.shards:
+            rows.append(_row(state, len(failures), sum(rejects.values()), workers))
         notes += [f"{name}: {line}" for line in rebuild_reasons(state)]
         notes += [f"{name}: {line}" for line in stage.report(state.view)]
         notes += [f"{name}: {count:,} rejected: {reason}" for reason, count in rejects.most_common()]

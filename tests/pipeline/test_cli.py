@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.config import load_config
+from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
+from pipeline.status import status_lines
 from tests.pipeline.conftest import WriteConfig, made
 from tests.pipeline.toy_run import PACKAGE, run_toy_stages
 
@@ -65,6 +68,16 @@ def test_run_and_status_show_every_stage(tmp_path: Path, write_config: WriteConf
     assert by_name["flour"][1:7] == ["0/6", "0", "0", "0", "0s", "?"]
     assert by_name["bread"][1:] == ["waits", "for", "flour"]
     assert "grain: 12 rejected: hollow" in status.stdout
+
+
+def test_status_leaves_out_stages_that_the_config_does_not_request(tmp_path: Path) -> None:
+    stages = find_stages()
+    config = load_config(ROOT / "configs" / "chairs.yaml", {name: stage.config for name, stage in stages.items()})
+    rows = {line.split()[0]: line.split() for line in status_lines(config, stages, DatasetPaths(tmp_path, "none"), 1)}
+    assert rows["programs"][1].startswith("0/")
+    assert rows["points"][1:] == ["waits", "for", "programs"]
+    assert "package" in rows
+    assert not rows.keys() & {"exemplars", "grammars", "mixture", "primitives", "proportions", "variations"}
 
 
 def test_run_without_a_stage_makes_the_whole_dataset(tmp_path: Path, write_config: WriteConfig) -> None:
