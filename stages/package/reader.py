@@ -38,8 +38,11 @@ class Dataset:
         try:
             manifest = json.loads(files.cat_file(f"{root}/{MANIFEST}"))
             listed = json.loads(files.cat_file(f"{root}/{CLASSES}"))
+        except FileNotFoundError:
+            remedy = "make it with `make dataset`, or name the folder that holds it"
+            raise ConfigError(f"{location} is no finished dataset: it has no {MANIFEST}; {remedy}") from None
         except (OSError, json.JSONDecodeError) as error:
-            raise ConfigError(f"{location} is no finished dataset: {error}; make it with `make dataset`") from error
+            raise ConfigError(f"{location} is no finished dataset: {error}; make it with `make dataset`") from None
         return cls(str(location), manifest, tuple(entry["name"] for entry in listed))
 
     def __len__(self) -> int:

@@ -47,7 +47,7 @@ class DatasetSplit(Sequence[DatasetSample]):
                 read_dictionary=["shard"],
             )
         except (OSError, pa.ArrowException) as error:
-            raise ConfigError(f"{index}: the index cannot be read: {error}") from error
+            raise ConfigError(f"{index}: the index cannot be read: {error}") from None
         rows = rows.unify_dictionaries().combine_chunks()
         shards = rows["shard"].combine_chunks()
         self._keys = rows["key"].combine_chunks()
@@ -82,7 +82,7 @@ class DatasetSplit(Sequence[DatasetSample]):
             content = files.cat_file(f"{root}/{shard}", start=offset, end=offset + size)
             ((found, members),) = read_shard(io.BytesIO(content))
         except (OSError, ValueError, tarfile.TarError) as error:
-            raise ConfigError(f"{self.location}/{shard}: {key} cannot be read at byte {offset}: {error}") from error
+            raise ConfigError(f"{self.location}/{shard}: {key} cannot be read at byte {offset}: {error}") from None
         if found != key or len(content) != size:
             raise ConfigError(f"{self.location}/{shard}: has {found} at byte {offset}, where the index states {key}")
         return DatasetSample(key, self.split, members)

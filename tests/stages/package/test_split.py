@@ -109,3 +109,9 @@ def test_missing_index_and_unknown_store_are_named(copied: Path) -> None:
         api.open_dataset("nowhere://bucket/toy")
     with pytest.raises(ValueError, match="'dev' is no split; take one of train, val, test"):
         api.open_dataset(copied).split("dev")
+
+
+def test_folder_without_a_dataset_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"is no finished dataset: it has no manifest\.json; make it with") as caught:
+        api.open_dataset(tmp_path / "none")
+    assert caught.value.__suppress_context__
