@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -20,6 +20,23 @@ from pipeline.yaml_loader import KeyPath, read_yaml
 
 MAX_MISTAKES_SHOWN = 50
 MAX_CHARACTERS_SHOWN = 200
+SECTION_PAGES = Path("configs", "sections")
+"""Folder of the project with a page on the keys of each section."""
+
+_TYPES_IN_WORDS = {
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "finite_number": "a finite number",
+    "string_type": "text",
+    "bool_type": "true or false",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "dict_type": "keys and values",
+    "model_type": "keys and values",
+    "path_type": "a path",
+}
+"""What a value should be, by the kind of pydantic's error."""
 
 Section = TypeVar("Section", bound="StrictModel")
 
@@ -92,14 +109,14 @@ def existing_file(path: Path) -> Path:
     except OSError as error:
         raise ValueError(f"{_shown(str(path))} is no file: {error.strerror}") from None
     if not str(path).isprintable():
-        raise ValueError(f"{_shown(str(path))} is no path: it holds what cannot be written")
+        raise ValueError(f"{_shown(str(path))} is no path: it holds characters that cannot be printed")
     if path.is_dir():
         raise ValueError(f"{path} is a folder, not a file")
     folder = path.parent
     if not folder.is_dir():
         while not folder.is_dir() and folder != folder.parent:
             folder = folder.parent
-        raise ValueError(f"there is no file {path}; of its folders {folder.resolve()} is the last that is there")
+        raise ValueError(f"there is no file {path}; the last folder of this path that exists is {folder.resolve()}")
     names = sorted(file.name for file in folder.iterdir() if file.is_file())
     close = nearest_word(path.name, names)
     hint = f"; the nearest file there is {folder / close}" if close else ""
@@ -126,7 +143,8 @@ def load_config(
     for key in values:
         if key not in facts and key not in sections:
             known = [*DatasetFacts.model_fields, *sections]
-            mistakes.append(f"{_where(path, lines, (key,))}: {_shown(key)}: unknown key; {_known(key, known)}")
+            hint = f"{_known(key, known)}; sections are listed in configs/README.md"
+            mistakes.append(f"{_where(path, lines, (key,))}: {_shown(key)}: unknown key; {hint}")
     header = _validate(path, lines, (), DatasetFacts, facts, mistakes)
     validated: dict[str, StrictModel] = {}
     for name, model in sections.items():
@@ -163,18 +181,67 @@ def _validate(
     try:
         return model.model_validate_json(json.dumps(values))
     except ValidationError as error:
-        schema = model.model_json_schema()
-        details = error.errors(include_url=False)
-        for detail in details:
-            # pydantic drops faulty items from a list and then finds it too short: not another mistake
-            if detail["type"] == "too_short" and any(
-                other["loc"][: len(detail["loc"])] == detail["loc"] != other["loc"] for other in details
-            ):
-                continue
-            key = (*section_key, *detail["loc"])
-            dotted = _shown(".".join(str(step) for step in key)) or "(the file)"
-            mistakes.append(f"{_where(path, lines, key)}: {dotted}: {_explain(schema, detail)}")
+        prefix = ".".join(map(str, section_key))
+        for location, sentence in explain_mistakes(model, error, prefix or "dataset"):
+            named = key_in_words(values, location)
+            key = prefix + (f".{named}" if prefix and named and named[0] != "[" else named)
+            where = _where(path, lines, (*section_key, *location))
+            mistakes.append(f"{where}: {_shown(key) or '(the file)'}: {sentence}")
         return None
+
+
+def mistakes_in_words(model: type[BaseModel], error: ValidationError, values: Any, section: str = "") -> list[str]:
+    """Return a line for each mistake in `values`, which `model` refused: the key, what is wrong, what would be right.
+
+    section: the config section whose page lists the keys, or empty
+    """
+    return [
+        f"{_shown(key_in_words(values, location)) or 'all'}: {sentence}"
+        for location, sentence in explain_mistakes(model, error, section)
+    ]
+
+
+def key_in_words(values: Any, location: KeyPath) -> str:
+    """Return the key at a location, such as `kits[castle].shapes[wall.glb]`.
+
+    An item of a list has its name or path, or its number from 1.
+    """
+    words, here = "", values
+    for step in location:
+        if isinstance(step, int):
+            here = here[step] if isinstance(here, list | tuple) and step < len(here) else None
+            words += f"[{_item_in_words(here, step)}]"
+        elif isinstance(here, Mapping) and (step in here or step not in here.values()):
+            words += f".{step}" if words else step
+            here = here.get(step)
+        # Another step is no key: the kind of one of several models, or a key that a text stands for.
+    return words
+
+
+def _item_in_words(item: Any, index: int) -> str:
+    if isinstance(item, Mapping):
+        item = item.get("name", item.get("path"))
+    return item if isinstance(item, str) and item else f"item {index + 1}"
+
+
+def explain_mistakes(
+    model: type[BaseModel], error: ValidationError, section: str = ""
+) -> Iterator[tuple[KeyPath, str]]:
+    """Yield the location of each mistake in the values that `model` refused, and what is wrong and would be right."""
+    schema = model.model_json_schema()
+    details = error.errors(include_url=False)
+    for detail in details:
+        # pydantic drops faulty items from a list and then finds it too short: not another mistake
+        if detail["type"] == "too_short" and any(
+            other["loc"][: len(detail["loc"])] == detail["loc"] != other["loc"] for other in details
+        ):
+            continue
+        yield detail["loc"], _explain(schema, detail, section)
+
+
+def _page_hint(section: str) -> str:
+    page = SECTION_PAGES / f"{section}.md"
+    return f"; its keys are in {page}" if (Path(__file__).parents[1] / page).is_file() else ""
 
 
 def _shown(text: str) -> str:
@@ -190,11 +257,11 @@ def _where(path: Path, lines: Mapping[KeyPath, int], key: KeyPath) -> str:
     return str(path)
 
 
-def _explain(schema: Mapping[str, Any], error: Mapping[str, Any]) -> str:
+def _explain(schema: Mapping[str, Any], error: Mapping[str, Any], section: str) -> str:
     kind, loc = error["type"], error["loc"]
     if kind == "extra_forbidden":
         known = _schema_at(schema, loc[:-1]).get("properties", {})
-        return f"unknown key; {_known(str(loc[-1]), known)}"
+        return f"unknown key; {_known(str(loc[-1]), known)}{_page_hint(section)}"
     field = _schema_at(schema, loc)
     if kind in {"union_tag_not_found", "union_tag_invalid"}:
         key, kinds = field["discriminator"]["propertyName"], field["discriminator"]["mapping"]
@@ -202,13 +269,31 @@ def _explain(schema: Mapping[str, Any], error: Mapping[str, Any]) -> str:
         return f"{key} {'is missing' if given is None else f'is {given}'}; it is one of {', '.join(kinds)}"
     suffix = f" ({field['description']})" if field.get("description") else ""
     if kind == "missing":
-        return f"is missing{suffix}"
+        return f"is missing{suffix}{_page_hint(section).replace('its keys are', 'an example is')}"
     if kind == "value_error":
         return str(error["ctx"]["error"])
-    wanted = error["msg"][0].lower() + error["msg"][1:]
-    if kind in {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}:
-        wanted = f"must lie in {_range(field)}" if _range(field) else wanted
-    return f"{wanted}, and is {_shown(json.dumps(error['input']))}{suffix}"
+    given = _shown(json.dumps(error["input"], ensure_ascii=False, default=str))
+    if kind == "string_pattern_mismatch" and suffix:
+        return f"must have another form than {given}{suffix}"
+    return f"{_wanted(field, error)}, and is {given}{suffix}"
+
+
+def _wanted(field: Mapping[str, Any], error: Mapping[str, Any]) -> str:
+    """Say what a value should be."""
+    kind, context = error["type"], error.get("ctx", {})
+    if kind in _TYPES_IN_WORDS:
+        return f"must be {_TYPES_IN_WORDS[kind]}"
+    if kind == "literal_error":
+        return f"must be {context['expected']}"
+    if kind in {"greater_than", "greater_than_equal", "less_than", "less_than_equal"} and _range(field):
+        return f"must be {_range(field)}"
+    if kind in {"string_too_long", "string_too_short"}:
+        limit = f"at most {context['max_length']:,}" if kind.endswith("long") else f"at least {context['min_length']:,}"
+        return f"must have {limit} characters"
+    if kind in {"too_long", "too_short"}:
+        limit = f"at most {context['max_length']:,}" if kind.endswith("long") else f"at least {context['min_length']:,}"
+        return f"must have {limit} entries"
+    return str(error["msg"][0].lower() + error["msg"][1:])
 
 
 def _known(key: str, known: Iterable[str]) -> str:
@@ -217,9 +302,8 @@ def _known(key: str, known: Iterable[str]) -> str:
 
 
 def _range(field: Mapping[str, Any]) -> str:
-    low = f"[{field['minimum']}" if "minimum" in field else f"({field.get('exclusiveMinimum', '-inf')}"
-    high = f"{field['maximum']}]" if "maximum" in field else f"{field.get('exclusiveMaximum', 'inf')})"
-    return "" if (low, high) == ("(-inf", "inf)") else f"{low}, {high}"
+    words = {"minimum": "at least", "exclusiveMinimum": "above", "maximum": "at most", "exclusiveMaximum": "below"}
+    return " and ".join(f"{word} {field[key]}" for key, word in words.items() if key in field)
 
 
 def _schema_at(schema: Mapping[str, Any], loc: tuple[str | int, ...]) -> Mapping[str, Any]:

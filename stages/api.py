@@ -32,15 +32,17 @@ def read_kit(models: str | Path | Sequence[str | Path], name: str = "kit", **set
     """
     from pydantic import ValidationError
 
+    from pipeline.config import mistakes_in_words
     from pipeline.errors import ConfigError
     from stages.autoconfig.resolved_kit import read_and_resolve
     from stages.autoconfig.settings import AutoconfigConfig
     from stages.exemplars.settings import ExemplarsConfig, KitConfig
 
+    stated = {"name": name, "shapes": tuple(_paths(models)), **settings}
     try:
-        config = KitConfig.model_validate({"name": name, "shapes": tuple(_paths(models)), **settings})
+        config = KitConfig.model_validate(stated)
     except ValidationError as error:
-        raise ConfigError(str(error)) from error
+        raise ConfigError("\n".join(mistakes_in_words(KitConfig, error, stated, "exemplars"))) from None
     reading = read_and_resolve(config, ExemplarsConfig().limits, AutoconfigConfig().max_tries, ())
     observed = reading.observe(reading.resolution.values)
     if observed.refusals:

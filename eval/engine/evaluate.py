@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import Evaluation, TableResult
 from eval.engine.registry import read_tables
-from pipeline.config import StrictModel, nearest_word
+from pipeline.config import StrictModel, mistakes_in_words, nearest_word
 from pipeline.errors import ConfigError
 from pipeline.paths import write_file
 
@@ -91,9 +91,9 @@ def table_options(name: str, model: type[StrictModel], values: Mapping[str, obje
     try:
         return model.model_validate_json(json.dumps(values))
     except ValidationError as error:
-        wrong = "; ".join(f"{'.'.join(map(str, mistake['loc']))}: {mistake['msg']}" for mistake in error.errors())
+        wrong = "; ".join(mistakes_in_words(model, error, values))
         known = f"its options: {_options_text(model)}" if model.model_fields else "it has no options"
-        raise ConfigError(f"{name}: {wrong}; {known}") from error
+        raise ConfigError(f"{name}: {wrong}; {known}") from None
 
 
 def print_table_of_files(

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 
 from pydantic import Field, ValidationError, model_validator
 
-from pipeline.config import StrictModel, nearest_word
+from pipeline.config import StrictModel, mistakes_in_words, nearest_word
 from pipeline.errors import ConfigError
 from pipeline.yaml_loader import read_yaml
 
@@ -121,7 +121,7 @@ def load_paper(name: str) -> Paper:
     try:
         return Paper.model_validate_json(json.dumps(values))
     except ValidationError as error:
-        raise ConfigError(f"{path}: {error}") from error
+        raise ConfigError("\n".join(f"{path}: {line}" for line in mistakes_in_words(Paper, error, values))) from None
 
 
 def known_scale(name: str) -> Scale:

@@ -120,7 +120,7 @@ def write_grammar_report(
         ready=READY_CLOUD if grammar.splats else READY,
         summary=summary,
         name=config.name,
-        model=json.dumps(str(path)),
+        model=json.dumps(str(path), ensure_ascii=False),
         radius=config.radius,
         up=up,
         random_shapes=requested[RANDOM_RULES],

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, get_args
 import typer
 from pydantic import ValidationError
 
+from pipeline.config import explain_mistakes
 from pipeline.display import ticking
 from pipeline.errors import ConfigError
 from pipeline.options import DATASETS, DEFAULT_CONFIG, DEFAULT_OUT, INSPECTION, ConfigOption, OutOption
@@ -191,7 +192,10 @@ def _label_map(labels: list[str]) -> dict[str, tuple[str, ...]]:
 
 def _wrong_options(error: ValidationError) -> typer.BadParameter:
     """Return what is wrong with the options, by their names."""
-    faults = [(fault["loc"], fault["msg"]) for fault in error.errors(include_url=False)]
+    from stages.exemplars.settings import KitConfig
+    from stages.model_files.limits import ReadLimits
+
+    faults = list(explain_mistakes(ReadLimits if error.title == "ReadLimits" else KitConfig, error))
     keys = [str(loc[1] if loc[0] == "contact" and len(loc) > 1 else loc[0]) if loc else "options" for loc, _ in faults]
     limited = error.title == "ReadLimits"
     hints = [f"--{'max-' * limited}{key.replace('_', '-')}" for key in keys]

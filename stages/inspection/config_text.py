@@ -152,4 +152,4 @@ def _value(value: Any) -> str:
         return "[" + ", ".join(map(_value, value)) + "]"
     text = str(value)
     plain = re.fullmatch(r"[A-Za-z_][A-Za-z_-]*", text) and yaml.safe_load(text) == text  # `no` is false
-    return text if not isinstance(value, str) or plain else json.dumps(text)
+    return text if not isinstance(value, str) or plain else json.dumps(text, ensure_ascii=False)

@@ -60,7 +60,7 @@ def source_shard(plan: Plan, number: int, source: SourceConfig) -> Shard:
         if not path.is_file():
             mend = f"make train with its config and MODEL={source.model}" if role == "weights" else "make strings there"
             raise ConfigError(
-                f"{plan.config.path}: string_sampling.sources.{number}: there is no {path}: dataset"
+                f"{plan.config.path}: string_sampling.sources[item {number + 1}]: there is no {path}: dataset"
                 f" {source.dataset} has no "
                 f"{role} of {name if role == 'weights' else source.kit}; {mend} first"
             )

@@ -81,7 +81,7 @@ def check(config: Config) -> None:
     for number, source in enumerate(sources):
         if source.kit not in kits:
             raise ConfigError(
-                f"{config.path}: string_sampling.sources.{number}: there is no kit"
+                f"{config.path}: string_sampling.sources[item {number + 1}]: there is no kit"
                 f" {source.kit}; kits are {', '.join(kits)}"
             )
 

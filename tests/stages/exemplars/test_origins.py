@@ -61,5 +61,5 @@ def test_mistake_in_a_shape_is_named_with_its_place(files: list[str], tmp_path: 
     wrong = [files[0] + "b", {"path": files[0], "autor": "A"}]
     with pytest.raises(ConfigError) as error:
         config_of(tmp_path, {"name": "k", "shapes": wrong})
-    assert "exemplars.kits.0.shapes.0.path: there is no file" in str(error.value)
-    assert "exemplars.kits.0.shapes.1.autor: unknown key" in str(error.value)
+    assert f"exemplars.kits[k].shapes[{files[0]}b]: there is no file" in str(error.value)
+    assert f"exemplars.kits[k].shapes[{files[0]}].autor: unknown key" in str(error.value)

@@ -179,7 +179,7 @@ def test_table_compares_generated_and_training_shapes(sampled: tuple[Path, str],
 def test_missing_model_is_reported_with_the_command_that_trains_it(bare: Path) -> None:
     code, said = run(bare / "sampled.yaml", bare, "string_sampling")
     assert code == 2
-    assert "string_sampling.sources.0" in said
+    assert "string_sampling.sources[item 1]" in said
     assert "parent-models/tiny-chain-0/weights.safetensors" in said
     assert "make train" in said
 
@@ -219,4 +219,4 @@ def test_variations_and_string_sampling_are_exclusive(tmp_path: Path) -> None:
 def test_models_outside_the_output_folder_are_rejected(tmp_path: Path, dataset: str) -> None:
     code, said = run(write_config(tmp_path, sources=[{**SOURCE, "dataset": dataset}]), tmp_path, "string_sampling")
     assert code == 2
-    assert "string_sampling.sources.0.dataset" in said
+    assert "string_sampling.sources[item 1].dataset" in said
