@@ -126,7 +126,7 @@ class LayoutDraws:
             if len(self._rows) >= MAX_LAYOUTS_REMEMBERED:
                 self._rows.clear()
             counted = self.refused if layout is self.exemplar else Counter[str]()
-            rows = find_rows(layout, self.steps, lambda reason: counted.update([reason]))
+            rows = find_rows(layout, self.steps, lambda reason: counted.update([reason]), may_stretch=self._is_alone)
             if self._is_alone:
                 counted.update([TOO_SMALL] * sum(not is_visible(self.exemplar, row) for row in rows))
                 rows = [row for row in rows if is_visible(self.exemplar, row)]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from stages.rows.layout import Layout
-from stages.rows.slabs import RowChange, Slab
+from stages.rows.slabs import RowChange, Slab, SlabError, repeat
 from stages.rows.steps import ROUNDING_DECIMALS, Step, bay_ends, longest_row, steps_of, with_long_rows
 from stages.shape.arrays import BoolArray, FloatArray
 
@@ -23,6 +24,22 @@ MIN_AREA_SHARE = 0.005
 TOO_SMALL = "its parts are too small to be seen"
 MAX_PLANES = 160
 """Ends of slabs that are tried for each step and normal."""
+
+LENGTHENING, CUTTING, STRETCHING = range(3)
+"""What happens to parts that hold a row, the best first."""
+MIN_STRETCHING_ROW = 3
+"""Parts of a row from which a part that holds it is stretched; two handles do not tell how many drawers there are."""
+MAX_STRETCHING_PLACES = 4
+"""Places of a row that are tried where parts are stretched: a try moves all vertices and looks for contacts."""
+
+
+class _Place(NamedTuple):
+    """End of a slab, whether it can be inserted and removed, and what that does to parts that span it."""
+
+    at: float
+    may_insert: bool
+    may_remove: bool
+    cost: int
 
 
 @dataclass(frozen=True)
@@ -58,11 +75,15 @@ class Row:
 
 
 def find_rows(
-    layout: Layout, steps: Sequence[Step] | None = None, refuse: Callable[[str], None] = lambda _: None
+    layout: Layout,
+    steps: Sequence[Step] | None = None,
+    refuse: Callable[[str], None] = lambda _: None,
+    may_stretch: bool = False,
 ) -> list[Row]:
     """Return the rows of a layout with one of the steps, by default its own.
 
     refuse: is told why a place of a row was left out although it fits its neighbours
+    may_stretch: whether there are rows, too, whose change stretches a part that holds them
     """
     rows: list[Row] = []
     steps = steps_of(layout) if steps is None else steps
@@ -79,7 +100,7 @@ def find_rows(
         ]
         for normal in step.normals():
             ends = _bay_ends_along(layout, normal, steps, all_mates)
-            rows += _rows_along(layout, number, step, count, normal, mates, others, ends, refuse)
+            rows += _rows_along(layout, number, step, count, normal, mates, others, ends, refuse, may_stretch)
     return [row for row in rows if not any(_splits_units(layout, row, whole) for whole in rows)]
 
 
@@ -135,6 +156,7 @@ def _rows_along(
     others: Sequence[np.ndarray],
     ends: np.ndarray,
     refuse: Callable[[str], None],
+    may_stretch: bool,
 ) -> Iterator[Row]:
     """Yield the rows with one step and one normal, by what a period holds.
 
@@ -144,7 +166,7 @@ def _rows_along(
     low, high = layout.spans(normal)
     previous = layout.mates(-step.shift)
     recurs = (mates >= 0) | (previous >= 0)
-    found: dict[tuple[int, ...], list[tuple[float, bool, bool, bool]]] = {}
+    found: dict[tuple[int, ...], list[_Place]] = {}
     if step.is_bay:
         planes = np.unique(np.round(low[bay_ends(layout, step.shift) & (previous >= 0)], ROUNDING_DECIMALS))
     else:
@@ -154,7 +176,7 @@ def _rows_along(
         slab = Slab(layout, normal, step.shift, at, mates, previous, low, high, step.is_bay)
         may_insert = slab.insertion_fault() is None
         may_remove = slab.removal_fault() is None and not (step.is_bay and count < MIN_BAYS_SHORTENED)
-        if not (may_insert or may_remove) or not (slab.is_regular or slab.spanning_fault() is None):
+        if not (may_insert or may_remove) or not (may_stretch or slab.is_regular or not len(slab.stretched)):
             continue
         fits = may_insert, may_remove
         may_insert = may_insert and not any(slab.tears(other, 1) or slab.leaves_gap(other) for other in others)
@@ -164,13 +186,35 @@ def _rows_along(
             refuse(TORN_ROW)
         if may_insert or may_remove:
             copied = tuple(sorted(layout.types[slab.recurs].tolist()))
-            found.setdefault(copied, []).append((at, may_insert, may_remove, slab.is_regular))
+            cost = LENGTHENING if slab.is_regular else STRETCHING if len(slab.stretched) else CUTTING
+            if cost == STRETCHING and (count < MIN_STRETCHING_ROW or slab.leaves_some_uncopied):
+                continue
+            found.setdefault(copied, []).append(_Place(at, may_insert, may_remove, cost))
     for copied, places in found.items():
         # A cut leaves vertices, after which a part may no longer repeat itself elsewhere.
-        best = [place for place in places if place[3]] or places
-        insertions = np.array([at for at, may_insert, _, _ in best if may_insert])
-        removals = np.array([at for at, _, may_remove, _ in best if may_remove])
-        yield Row(number, normal, step.shift, count, copied, insertions, removals, step.is_bay)
+        cost = min(place.cost for place in places)
+        best = [place for place in places if place.cost == cost]
+        if cost == STRETCHING:
+            best = list(_tried(layout, normal, step, best))
+        insertions = np.array([place.at for place in best if place.may_insert])
+        removals = np.array([place.at for place in best if place.may_remove])
+        if len(insertions) or len(removals):
+            yield Row(number, normal, step.shift, count, copied, insertions, removals, step.is_bay)
+
+
+def _tried(layout: Layout, normal: FloatArray, step: Step, places: Sequence[_Place]) -> Iterator[_Place]:
+    """Yield a few of the places, with those changes that parts that are stretched allow."""
+    for index in np.unique(np.linspace(0, len(places) - 1, min(len(places), MAX_STRETCHING_PLACES)).astype(int)):
+        place = places[index]
+        allowed = []
+        for times, may_change in ((1, place.may_insert), (-1, place.may_remove)):
+            try:
+                if may_change:
+                    repeat(layout, RowChange(normal, step.shift, place.at, times, step.is_bay))
+                allowed.append(may_change)
+            except SlabError:
+                allowed.append(False)
+        yield _Place(place.at, allowed[0], allowed[1], place.cost)
 
 
 def _may_end_slabs(

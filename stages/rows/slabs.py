@@ -3,7 +3,8 @@
 A slab begins at `at - normal @ shift` along its normal and ends at `at`. Parts that begin in it are copied by the
 shift, parts beyond it move, and parts that span it become longer or shorter. A slab is valid where each contact across
 its end recurs a period earlier, so that a new seam shows only what the exemplar shows. What occurs once stays where it
-is.
+is. A part that spans the slab and is neither a prism nor repeats itself is stretched, if it then touches what it has
+to.
 
 The slab of a bay is whole: what occurs once in it is copied too, such as the door between the two sides of a cabinet.
 """
@@ -18,7 +19,9 @@ import numpy as np
 from stages.rows.layout import Layout, sorted_edges, with_classes
 from stages.rows.spanning import Span
 from stages.shape.arrays import BoolArray, FloatArray
+from stages.shape.geometry.pose import relative_poses
 from stages.shape.kit import PartMesh
+from stages.shape.stretch import STRETCHED_DEPTH
 
 MIN_PARALLEL_COSINE = 0.999
 """Cosine of the angle of two steps from which they are parallel."""
@@ -27,7 +30,8 @@ MAX_REACH_SHARE = 0.25
 MIN_OVERHANG_SHARE = 0.5
 """Parts that reach out of a bay and are shorter than this share of it are copied with it."""
 HELD_ONCE = "a part that spans the slab holds a single part of the row"
-
+CANNOT_STRETCH = "a part that spans the slab is neither a prism there nor repeats itself, and is too short to stretch"
+APART = "a stretched part is apart from what it has to touch"
 
 END_MARGIN_SHARE = 0.1
 """Parts are at an end of a shape up to this share of its length away from it."""
@@ -293,6 +297,12 @@ class Slab:
                 return True
         return False
 
+    @property
+    def leaves_some_uncopied(self) -> bool:
+        """Whether a part of the slab occurs once although another of its type recurs: a row would get a gap."""
+        types = self.layout.types
+        return bool(np.isin(types[self.within & ~self.recurs], types[self.recurs]).any())
+
     def leaves_end_behind(self, ends: np.ndarray) -> bool:
         """Return whether the shape would become longer beyond parts at its ends, such as beyond the legs of a table.
 
@@ -318,12 +328,18 @@ class Slab:
         """Whether no part that spans the slab has to be cut."""
         return all(self.span(part).is_regular for part in self.spanning.tolist())
 
-    def spanning_fault(self) -> str | None:
-        """Return why a part that spans the slab can become neither longer nor shorter, or None."""
-        for part in self.spanning.tolist():
-            if not self.span(part).can_change:
-                return "a part that spans the slab is neither a prism there nor repeats itself"
-        return None
+    @cached_property
+    def stretched(self) -> np.ndarray:
+        """Spanning parts that have to be stretched, int64 (k,), ascending."""
+        return np.array([part for part in self.spanning.tolist() if not self.span(part).can_change], dtype=np.int64)
+
+    def spanning_fault(self, times: int) -> str | None:
+        """Return why a part that spans the slab cannot become longer by `times` periods (-1: shorter by one), or
+        None."""
+        if self.is_bay and len(self.stretched):
+            return CANNOT_STRETCH
+        can_stretch = all(self.span(part).can_stretch(times) for part in self.stretched.tolist())
+        return None if can_stretch else CANNOT_STRETCH
 
     @property
     def _both_ways(self) -> tuple[np.ndarray, np.ndarray]:
@@ -366,10 +382,31 @@ def repeat(layout: Layout, change: RowChange) -> Layout:
     """Return a layout in which periods are inserted or one is removed. Raises SlabError where that is not valid."""
     slab = slab_of(layout, change)
     fault = slab.insertion_fault() if change.times > 0 else slab.removal_fault()
-    fault = fault or slab.spanning_fault()
+    fault = fault or slab.spanning_fault(change.times)
     if fault is not None:
         raise SlabError(fault)
-    return inserted(slab, change.times) if change.times > 0 else removed(slab)
+    made = inserted(slab, change.times) if change.times > 0 else removed(slab)
+    kept = np.flatnonzero(~slab.within) if change.times < 0 else np.arange(len(layout))
+    if not _touch_all(made, np.searchsorted(kept, slab.stretched)):
+        raise SlabError(APART)
+    return made
+
+
+def _touch_all(layout: Layout, parts: np.ndarray) -> bool:
+    """Return whether parts int64 (k,) touch all that they have a contact with, up to STRETCHED_DEPTH."""
+    if not len(parts):
+        return True
+    from stages.shape.geometry.contact import ContactTest
+
+    edges = layout.edges[np.isin(layout.edges, parts).any(axis=1)]
+    involved = np.unique(edges)
+    meshes = [layout.meshes[part] for part in involved.tolist()]
+    test = ContactTest(meshes, layout.tolerance)
+    poses = relative_poses(layout.poses, edges)
+    return all(
+        test.touches(i, j, pose, layout.tolerance + STRETCHED_DEPTH * min(meshes[i].diagonal, meshes[j].diagonal))
+        for (i, j), pose in zip(np.searchsorted(involved, edges).tolist(), poses, strict=True)
+    )
 
 
 def inserted(slab: Slab, times: int) -> Layout:

@@ -1,4 +1,6 @@
-"""Parts that span a slab: they are lengthened where they are prisms in it, or cut where they repeat themselves."""
+"""Parts that span a slab: they are lengthened where they are prisms in it, cut where they repeat themselves, or
+stretched as a whole.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +22,9 @@ WELDED_SHARE = 1e-7
 """Corners nearer to each other than this share of a part's size are one."""
 MAX_SECTION_DIFFERENCE = 0.01
 """Largest relative difference of the lengths of two equal sections."""
+
+MAX_STRETCH = 1.6
+"""Largest factor by which a part is stretched, and one over the smallest."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +53,18 @@ class Span:
 
     @cached_property
     def can_change(self) -> bool:
-        """Whether the part can become longer and shorter."""
+        """Whether the part can become longer and shorter without being stretched."""
         return self.is_regular or self._repeats_itself
+
+    def can_stretch(self, times: int) -> bool:
+        """Whether the part keeps its look when it is stretched by `times` periods."""
+        factor = 1.0 + times * (self.high - self.low) / max(float(np.ptp(self.heights)), 1e-300)
+        return 1.0 / MAX_STRETCH <= factor <= MAX_STRETCH
 
     def changed(self, times: int) -> tuple[LengthenedMesh, FloatArray]:
         """Return surface and pose of the part with `times` more periods (-1: one less)."""
+        if not self.can_change:
+            return _stretched(self, times)
         if not self.is_regular:
             return _clipped_and_repeated(self, times)
         return _longer(self, times) if times > 0 else _shorter(self)
@@ -157,6 +169,13 @@ def _shorter(span: Span) -> tuple[LengthenedMesh, FloatArray]:
     moved = span.points - (sides == 2)[:, None] * span.shift
     owners = np.concatenate([stays, start])
     return _posed(span, moved, np.concatenate([faces[stays], led]), owners)
+
+
+def _stretched(span: Span, times: int) -> tuple[LengthenedMesh, FloatArray]:
+    """Return a part whose end moves by `times` periods, and what is before its end by its share of that."""
+    shares = (span.heights - span.heights.min()) / max(float(np.ptp(span.heights)), 1e-300)
+    faces = span.mesh.faces
+    return _posed(span, span.points + times * shares[:, None] * span.shift, faces, np.arange(len(faces)))
 
 
 def are_parallel(corners: FloatArray, shift: FloatArray, points: FloatArray) -> BoolArray:

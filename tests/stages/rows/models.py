@@ -75,6 +75,40 @@ def rail(posts: int = 8) -> tuple[Kit, Layout]:
 
 
 @cache
+def arched_rail(bars: int = 6, more: tuple[float, ...] = ()) -> tuple[Kit, Layout]:
+    """Bars between a sill and a rail whose underside is flat and whose upper side is an arch.
+
+    more: places of bars beside these, along x
+    """
+    length = 0.5 * bars
+    along = np.linspace(-length / 2, length / 2, 16)
+    arch = 0.1 + 0.3 * np.cos(np.pi * along / length)
+    corners = [(x, y, z) for z in (-0.1, 0.1) for x, top in zip(along, arch, strict=True) for y in (0.0, top)]
+    meshes = {
+        "rail": trimesh.Trimesh(corners).convex_hull,
+        "sill": box(length, 0.1, 0.2),
+        "bar": box(0.1, 1.0, 0.1),
+    }
+    places = [*(0.25 + 0.5 * number - length / 2 for number in range(bars)), *more]
+    held = [("bar", pose(x, 0.5, 0.0)) for x in places]
+    centre = np.eye(4)
+    centre[:3, 3] = [0.0, 1.0, 0.0]
+    return layout(meshes, [("sill", pose(0.0, -0.05, 0.0)), ("rail", centre), *held])
+
+
+@cache
+def battlement() -> tuple[Kit, Layout]:
+    """Pegs on three equal teeth of a wall with other notches between them."""
+    xs = [0.0, 0.35, 0.65, 1.0, 1.35, 1.65, 1.8, 2.35, 2.65, 3.0]
+    solid = np.ones((9, 3), dtype=bool)
+    solid[[0, 2, 3, 5, 6, 8], 2] = False
+    solid[[3, 5], 1] = False
+    wall = plate(xs, [0.0, 0.4, 0.8, 1.0], 0.2, solid)
+    pegs = [("peg", pose(0.5 + number, 1.25, 0.0)) for number in range(3)]
+    return layout({"wall": wall, "peg": box(0.1, 0.5, 0.1)}, [("wall", pose(0.0, 0.0, 0.0)), *pegs])
+
+
+@cache
 def leaning_frame(bars: int = 6) -> tuple[Kit, Layout]:
     """Two slanted posts with bars between them; everything is turned about x."""
     turn = trimesh.transformations.rotation_matrix(0.6, [1, 0, 0])

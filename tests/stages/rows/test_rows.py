@@ -281,6 +281,45 @@ def test_no_change_tears_another_row_apart(ratio: float, pegs: int) -> None:
             np.testing.assert_allclose(steps, steps[:1].repeat(len(steps)), atol=1e-6)
 
 
+@pytest.mark.parametrize("times", [2, -1])
+def test_rail_with_a_flat_underside_is_stretched_over_its_bars(times: int) -> None:
+    kit, layout = models.arched_rail()
+    assert not find_rows(layout), "it is no prism, and repeats nothing"
+    tried = list(changes(find_rows(layout, may_stretch=True), times))
+    assert tried
+    for change in tried:
+        changed = repeat(layout, change)
+        check(kit, changed)
+        assert counts(kit, changed)["bar"] == 6 + times
+        np.testing.assert_allclose(changed.boxes[1] - layout.boxes[1], [[0, 0, 0], [0.5 * times, 0, 0]], atol=1e-9)
+        heights = [np.unique(np.round(kind.points[1][:, 1], 9)) for kind in (layout, changed)]
+        np.testing.assert_array_equal(*heights)
+    with pytest.raises(SlabError, match="too short to stretch"):
+        repeat(layout, replace(tried[0], times=4))
+
+
+def test_rail_is_not_stretched_for_two_bars() -> None:
+    _, layout = models.arched_rail(bars=2)
+    assert not find_rows(layout, may_stretch=True)
+
+
+def test_wall_is_not_stretched_if_its_pegs_would_hang_over_notches() -> None:
+    _, layout = models.battlement()
+    assert not find_rows(layout, may_stretch=True)
+    with pytest.raises(SlabError, match="apart from what it has to touch"):
+        repeat(layout, RowChange(np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]), 1.3, 1))
+
+
+def test_no_period_leaves_a_bar_out_where_the_rail_is_stretched() -> None:
+    """One more bar between two others occurs once: a copy of its period would lack it."""
+    place = 0.45
+    _, layout = models.arched_rail(more=(place,))
+    rows = find_rows(layout, may_stretch=True)
+    assert rows
+    for change in changes(rows, 1):
+        assert not change.at - 0.5 <= place < change.at
+
+
 def test_no_front_gets_a_second_handle() -> None:
     kit, layout = models.fronts()
     tried = [*changes(find_rows(layout), 2), *changes(find_rows(layout), -1)]
