@@ -25,6 +25,12 @@ EXECUTING = {"pickle", "cloudpickle", "dill", "shelve", "marshal"}
 
 CLOCKS = {"time.time", "time.time_ns", "datetime.now", "datetime.utcnow", "datetime.today", "date.today"}
 
+HOOKS = {"build", "new_task", "new_model", "prepare", "batches", "batch_of", "main"}
+"""Functions that every program of the library, every kind of model and every process has."""
+
+FRONT_DOORS = {ROOT / "stages" / "api.py", ROOT / "stages" / "package" / "standalone_verifier.py"}
+"""The facade, whose functions are called like those behind it, and a program that imports nothing of ours."""
+
 CODE = sorted(path for top in ("pipeline", "stages", "eval") for path in (ROOT / top).rglob("*.py"))
 ALL = sorted([*CODE, *(ROOT / "tests").rglob("*.py")])
 
@@ -107,6 +113,18 @@ def test_rooms_do_not_import_in_a_circle() -> None:
     order = list(TopologicalSorter(reads).static_order())
     assert order[0] == "shape"
     assert [room for room, read in reads.items() if "package" in read] == ["export", "publishing", "verification"]
+
+
+def test_public_functions_and_classes_have_names_of_their_own() -> None:
+    homes: dict[str, list[str]] = {}
+    for path in CODE:
+        if path in FRONT_DOORS or path.name in ("commands.py", "stage.py", "cli.py"):
+            continue
+        for node in parsed(path).body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+                homes.setdefault(node.name, []).append(relative(path))
+    shared = {name: paths for name, paths in homes.items() if len(paths) > 1 and name not in HOOKS}
+    assert shared == {}
 
 
 def test_stages_are_found_without_numba_and_scipy() -> None:

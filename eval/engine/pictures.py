@@ -11,7 +11,7 @@ from stages.shape.views.picture import ABOVE
 PICTURE_SIZE = (264, 264)
 
 
-def shape_picture(shape: Shape) -> bytes:
+def rendered_png(shape: Shape) -> bytes:
     """Render a shape as PNG."""
     from stages.shape.views.sheet import picture_png
 

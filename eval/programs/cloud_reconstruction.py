@@ -16,7 +16,7 @@ from eval.engine.table import Cell, ReferenceRow, Table
 from eval.programs.quality import boxes_of_programs, clouds_of, physical_shares, shape_of_boxes
 from eval.programs.two_sample_test import POINTS_PER_CLOUD, features_of
 from pipeline.errors import Rejected
-from stages.abstraction.hierarchy import Boxes, hierarchy_of
+from stages.abstraction.hierarchy import Boxes, part_hierarchy
 from stages.abstraction.settings import AbstractionConfig
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.fitting import fit, fit_cuboids
@@ -122,14 +122,14 @@ def reconstructions(
 def _program_of(boxes: Sequence[Box]) -> tuple[AssemblyProgram | None, FloatArray, float]:
     """Return the program extracted from cuboids, or None, and the centre and scale of its coordinates."""
     try:
-        hierarchy = hierarchy_of(shape_of_boxes(boxes), AbstractionConfig().children, Boxes())
+        hierarchy = part_hierarchy(shape_of_boxes(boxes), AbstractionConfig().children, Boxes())
         extracted = extract(hierarchy, CATEGORY_RULES["any"], Gates(), Cleaning())
     except Rejected:
         return None, np.zeros(3), 1.0
     return extracted.program, extracted.center, extracted.scale
 
 
-def f_score(boxes: Sequence[Box], cloud: FloatArray) -> float:
+def cloud_f_score(boxes: Sequence[Box], cloud: FloatArray) -> float:
     """Return the F-score from 0 to 100 of the surface of cuboids against a cloud (n, 3) (Knapitsch et al. 2017)."""
     surface = clouds_of([boxes], len(cloud))[0]
     max_distance = MATCH_DISTANCE_SHARE * float(np.linalg.norm(np.ptp(cloud, axis=0)))
@@ -159,7 +159,7 @@ def clouds_table(rows: Mapping[str, ReconstructedShapes]) -> Table:
     cells: list[tuple[Cell, ...]] = []
     for name, shapes in rows.items():
         physics = physical_shares(shapes.boxes)
-        scores = [f_score(boxes, cloud) for boxes, cloud in zip(shapes.boxes, shapes.clouds, strict=True)]
+        scores = [cloud_f_score(boxes, cloud) for boxes, cloud in zip(shapes.boxes, shapes.clouds, strict=True)]
         cells.append((name, len(shapes.boxes), fmean(scores), physics.rooted, physics.stable))
     notes = (
         f"Surrogate for dense meshes, which are not available: clouds of {POINTS_PER_CLOUD} points on cuboids of val. "

@@ -45,7 +45,7 @@ def ablation_of(trained: TrainedModel[Any]) -> str:
     return str(trained.model.header["settings"].get("ablate", "nothing"))
 
 
-def category_programs(run: DatasetRun, category: str, split: str) -> list[AssemblyProgram]:
+def read_category_programs(run: DatasetRun, category: str, split: str) -> list[AssemblyProgram]:
     """Read the programs of a category in a split of the dataset."""
     samples = (sample for shard in program_shards(run, split) for sample in read_samples(shard))
     return [parse(sample.text) for sample in samples if sample.kit == category]
@@ -60,7 +60,7 @@ def commonly_readable_programs(
     run: DatasetRun, category: str, split: str, max_programs: int, rng: np.random.Generator
 ) -> list[AssemblyProgram]:
     """Return random programs of a category in a split that every kind of model with a latent space can encode."""
-    programs = category_programs(run, category, split)
+    programs = read_category_programs(run, category, split)
     kept: list[AssemblyProgram] = []
     for index in rng.permutation(len(programs)).tolist():
         try:

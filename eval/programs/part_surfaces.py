@@ -16,12 +16,12 @@ from eval.programs.figures import boxes_portrait, picture_figure
 from stages.abstraction.hierarchy import MAX_TURNED_VOLUME_SHARE
 from stages.programs.program import find_program
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.boxes import box_corners, nearest_axes
+from stages.shapeassembly.extraction.boxes import corners_of_box, nearest_axes
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
-from stages.shapeassembly.extraction.validity import surface_points
+from stages.shapeassembly.extraction.validity import even_surface_points
 from stages.training.latent import reparameterize
-from stages.training.recovery.shapes import TRAIN_INTERVAL, random_shapes
+from stages.training.recovery.shapes import TRAIN_INTERVAL, random_training_shapes
 from stages.training.recovery.surface import even_points
 
 POINTS_PER_PART = 256
@@ -50,7 +50,7 @@ def box_features(boxes: Sequence[Box]) -> FloatArray:
 
     Lengths are shares of the largest side of the shape; the origin is the middle of its ground.
     """
-    corners = np.concatenate([box_corners(box) for box in boxes])
+    corners = np.concatenate([corners_of_box(box) for box in boxes])
     low, high = corners.min(axis=0), corners.max(axis=0)
     side = float((high - low).max())
     middle = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
@@ -60,7 +60,7 @@ def box_features(boxes: Sequence[Box]) -> FloatArray:
 def curve_parts(program: str, shapes: int, rng: np.random.Generator) -> PartClouds:
     """Return the parts of random shapes of a curve program."""
     points, features = [], []
-    for shape in islice(random_shapes(find_program(program), TRAIN_INTERVAL, rng), shapes):
+    for shape in islice(random_training_shapes(find_program(program), TRAIN_INTERVAL, rng), shapes):
         meshes = [part.mesh for part in shape.parts]
         boxes = [nearest_axes(minimum_box(mesh.vertices, MAX_TURNED_VOLUME_SHARE), np.eye(3)) for mesh in meshes]
         for mesh, box in zip(meshes, boxes, strict=True):
@@ -84,7 +84,7 @@ class PartSurfaces(nn.Module):
             nn.Linear(HIDDEN_UNITS, HIDDEN_UNITS), nn.ReLU(), nn.Linear(HIDDEN_UNITS, 3)
         )  # fmt: skip
         unit = Box(np.zeros(3), np.ones(3), np.eye(3))
-        template = surface_points([unit], 2 * POINTS_PER_PART)
+        template = even_surface_points([unit], 2 * POINTS_PER_PART)
         rows = np.linspace(0, len(template) - 1, POINTS_PER_PART).astype(int)
         self.template: Tensor
         self.register_buffer("template", torch.from_numpy(template[rows]).float())

@@ -18,9 +18,9 @@ from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.shape import Shape
 from stages.shapeassembly.analysis.structure import program_distance, signature
 from stages.shapeassembly.execution.interpreter import execute_all
-from stages.shapeassembly.extraction.boxes import box_corners
+from stages.shapeassembly.extraction.boxes import corners_of_box
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.shapeassembly.extraction.validity import execution_boxes, surface_points
+from stages.shapeassembly.extraction.validity import even_surface_points, execution_boxes
 from stages.shapeassembly.syntax.program import AssemblyProgram
 from stages.training.latent import LatentPoints
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
@@ -47,7 +47,7 @@ def boxes_of_programs(programs: Sequence[AssemblyProgram]) -> list[list[Box]]:
 
 def shape_of_boxes(boxes: Sequence[Box]) -> Shape:
     """Return the shape of some cuboids."""
-    return box_shape(np.stack([box_corners(box) for box in boxes]), "y")
+    return box_shape(np.stack([corners_of_box(box) for box in boxes]), "y")
 
 
 def physical_shares(samples: Sequence[Sequence[Box]]) -> PhysicalShares:
@@ -62,7 +62,7 @@ def clouds_of(samples: Sequence[Sequence[Box]], count: int = POINTS_PER_SHAPE) -
     """Return points on the surface of the cuboids of each shape, float64 (n, count, 3)."""
     clouds = []
     for boxes in samples:
-        points = surface_points(boxes, 2 * count)
+        points = even_surface_points(boxes, 2 * count)
         clouds.append(points[np.linspace(0, len(points) - 1, count).astype(int)])
     return np.stack(clouds)
 
@@ -133,7 +133,7 @@ def smoothness(
         failed += steps - len(samples)
         clouds = clouds_of(samples) if samples else np.empty((0, POINTS_PER_SHAPE, 3))
         for boxes, distance in zip(samples, paired_distances(clouds[:-1], clouds[1:]).tolist(), strict=False):
-            corners = np.concatenate([box_corners(box) for box in boxes])
+            corners = np.concatenate([corners_of_box(box) for box in boxes])
             geometry.append(distance / float(np.linalg.norm(np.ptp(corners, axis=0))))
         structure += [program_distance(*pair) for pair in pairwise(programs)]
     share = 100 * failed / (sequences * steps)

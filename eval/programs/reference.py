@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from eval.engine.dataset_run import DatasetRun
-from eval.programs.models import category_programs
+from eval.programs.models import read_category_programs
 from eval.programs.quality import boxes_of_programs, clouds_of
 from eval.programs.two_sample_test import POINTS_PER_CLOUD, features_of
 from stages.shape.arrays import FloatArray
@@ -36,7 +36,7 @@ class ReferencePrograms:
 
 def read_reference(run: DatasetRun, category: str, max_real: int) -> ReferencePrograms:
     """Read a category of the dataset. `max_real`: shapes for networks."""
-    train, val = (category_programs(run, category, split) for split in ("train", "val"))
+    train, val = (read_category_programs(run, category, split) for split in ("train", "val"))
     train_boxes = boxes_of_programs(train)
     return ReferencePrograms(
         train,

@@ -22,7 +22,7 @@ from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.clouds import chamfer_squared
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.drawings import draw_fitted
-from stages.training.recovery.shapes import TEST_INTERVAL, TRAIN_INTERVAL, RandomShape, random_shapes
+from stages.training.recovery.shapes import TEST_INTERVAL, TRAIN_INTERVAL, RandomShape, random_training_shapes
 from stages.training.recovery.surface import sample_points, shape_points
 from stages.training.recovery.trained import PRETRAINED_FOLDER, RecoveryModels, TrainedRecovery, find_models
 
@@ -72,7 +72,7 @@ def held_out(
     model: TrainedRecovery, count: int, rng: np.random.Generator
 ) -> Iterator[tuple[str, list[RandomShape], list[RecoveryInput]]]:
     """Yield held-out shapes as inputs of a model, with a name: clouds, or drawings from trained and novel views."""
-    shapes = list(islice(random_shapes(model.program, TEST_INTERVAL, rng), count))
+    shapes = list(islice(random_training_shapes(model.program, TEST_INTERVAL, rng), count))
     names = [f"{number:03}" for number in range(count)]
     if model.entry.input == "points":
         clouds = [sample_points(shape.parts, POINTS_PER_INPUT, rng) for shape in shapes]
@@ -127,7 +127,7 @@ def methods(model: TrainedRecovery, budget: int, seed: int) -> dict[str, Recover
 def _nearest_training_shape(program: Program, rng: np.random.Generator) -> RecoveryMethod:
     @cache
     def training_shapes() -> list[tuple[Values, FloatArray]]:
-        shapes = islice(random_shapes(program, TRAIN_INTERVAL, rng), NUM_TRAINING_SHAPES)
+        shapes = islice(random_training_shapes(program, TRAIN_INTERVAL, rng), NUM_TRAINING_SHAPES)
         pairs = ((shape.values, shape_points(shape.parts, POINTS_PER_TRAINING_SHAPE)) for shape in shapes)
         return [(values, frame_of(points).normalized(points)) for values, points in pairs]
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from eval.engine.evaluation import ImageRow
-from eval.engine.pictures import shape_picture
+from eval.engine.pictures import rendered_png
 from eval.generated.instantiation import attempts
 from eval.strings.string_vaes import MAX_GRAPH_NODES
 from stages.shape.graphs.canonical import graph_digest
@@ -68,7 +68,7 @@ def interpolation_rows(
         for stop, attempt in zip(stops, attempts(instantiator, stops, method, 0), strict=True):
             if attempt.is_valid and attempt.assembly is not None:
                 shape = kit_shape(instantiator.kit, attempt.assembly)
-                pictures.append((f"{len(stop.types)} parts", shape_picture(shape)))
+                pictures.append((f"{len(stop.types)} parts", rendered_png(shape)))
             else:
                 failed += 1
         failures = f"; {failed} of {len(stops)} stops become no shape" if failed else ""

@@ -26,7 +26,7 @@ def _compute(run: DatasetRun, options: CategoriesOptions) -> TableResult:
     from itertools import islice
 
     from eval.engine.models import training_curve
-    from eval.engine.pictures import shape_picture
+    from eval.engine.pictures import rendered_png
     from eval.generated.edge_categories import (
         categories_table,
         category_models,
@@ -59,9 +59,9 @@ def _compute(run: DatasetRun, options: CategoriesOptions) -> TableResult:
         for number, shape in enumerate(islice(split_assemblies(run, kit, "test"), SHAPES_SHOWN)):
             rng = decision_rng(run.config.seed, "eval", "categories", kit, "shown", number)
             predicted = reconstruct_shape(trained.model, writer, shape, options.voters, rng)
-            pictures.append((f"{kit}, {len(shape)} parts", shape_picture(kit_shape(kits[kit], shape))))
+            pictures.append((f"{kit}, {len(shape)} parts", rendered_png(kit_shape(kits[kit], shape))))
             if predicted is not None:
-                pictures.append((f"as predicted by {trained.folder}", shape_picture(kit_shape(kits[kit], predicted))))
+                pictures.append((f"as predicted by {trained.folder}", rendered_png(kit_shape(kits[kit], predicted))))
         image_rows.append(ImageRow(f"Test shapes, and what {trained.folder} predicts from their strings", pictures))
         curve = training_curve(run.models / trained.folder, "val_tokens")
         lines[trained.folder] = [(step, 100 * share) for step, share in curve]

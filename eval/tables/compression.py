@@ -13,7 +13,7 @@ EDGES: tuple[Edges, ...] = ("all", "tree")
 
 
 def _compute(run: DatasetRun, _: NoOptions) -> TableResult:
-    from eval.engine.pictures import shape_picture
+    from eval.engine.pictures import rendered_png
     from eval.strings.compression import StoredSample, compression_row, compression_table, round_trip
     from pipeline.shards import read_shard
     from stages.exemplars.language import LANGUAGE, dataset_kits
@@ -42,7 +42,7 @@ def _compute(run: DatasetRun, _: NoOptions) -> TableResult:
             ranked = sorted(trips, key=lambda trip: (len(trip.packed), trip.text))
             for trip in (ranked[0], ranked[len(ranked) // 2], ranked[-1]):
                 caption = f"{name}, {len(trip.restored)} parts from {len(trip.packed)} bytes"
-                pictures.append((caption, shape_picture(Shape(kit.types, trip.restored, "y", kit.labels))))
+                pictures.append((caption, rendered_png(Shape(kit.types, trip.restored, "y", kit.labels))))
     row = ImageRow("The smallest, median and largest shape of each kit, restored from its bytes", pictures)
     return TableResult([compression_table(rows)], image_rows=[row])
 

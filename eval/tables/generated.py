@@ -37,7 +37,7 @@ def _missing(run: DatasetRun) -> str:
 
 
 def _compute(run: DatasetRun, options: GeneratedOptions) -> TableResult:
-    from eval.engine.pictures import shape_picture
+    from eval.engine.pictures import rendered_png
     from eval.generated.generated_shapes import GeneratedShape, finished_shapes, generated_row, generated_table
     from pipeline.paths import DatasetPaths
     from stages.exemplars.language import dataset_kits
@@ -66,10 +66,7 @@ def _compute(run: DatasetRun, options: GeneratedOptions) -> TableResult:
                 image_rows.append(
                     ImageRow(
                         title,
-                        [
-                            (f"{len(assembly)} parts", shape_picture(kit_shape(kit, assembly)))
-                            for assembly in assemblies
-                        ],
+                        [(f"{len(assembly)} parts", rendered_png(kit_shape(kit, assembly))) for assembly in assemblies],
                     )
                 )
     return TableResult([generated_table(rows)], image_rows=image_rows)

@@ -38,7 +38,7 @@ def _compute(run: DatasetRun, _: NoOptions) -> TableResult:
 
 
 def _image_row(kit: Kit, growth: SearchGrowth) -> ImageRow:
-    from eval.engine.pictures import shape_picture
+    from eval.engine.pictures import rendered_png
     from stages.shape.shape import kit_shape, upright
 
     exemplar = kit.exemplars[0]
@@ -46,7 +46,7 @@ def _image_row(kit: Kit, growth: SearchGrowth) -> ImageRow:
     for generation in list(growth.generations)[:GENERATIONS_SHOWN]:
         first = next(variant for variant in growth.variants if variant.generation == generation)
         shown.append((f"generation {generation}, {len(first.assembly)} parts", first.assembly))
-    pictures = [(caption, shape_picture(upright(kit_shape(kit, assembly)))) for caption, assembly in shown]
+    pictures = [(caption, rendered_png(upright(kit_shape(kit, assembly)))) for caption, assembly in shown]
     return ImageRow(f"{kit.name}: an input, and the first variant of each generation", pictures)
 
 

@@ -69,7 +69,7 @@ def _margins(results: Mapping[str, PhysicalResults]) -> Chart:
 
 
 def _weakest(results: Mapping[str, PhysicalResults]) -> list[tuple[str, bytes]]:
-    from eval.engine.pictures import shape_picture
+    from eval.engine.pictures import rendered_png
 
     ranked = sorted(
         (validity.margin, name, index)
@@ -79,7 +79,7 @@ def _weakest(results: Mapping[str, PhysicalResults]) -> list[tuple[str, bytes]]:
     pictures = []
     for margin, name, index in ranked[:SHAPES_SHOWN]:
         verdict = f"bears {margin:.2f}" if margin >= 0 else "falls"
-        pictures.append((f"{name}, {verdict}", shape_picture(results[name].shapes[index])))
+        pictures.append((f"{name}, {verdict}", rendered_png(results[name].shapes[index])))
     return pictures
 
 

@@ -183,10 +183,10 @@ def _generated(
 
 
 def _pictures(samples: Sequence[Sequence[Box]]) -> list[tuple[str, bytes]]:
-    from eval.engine.pictures import shape_picture
+    from eval.engine.pictures import rendered_png
     from eval.programs.quality import shape_of_boxes
 
-    return [("", shape_picture(shape_of_boxes(boxes))) for boxes in samples]
+    return [("", rendered_png(shape_of_boxes(boxes))) for boxes in samples]
 
 
 TABLE = Evaluation(

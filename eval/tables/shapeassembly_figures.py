@@ -40,9 +40,9 @@ def _compute(run: DatasetRun, options: ShapeassemblyFiguresOptions) -> TableResu
     from eval.programs.models import (
         PROGRAM_KINDS,
         ablation_of,
-        category_programs,
         commonly_readable_programs,
         program_models,
+        read_category_programs,
     )
     from eval.programs.part_surfaces import curve_parts, surfaces_figure, train_surfaces
     from eval.programs.quality import boxes_of_programs, clouds_of
@@ -55,7 +55,7 @@ def _compute(run: DatasetRun, options: ShapeassemblyFiguresOptions) -> TableResu
     seed = run.config.seed
     figures: list[Figure] = []
     rows = []
-    by_category = {kit: category_programs(run, kit, "train") for kit in sorted({model.kit for model in models})}
+    by_category = {kit: read_category_programs(run, kit, "train") for kit in sorted({model.kit for model in models})}
     for category, train in by_category.items():
         clouds = clouds_of(boxes_of_programs(train))
         rng = decision_rng(seed, "shapeassembly_figures", category)

@@ -100,11 +100,11 @@ def _folders(run: DatasetRun, options: WorthOptions) -> list[Path]:
 
 
 def _training_clouds(folder: Path, shapes: int, seed: int) -> LabelledClouds:
-    from eval.worth.labelled_clouds import dataset_clouds
+    from eval.worth.labelled_clouds import labelled_dataset_clouds
     from eval.worth.real_sets import LEARNT_POINTS
     from pipeline.randomness import decision_rng
 
-    return dataset_clouds(folder, shapes, LEARNT_POINTS, decision_rng(seed, "worth", "dataset", folder.name))
+    return labelled_dataset_clouds(folder, shapes, LEARNT_POINTS, decision_rng(seed, "worth", "dataset", folder.name))
 
 
 def _estimate_seconds(run: DatasetRun) -> float:

@@ -25,7 +25,7 @@ MIN_PARTIAL_SHARE = 0.5
 """A partial cloud keeps between this share of the points and all."""
 
 
-def augment(
+def augmented_cloud(
     cloud: npt.NDArray[np.float32], parts: PartIds, ways: Collection[Augmentation], rng: np.random.Generator
 ) -> tuple[npt.NDArray[np.float32], PartIds]:
     """Augment one cloud float32 (n, 3) with the part of each point int32 (n,), and scale it to diagonal 1 again.

@@ -20,7 +20,7 @@ from stages.points.area_sampling import sample_shape, sample_surface
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import transform_points
 from stages.shapeassembly.extraction.readers.child_process import read_grass_in_child
-from stages.shapeassembly.shape import shape_of_text
+from stages.shapeassembly.shape import shape_of_program_text
 from stages.shapeassembly.sources import program_texts
 from stages.training.recovery.clouds import frame_of, subsample
 
@@ -56,7 +56,7 @@ def join_clouds(sets: Sequence[LabelledClouds]) -> LabelledClouds:
     return LabelledClouds(np.concatenate([s.points for s in sets]), np.concatenate([s.parts for s in sets]))
 
 
-def dataset_clouds(folder: Path, shapes: int, points: int, rng: np.random.Generator) -> LabelledClouds:
+def labelled_dataset_clouds(folder: Path, shapes: int, points: int, rng: np.random.Generator) -> LabelledClouds:
     """Return clouds of at most `shapes` random training shapes of a finished dataset.
 
     Raises ConfigError for a folder without dataset, and for a dataset without clouds.
@@ -81,7 +81,7 @@ def program_clouds(
     texts = _texts(archive, f"data/{category}")
     names = _texts(archive, f"data_splits/{category}")[f"data_splits/{category}/{split}.txt"].split()
     chosen = [names[index] for index in rng.permutation(len(names))[:shapes].tolist()]
-    clouds = (sample_shape(shape_of_text(texts[f"data/{category}/{name}.txt"]), points, rng) for name in chosen)
+    clouds = (sample_shape(shape_of_program_text(texts[f"data/{category}/{name}.txt"]), points, rng) for name in chosen)
     return _stacked(((cloud.points, cloud.instances) for cloud in clouds), points, rng)
 
 

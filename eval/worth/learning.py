@@ -11,9 +11,9 @@ import numpy as np
 import torch
 from torch import Generator, Tensor
 
-from eval.worth.augmentation import Augmentation, augment
+from eval.worth.augmentation import Augmentation, augmented_cloud
 from eval.worth.labelled_clouds import LabelledClouds
-from eval.worth.network import PointEncoder, near_pairs, same_part_loss, squared_distances
+from eval.worth.network import PointEncoder, near_point_pairs, same_part_loss, squared_distances
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.training.loop import TrainState, train
 from stages.training.model_config import ModelConfig
@@ -44,7 +44,9 @@ class SamePartTask(TrainingTask):
             augmented = []
             for index in islice(order, self.config.batch_size):
                 drawn = rng.permutation(clouds.points.shape[1])[:POINTS_PER_CLOUD]
-                augmented.append(augment(clouds.points[index, drawn], clouds.parts[index, drawn], self.ways, rng))
+                augmented.append(
+                    augmented_cloud(clouds.points[index, drawn], clouds.parts[index, drawn], self.ways, rng)
+                )
             points, parts = (torch.from_numpy(np.stack(arrays)) for arrays in zip(*augmented, strict=True))
             yield points, parts, torch.from_numpy(rng.permutation(points.shape[1])[:POINTS_IN_PAIRS])
 
@@ -109,7 +111,7 @@ def _precision_of_clouds(embeddings: Callable[[Tensor], Tensor], clouds: Labelle
     precisions = []
     for index in range(len(clouds)):
         points, parts = torch.from_numpy(clouds.points[index : index + 1]), clouds.parts[index, :count]
-        near = near_pairs(points[:, :count])[0].numpy()
+        near = near_point_pairs(points[:, :count])[0].numpy()
         distances = squared_distances(embeddings(points)[:, :count].double())[0].numpy()
         same = parts[:, None] == parts
         precisions.append(100.0 * average_precision(-distances[near], same[near]))

@@ -60,7 +60,7 @@ def squared_distances(vectors: Tensor) -> Tensor:
     return distances.clamp(min=0.0)
 
 
-def near_pairs(points: Tensor) -> Tensor:
+def near_point_pairs(points: Tensor) -> Tensor:
     """Return which pairs of points float (n, k, 3) are near, each pair once, bool (n, k, k)."""
     count = points.shape[1]
     once = torch.ones((count, count), dtype=torch.bool, device=points.device).triu(1)
@@ -74,7 +74,7 @@ def same_part_loss(encoder: PointEncoder, points: Tensor, parts: Tensor, chosen:
     """
     embeddings = encoder(points)[:, chosen]
     points, parts = points[:, chosen], parts[:, chosen]
-    near = near_pairs(points)
+    near = near_point_pairs(points)
     logits = encoder.threshold - squared_distances(embeddings)[near]
     same = (parts[:, :, None] == parts[:, None, :])[near]
     return binary_cross_entropy_with_logits(logits, same.float())

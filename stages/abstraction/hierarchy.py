@@ -9,7 +9,7 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartMesh
 from stages.shape.shape import Shape
-from stages.shapeassembly.extraction.boxes import bounding_box, box_corners, box_gap
+from stages.shapeassembly.extraction.boxes import bounding_box, box_gap, corners_of_box
 from stages.shapeassembly.extraction.hierarchy import Box, PartHierarchy, PartNode, check_limits
 from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
 
@@ -36,7 +36,7 @@ class Boxes:
         return Box(pose[:3, :3] @ box.center + pose[:3, 3], box.size, box.axes @ pose[:3, :3].T)
 
 
-def hierarchy_of(shape: Shape, children: int, boxes: Boxes) -> PartHierarchy:
+def part_hierarchy(shape: Shape, children: int, boxes: Boxes) -> PartHierarchy:
     """Return the parts of an upright shape below nodes of at most `children` children.
 
     Nodes are connected groups of parts; a node with more disconnected pieces has more children. Raises Rejected for
@@ -47,7 +47,7 @@ def hierarchy_of(shape: Shape, children: int, boxes: Boxes) -> PartHierarchy:
         PartNode(shape.meshes[kind].label, boxes.of(shape.meshes[kind], pose))
         for kind, pose in zip(assembly.types.tolist(), assembly.poses, strict=True)
     ]
-    corners = np.stack([box_corners(leaf.box) for leaf in leaves])
+    corners = np.stack([corners_of_box(leaf.box) for leaf in leaves])
     reach = TOUCHING_GAP_SHARE * float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
     label = max(leaves, key=lambda leaf: float(np.prod(leaf.box.size))).label
     check_limits(PartNode(label, leaves[0].box, tuple(leaves)), "a sample")

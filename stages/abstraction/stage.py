@@ -8,7 +8,7 @@ from typing import Any
 from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.abstraction.hierarchy import Boxes, hierarchy_of
+from stages.abstraction.hierarchy import Boxes, part_hierarchy
 from stages.abstraction.members import PROGRAM, PROGRAM_FOUND, figures
 from stages.abstraction.settings import AbstractionConfig
 from stages.shape.collection.collection import Collection, add_members
@@ -35,7 +35,7 @@ def run_shard(task: Task) -> Outcome:
     def abstracted(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
         shape = collection.shape(sample)
         try:
-            hierarchy = hierarchy_of(shape, config.children, boxes)
+            hierarchy = part_hierarchy(shape, config.children, boxes)
             extracted = extract(hierarchy, CATEGORY_RULES["any"], config.gates, config.cleaning)
         except Rejected as error:
             nothing = {"refused": error.reason, "f_score": 0, "lines": 0, "leaves": 0, "centre": [0, 0, 0], "scale": 0}

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from stages.model_files.scene import ModelScene, Placement, Surface
-from stages.shape.appearance import Appearance, barycentric, joined
+from stages.shape.appearance import Appearance, barycentric, joined_appearance
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 from stages.symmetry.pieces import RADIUS_SHARE, SurfacePiece, repeated_pieces
@@ -94,7 +94,7 @@ def _world_look(scene: ModelScene) -> Appearance | None:
         if look is not None:
             look = look.turned(linear).mirrored() if np.linalg.det(linear) < 0 else look.turned(linear)
         looks.append(look)
-    return joined(looks, [len(scene.surfaces[placement.surface].faces) for placement in scene.placements])
+    return joined_appearance(looks, [len(scene.surfaces[placement.surface].faces) for placement in scene.placements])
 
 
 def _surface(

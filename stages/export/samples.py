@@ -30,11 +30,11 @@ def export_files(sample: DatasetSample, kind: ExportFormat, settings: ExportSett
     where its program has changed.
     """
     if kind == "structurenet":
-        return structurenet_files(sample.key, sample_shape(sample), sample.contacts.T, sample.record)
-    return shape_files(kind, sample.key, sample_shape(sample), pairs_of(sample.members[JOINTS]), settings)
+        return structurenet_files(sample.key, shape_of_sample(sample), sample.contacts.T, sample.record)
+    return shape_files(kind, sample.key, shape_of_sample(sample), pairs_of(sample.members[JOINTS]), settings)
 
 
-def sample_shape(sample: DatasetSample) -> Shape:
+def shape_of_sample(sample: DatasetSample) -> Shape:
     """Return the shape of a sample with its parts in the order of the record, and the joints that its program knows."""
     record, shape = sample.record, sample.shape
     place_of = {name: place for place, name in enumerate(shape.part_names)}

@@ -52,7 +52,7 @@ def placed_terminals(grammar: ShapeGrammar, derivation: Derivation | ResizedGrid
     return terminals
 
 
-def shape_of_text(grammar: ShapeGrammar, text: str) -> Shape:
+def shape_of_derivation_text(grammar: ShapeGrammar, text: str) -> Shape:
     """Return the shape of a text with all meshes of the grammar, so that shapes share what is known of them.
 
     Raises DerivationError for a text that is no derivation of the grammar.

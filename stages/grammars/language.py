@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.config import Config
 from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan, Task
-from stages.grammars.derived_shape import exemplar_shape, shape_of_text
+from stages.grammars.derived_shape import exemplar_shape, shape_of_derivation_text
 from stages.grammars.files import load_grammar, load_grammars
 from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.settings import GrammarsConfig
@@ -29,7 +29,7 @@ class DerivationDecoder:
 
     def shape(self, sample: Sample) -> Shape:
         """Return the derived shape. Raises DerivationError for a text that is no derivation of its grammar."""
-        return shape_of_text(self._grammars[sample.kit], sample.text)
+        return shape_of_derivation_text(self._grammars[sample.kit], sample.text)
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
         """Return at most `count` exemplars with their names."""
@@ -74,7 +74,7 @@ def _rebuild(paths: DatasetPaths) -> RebuildShape:
     def shape(record: Mapping[str, Any], _: IntArray) -> Shape:
         if record["kit"] not in grammars:
             raise LookupError(f"grammar {record['kit']} is missing in the dataset's .work folder")
-        return upright(shape_of_text(grammars[record["kit"]], record["text"]))
+        return upright(shape_of_derivation_text(grammars[record["kit"]], record["text"]))
 
     return shape
 

@@ -15,7 +15,7 @@ from stages.shape.geometry.triangles import unit_normals
 from stages.shape.kit import PartMesh
 from stages.symmetry.surface.clip import fragments
 from stages.symmetry.surface.grid import CELLS_PER_RADIUS
-from stages.symmetry.surface.lattice import pack
+from stages.symmetry.surface.lattice import pack_cells
 
 AXIS_WEIGHTS = np.array([1.0, 1.0137, 1.0271])
 """Weights of the axes for a surface that faces between two: rounding must not decide what faces halfway."""
@@ -67,7 +67,7 @@ def sample_mesh(part: PartMesh, size: float) -> SurfaceSamples:
     corners = part.vertices[part.faces]
     normals = unit_normals(corners)
     cells, owner, middles = fragments(corners, corners.min(axis=(0, 1)) - size / 3, size)
-    _, first = np.unique((pack(cells) << FACING_BITS) + facing_direction(normals)[owner], return_index=True)
+    _, first = np.unique((pack_cells(cells) << FACING_BITS) + facing_direction(normals)[owner], return_index=True)
     return SurfaceSamples(np.ascontiguousarray(middles[first, :3]), normals[owner[first]])
 
 

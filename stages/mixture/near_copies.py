@@ -52,7 +52,7 @@ def copy_features(clouds: npt.NDArray[np.float32], extents: FloatArray) -> tuple
     return features, np.array([_distance(first, second) for first, second in clouds], dtype=np.float64)
 
 
-def near_pairs(
+def near_copy_pairs(
     features: FloatArray,
     spacings: FloatArray,
     cloud_of: Callable[[int], npt.NDArray[np.float32]],

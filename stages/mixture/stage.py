@@ -168,7 +168,7 @@ def _listed_rows(task: Task, listing: str) -> Iterator[Row]:
 
 def _copies(task: Task, rows: Sequence[Row], splits: npt.NDArray[np.int64]) -> list[int]:
     """Return the samples to leave out so that no near copies and no equal graphs of two producers are in two splits."""
-    from stages.mixture.near_copies import near_pairs
+    from stages.mixture.near_copies import near_copy_pairs
     from stages.mixture.rivals import left_out
 
     listings = task.shard.params["listings"]
@@ -185,7 +185,7 @@ def _copies(task: Task, rows: Sequence[Row], splits: npt.NDArray[np.int64]) -> l
     numbers: dict[tuple[str, str], int] = {}
     graphs = [numbers.setdefault((row["kit"], row["graph"]), len(numbers)) for row in rows]
     groups = np.array(graphs, dtype=np.int64)
-    pairs = near_pairs(features[:, :-1], features[:, -1], cloud_of, groups, makers, splits)
+    pairs = near_copy_pairs(features[:, :-1], features[:, -1], cloud_of, groups, makers, splits)
     return left_out(pairs, groups, makers, splits)
 
 

@@ -12,7 +12,7 @@ from pipeline.errors import ConfigError
 from stages.model_files.colors import color_bytes, face_paint, unit_colors
 from stages.model_files.polygons import triangulate
 from stages.model_files.scene import GREY, INVALID, Malformed, ModelScene, Placement, Surface
-from stages.model_files.wavefront_text import decode_text
+from stages.model_files.wavefront_text import decode_wavefront_text
 from stages.shape.arrays import ByteArray
 
 _HEADER = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF(?=[\s\d]|$)")
@@ -23,7 +23,7 @@ def read_off(path: Path) -> ModelScene:
     """Return the surface of an ASCII `.off` file. Raises ConfigError for a file that is cut off or malformed."""
     warnings: list[str] = []
     try:
-        surface = _parse(decode_text(path.read_bytes()), path.stem, warnings)
+        surface = _parse(decode_wavefront_text(path.read_bytes()), path.stem, warnings)
     except (ArithmeticError, LookupError, ValueError) as error:
         reason = error if isinstance(error, Malformed) else f"its count of vertices and faces, or a colour, {INVALID}"
         raise ConfigError(f"{path}: not a whole ASCII OFF file ({reason}); copy or export it again") from None

@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.model_files.scene import GREY, Malformed, ModelScene, Placement, Surface, plain_text
-from stages.model_files.wavefront_text import decode_text
+from stages.model_files.wavefront_text import decode_wavefront_text
 from stages.shape.arrays import ByteArray, FloatArray
 
 _HEAD_BYTES, _TRIANGLE_BYTES = 84, 50
@@ -36,7 +36,7 @@ def read_stl(path: Path) -> ModelScene:
     warnings: list[str] = []
     try:
         if _is_text(content):
-            solids = _Text(path.stem).read(decode_text(content), warnings)
+            solids = _Text(path.stem).read(decode_wavefront_text(content), warnings)
             colors: list[ByteArray | None] = [None] * len(solids)
         else:
             corners, color = _binary(content, warnings)

@@ -20,7 +20,7 @@ from stages.model_files.polygons import triangulate
 from stages.model_files.scene import GREY, ModelScene, Placement, Surface, type_label
 from stages.model_files.source_materials import appearance_of, painted_faces_without_material
 from stages.model_files.wavefront_materials import WavefrontMaterial, read_libraries
-from stages.model_files.wavefront_text import TextLine, decode_text, text_lines
+from stages.model_files.wavefront_text import TextLine, decode_wavefront_text, text_lines
 from stages.shape.appearance import NO_MATERIAL, Appearance, Material, given_normals
 from stages.shape.arrays import ByteArray, IntArray
 
@@ -164,7 +164,7 @@ def _appearance(
 
 def _parse(path: Path) -> _Lines:
     lines = _Lines()
-    text = decode_text(path.read_bytes())
+    text = decode_wavefront_text(path.read_bytes())
     if "#MRGB" in text:
         lines.brushed = [
             line.split()[1] for line in text.splitlines() if line.startswith("#MRGB ") and line.split()[1:]

@@ -14,7 +14,7 @@ from stages.model_files.colors import color_bytes, decode_image, srgb_from_linea
 from stages.model_files.enclosure import Enclosure, Outside
 from stages.model_files.scene import GREY
 from stages.model_files.source_materials import alpha_mode_of, linear_color, stated_number
-from stages.model_files.wavefront_text import TextLine, decode_text, text_lines
+from stages.model_files.wavefront_text import TextLine, decode_wavefront_text, text_lines
 from stages.shape.appearance import Material, Texture, TextureImage, Wrap
 from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.input_file import content_fault
@@ -80,7 +80,7 @@ def read_libraries(
             if other := content_fault(content):
                 warnings.append(f"material library {line.rest!r} {other}; its faces are grey")
                 continue
-            _Library(enclosure, materials, warnings, not_kept).read(decode_text(content))
+            _Library(enclosure, materials, warnings, not_kept).read(decode_wavefront_text(content))
     return materials
 
 

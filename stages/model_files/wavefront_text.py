@@ -32,7 +32,7 @@ class TextLine:
         return list(dict.fromkeys((self.full, re.split(r"\s#(?=\s|$)", self.full)[0], self.rest)))
 
 
-def decode_text(content: bytes) -> str:
+def decode_wavefront_text(content: bytes) -> str:
     """Decode text as its byte order mark says, else as UTF-8, else as Windows-1252, in which every byte is a letter."""
     if content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
         return content.decode("utf-16", errors="replace")

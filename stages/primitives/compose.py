@@ -25,7 +25,9 @@ SPREAD = {"heap": 0.25, "stack": 0.04}
 MAX_COPIES = 6
 
 
-def compose(composition: Composition, config: PrimitivesConfig, rng: np.random.Generator) -> list[PlacedSolid]:
+def random_composition(
+    composition: Composition, config: PrimitivesConfig, rng: np.random.Generator
+) -> list[PlacedSolid]:
     """Return the solids of a random composition, standing on the plane y = 0."""
     count = int(rng.integers(config.min_parts, config.max_parts + 1))
     if composition == "attached":

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from pipeline.paths import DatasetPaths
 from stages.primitives.settings import KINDS
-from stages.primitives.text import shape_of_text
+from stages.primitives.text import shape_of_composition_text
 from stages.shape.collection.language import Language, RebuildShape, Source
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
@@ -24,7 +24,7 @@ class CompositionDecoder:
 
     def shape(self, sample: Sample) -> Shape:
         """Return the shape of a sample. Raises CompositionError for a text that describes none."""
-        return shape_of_text(sample.text)
+        return shape_of_composition_text(sample.text)
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
         """Return nothing: solids are drawn at random."""
@@ -32,7 +32,7 @@ class CompositionDecoder:
 
 
 def _rebuild(_: DatasetPaths) -> RebuildShape:
-    return lambda record, _: upright(shape_of_text(record["text"]))
+    return lambda record, _: upright(shape_of_composition_text(record["text"]))
 
 
 LANGUAGE = Language(

@@ -61,7 +61,7 @@ def run_drawing(task: Task) -> Outcome:
 
     Raises ShardFailed where too many tries in a row meet none.
     """
-    from stages.primitives.compose import compose
+    from stages.primitives.compose import random_composition
     from stages.primitives.text import composition_text, shape_of_solids
     from stages.shape.physics.judge import unmet_requirement
 
@@ -72,7 +72,7 @@ def run_drawing(task: Task) -> Outcome:
             rng = task.rng(number)
             for _ in range(MAX_TRIES_PER_SAMPLE):
                 composition = config.compositions[int(rng.integers(len(config.compositions)))]
-                solids = compose(composition, config, rng)
+                solids = random_composition(composition, config, rng)
                 reason = unmet_requirement(config.require, shape_of_solids(solids))
                 if reason is None:
                     break

@@ -143,7 +143,7 @@ def shape_of_solids(solids: Iterable[PlacedSolid]) -> Shape:
     return Shape(tuple(meshes.values()), Assembly(types, poses, np.empty((0, 2), np.int32)), "y", KINDS)
 
 
-def shape_of_text(text: str) -> Shape:
+def shape_of_composition_text(text: str) -> Shape:
     """Return the shape of a text. Raises CompositionError for one that describes none."""
     try:
         return shape_of_solids(read_composition(text))

@@ -101,13 +101,13 @@ def mix(
     out: FolderOption = DEFAULT_FOLDER,
 ) -> None:
     """Copy groups of parameters from a second shape to a first."""
-    from stages.programs.editing import mix
+    from stages.programs.editing import mix_values
     from stages.programs.files import named_values
 
     with _program(program) as found:
         ends = named_values(found, target), named_values(found, source)
         title = f"{found.name}: {', '.join(group)} of the second on the first"
-        _write_shapes(found, out, [*ends, mix(found, *ends, group)], ["target", "source", "mixed"], title)
+        _write_shapes(found, out, [*ends, mix_values(found, *ends, group)], ["target", "source", "mixed"], title)
 
 
 @PROGRAMS.command()

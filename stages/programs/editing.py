@@ -10,7 +10,7 @@ from stages.programs.repair import repair
 from stages.programs.schema import Values
 
 
-def mix(program: Program, target: Values, source: Values, groups: Collection[str]) -> dict[str, Value]:
+def mix_values(program: Program, target: Values, source: Values, groups: Collection[str]) -> dict[str, Value]:
     """Copy the parameters of `groups` from `source` to `target`, and repair the result to satisfy the constraints.
 
     Repair changes copied parameters only where nothing else helps. Raises ParameterError for an unknown group.

@@ -8,7 +8,7 @@ from typing import Any
 from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan
 from stages.exemplars.language import KitDecoder, dataset_kits
-from stages.proportions.text import ProportionShapes, shape_of_text
+from stages.proportions.text import ProportionShapes, shape_of_proportion_text
 from stages.shape.arrays import IntArray
 from stages.shape.collection.language import Language, RebuildShape
 from stages.shape.kit import Kit
@@ -29,7 +29,7 @@ class ProportionDecoder:
         """Return the exemplar resized by the sample's text. Raises ProportionError for a text that does not fit its
         kit.
         """
-        return shape_of_text(self._shapes[sample.kit], sample.text)
+        return shape_of_proportion_text(self._shapes[sample.kit], sample.text)
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
         """Return the exemplars, hubs among their parts."""
@@ -49,7 +49,7 @@ def _rebuild(paths: DatasetPaths) -> RebuildShape:
     def shape(record: Mapping[str, Any], _: IntArray) -> Shape:
         if record["kit"] not in kits:
             raise LookupError(f"kit {record['kit']} is missing in the dataset's .work folder")
-        return upright(shape_of_text(kits[record["kit"]], record["text"]))
+        return upright(shape_of_proportion_text(kits[record["kit"]], record["text"]))
 
     return shape
 

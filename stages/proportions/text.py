@@ -130,7 +130,7 @@ class ProportionShapes:
             raise ProportionError(str(error)) from None
 
 
-def shape_of_text(shapes: ProportionShapes, text: str) -> Shape:
+def shape_of_proportion_text(shapes: ProportionShapes, text: str) -> Shape:
     """Return the shape of a text, with the contacts of the exemplar or of its layout. Raises ProportionError."""
     proportions = read_proportions(text)
     unwarped = shapes.unwarped(proportions.exemplar, proportions.changes)

@@ -25,7 +25,7 @@ def publish(
 ) -> None:
     """Put a finished, verified dataset where people load it; what is there with the same bytes is not sent again."""
     from pipeline.termination import exit_on_signals
-    from stages.publishing.publish import publish as publish_dataset
+    from stages.publishing.publish import publish_dataset
 
     folder = folder or out / load_dataset(context, config, out)[1].name
     with exit_on_signals():

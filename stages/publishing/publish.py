@@ -12,7 +12,7 @@ from stages.publishing.publication import read_publication
 from stages.publishing.store import Store
 
 
-def publish(folder: Path, destination: str, dry_run: bool) -> None:
+def publish_dataset(folder: Path, destination: str, dry_run: bool) -> None:
     """Send the files of a dataset that are not at a destination with the same bytes, and print what is done.
 
     destination: folder or URL of the dataset, such as `s3://bucket/castle` or `hf://organization/castle`

@@ -12,7 +12,7 @@ from stages.recovery.drawing_target import DrawingTarget
 from stages.recovery.initial_estimate import InitialEstimate, Up, initial_estimate
 from stages.recovery.inputs import RecoveryInput
 from stages.recovery.partial_target import PartialTarget, partial_target
-from stages.recovery.refinement import RefinedShape, refine
+from stages.recovery.refinement import RefinedShape, refine_estimate
 from stages.shape.arrays import FloatArray
 from stages.shape.views.camera import Camera
 from stages.training.recovery.estimate import base_estimate
@@ -117,8 +117,8 @@ def _fit(initial: InitialEstimate, budget: int, seed: int) -> RecoveryFit:
     program, surprise_cost, chance_distance = initial.program, 0.0, 0.0
     if budget > 1 and initial.model is not None and isinstance(initial.target, PartialTarget):
         surprise_cost, chance_distance = SURPRISE_COST, CHANCE_DISTANCE * _fit(initial, 1, seed).floor
-    refined = refine(program, initial.estimate, initial.target, budget, rng, surprise_cost, chance_distance)
-    base = refine(program, base_estimate(program), initial.target, 1, rng).distance
+    refined = refine_estimate(program, initial.estimate, initial.target, budget, rng, surprise_cost, chance_distance)
+    base = refine_estimate(program, base_estimate(program), initial.target, 1, rng).distance
     parts = program.parts(refined.values)
     missing = refined.target.missing(parts) if isinstance(refined.target, PartialTarget) else 0.0
     return RecoveryFit(initial, refined, refined.target.floor(parts, rng), base, missing, refined.tried)

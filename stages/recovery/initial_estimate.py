@@ -12,7 +12,7 @@ from stages.programs.program import Program
 from stages.recovery.cloud_target import cloud_target
 from stages.recovery.drawing_target import drawing_target
 from stages.recovery.inputs import RecoveryInput
-from stages.recovery.refinement import refine
+from stages.recovery.refinement import refine_estimate
 from stages.recovery.target import RecoveryTarget
 from stages.shape.arrays import FloatArray
 from stages.sketches.settings import SketchesConfig
@@ -75,7 +75,7 @@ def initial_estimate(
         rng = np.random.default_rng(seed)
         estimate = base_estimate(program) if model is None else model.estimate_from_cloud(cloud, rng)
         initial = InitialEstimate(program, model, estimate, target_of(cloud, rng), rotation, axis, frame_of(cloud))
-        candidates.append((refine(program, estimate, initial.target, 1, rng).distance, initial))
+        candidates.append((refine_estimate(program, estimate, initial.target, 1, rng).distance, initial))
     return min(candidates, key=lambda candidate: candidate[0])[1]
 
 

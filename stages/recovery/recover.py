@@ -11,7 +11,7 @@ from stages.recovery.fitting import best_fit
 from stages.recovery.initial_estimate import Up, initial_estimate
 from stages.recovery.inputs import RecoveryInput, checked_cloud, ink_from_picture
 from stages.recovery.outliers import find_outliers
-from stages.recovery.refinement import refine
+from stages.recovery.refinement import refine_estimate
 from stages.recovery.result import RecoveryResult, recovery_result
 from stages.shape.arrays import ByteArray, FloatArray
 from stages.training.recovery.trained import RecoveryModels
@@ -59,7 +59,7 @@ def recover_input(
     if len(initials) > 1:
         rng = np.random.default_rng(seed)
         distances = [
-            refine(initial.program, initial.estimate, initial.target, PROGRAM_TRIAL_SHAPES, rng).distance
+            refine_estimate(initial.program, initial.estimate, initial.target, PROGRAM_TRIAL_SHAPES, rng).distance
             for initial in initials
         ]
         initials = [initials[int(np.argmin(distances))]]

@@ -54,7 +54,7 @@ class RefinedShape:
     tried: int
 
 
-def refine(
+def refine_estimate(
     program: Program,
     estimate: ParameterEstimate,
     target: RecoveryTarget,

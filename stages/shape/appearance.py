@@ -170,7 +170,7 @@ class Look:
     appearance: Appearance | None
 
 
-def joined(appearances: Sequence[Appearance | None], face_counts: Sequence[int]) -> Appearance | None:
+def joined_appearance(appearances: Sequence[Appearance | None], face_counts: Sequence[int]) -> Appearance | None:
     """Return the look of meshes one after another, or None if none has one.
 
     Meshes without an appearance have no material. Normals are left out unless all meshes have them.

@@ -11,7 +11,7 @@ from stages.shape.collection.classes import read_labels
 from stages.shape.collection.language import Language, RebuildShape, Source
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
-from stages.shapeassembly.shape import label_colors, shape_of_text
+from stages.shapeassembly.shape import category_label_colors, shape_of_program_text
 
 
 class ProgramDecoder:
@@ -22,7 +22,7 @@ class ProgramDecoder:
 
     def shape(self, sample: Sample) -> Shape:
         """Return the executed program with the labels of its category. Raises ProgramError for an invalid text."""
-        return shape_of_text(sample.text, self.sources[sample.kit].labels)
+        return shape_of_program_text(sample.text, self.sources[sample.kit].labels)
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
         """Return nothing: a program starts from a text, not from shapes."""
@@ -30,7 +30,7 @@ class ProgramDecoder:
 
 
 def _source(labels: tuple[str, ...]) -> Source:
-    colors = tuple((red, green, blue) for red, green, blue in label_colors(len(labels)).tolist())
+    colors = tuple((red, green, blue) for red, green, blue in category_label_colors(len(labels)).tolist())
     return Source(labels, colors, f"{len(labels)} part labels")
 
 
@@ -51,7 +51,7 @@ def _decoder(task: Task) -> ProgramDecoder:
 def _rebuild(places: DatasetPaths) -> RebuildShape:
     """Return the function that executes a record's program, with the labels that the dataset lists."""
     labels = read_labels(places.out / places.dataset / "classes.json")
-    return lambda record, _: upright(shape_of_text(record["text"], tuple(labels.get(record["kit"], ()))))
+    return lambda record, _: upright(shape_of_program_text(record["text"], tuple(labels.get(record["kit"], ()))))
 
 
 LANGUAGE = Language(

@@ -25,7 +25,7 @@ _TONES = np.array(
 """Colours of the labels in order, sRGB: woods, cloths and paints."""
 
 
-def shape_of_text(text: str, labels: Sequence[str] = ()) -> Shape:
+def shape_of_program_text(text: str, labels: Sequence[str] = ()) -> Shape:
     """Return the shape of a program's text. Raises ProgramError where it cannot be read or executed."""
     return shape_of_execution(execute(parse(text)), labels)
 
@@ -36,7 +36,7 @@ def shape_of_execution(execution: Execution, labels: Sequence[str] = ()) -> Shap
     labels: those of all programs of a category, whose order decides the colours; without them the shape's own, sorted.
     """
     all_labels = tuple(labels) or tuple(sorted(set(execution.labels)))
-    color_of = dict(zip(all_labels, label_colors(len(all_labels)), strict=True))
+    color_of = dict(zip(all_labels, category_label_colors(len(all_labels)), strict=True))
     halves = np.array([[x, y, z] for x in (0.5, -0.5) for y in (0.5, -0.5) for z in (0.5, -0.5)])
     meshes = tuple(
         PartMesh(label, halves * size, _FACES, np.tile(color_of[label], (len(_FACES), 1)))
@@ -49,6 +49,6 @@ def shape_of_execution(execution: Execution, labels: Sequence[str] = ()) -> Shap
     return Shape(meshes, assembly, "y", all_labels, execution.names)
 
 
-def label_colors(count: int) -> ByteArray:
+def category_label_colors(count: int) -> ByteArray:
     """Return the colours of the first `count` labels of a category, sRGB uint8 (count, 3)."""
     return _TONES[np.arange(count) % len(_TONES)]

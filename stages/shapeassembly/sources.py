@@ -49,7 +49,7 @@ def program_texts(path: Path, folder: str = "") -> Iterator[tuple[str, str]]:
     yield from sorted(texts.items())
 
 
-def listed_names(path: Path, name: str) -> list[str]:
+def names_of_list(path: Path, name: str) -> list[str]:
     """Return the lines of a `.txt` list below `path`, without empty ones. Raises KeyError where it does not exist."""
     lists = dict(program_texts(path, name.rpartition("/")[0]))
     return lists[name].split()

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from pipeline.errors import ShardFailed
 from stages.shape.collection.assignment import SPLITS, assign_splits
 from stages.shapeassembly.settings import ProgramFiles, ShapeAssemblyConfig
-from stages.shapeassembly.sources import listed_names
+from stages.shapeassembly.sources import names_of_list
 
 
 def splits_of(
@@ -48,7 +48,7 @@ def _listed(source: ProgramFiles) -> dict[str, int]:
     splits: dict[str, int] = {}
     for split, name in source.lists.items():
         try:
-            names = listed_names(source.path, name)
+            names = names_of_list(source.path, name)
         except KeyError:
             raise ShardFailed(f"{key}: there is no {name} in {source.path}") from None
         for program in names:

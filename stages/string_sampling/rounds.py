@@ -71,7 +71,7 @@ def _reason_to_end(wanted: int, patience: int, pools: Sequence[Mapping[str, Any]
     return ""
 
 
-def run_pool(task: Task) -> Outcome:
+def write_new_graphs(task: Task) -> Outcome:
     """Write the new graphs of a round, each once.
 
     `.graphs.txt`: their digests; `.jsonl`: for each its worker, its key there, and its graph.

@@ -20,7 +20,7 @@ from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.assignment import SPLITS, SplitConfig, assign_shards, assign_splits
 from stages.shape.sample import read_samples, write_sample
-from stages.string_sampling.rounds import ModelRounds, model_rounds, read_pool, run_pool
+from stages.string_sampling.rounds import ModelRounds, model_rounds, read_pool, write_new_graphs
 from stages.string_sampling.settings import StringSamplingConfig
 from stages.string_sampling.source import run_source
 
@@ -46,7 +46,7 @@ def run_shard(task: Task) -> Outcome:
     jobs = {
         "source": run_source,
         "worker": run_worker,
-        "pool": run_pool,
+        "pool": write_new_graphs,
         "assignment": run_assignment,
         "collection": run_collection,
     }

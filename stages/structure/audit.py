@@ -37,7 +37,7 @@ def structure_faults(sample: PackagedSample) -> Iterator[str]:
                 yield f"its {operation['kind']} by {operation['degrees']} degrees leaves an orbit"
 
 
-def recomputed_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
+def recomputed_structure_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
     """Yield a sentence for a hierarchy or a symmetry that the shape does not have."""
     config = StructureConfig.model_validate(sample.sections.get("structure", {}))
     language = described_language(sample.record["language"], sample.record.get("text", ""))
@@ -50,4 +50,4 @@ def recomputed_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
                 yield f"the {name} of its symmetry are not those of its shape"
 
 
-AUDIT = Audit(faults=structure_faults, recheck=recomputed_faults)
+AUDIT = Audit(faults=structure_faults, recheck=recomputed_structure_faults)

@@ -50,7 +50,7 @@ def _fall_faults(physics: Mapping[str, Any], parts: int) -> Iterator[str]:
         yield "its json names a fallen part that does not exist"
 
 
-def recomputed_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
+def recomputed_validity_faults(sample: PackagedSample, _: DatasetPaths) -> Iterator[str]:
     """Yield a sentence for each field that statics computes otherwise, and for wrong contacts."""
     shape, recorded = sample.shape, sample.record["physics"]
     judge = judge_of(shape.meshes, shape.up, _config(sample))
@@ -101,4 +101,4 @@ def _config(sample: PackagedSample) -> ValidityConfig:
     return ValidityConfig.model_validate(sample.sections["validity"])
 
 
-AUDIT = Audit(faults=contradictions, recheck=recomputed_faults)
+AUDIT = Audit(faults=contradictions, recheck=recomputed_validity_faults)

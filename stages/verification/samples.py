@@ -29,7 +29,7 @@ class SampleError(Exception):
     """A sample that cannot be read; the message says why."""
 
 
-def read_record(content: bytes) -> dict[str, Any]:
+def read_sample_record(content: bytes) -> dict[str, Any]:
     """Return the record of a sample. Raises SampleError."""
     try:
         record = json.loads(content)

@@ -28,7 +28,7 @@ from stages.verification.samples import (
     SampleError,
     array_faults,
     read_packaged,
-    read_record,
+    read_sample_record,
     record_faults,
     sample_faults,
 )
@@ -67,7 +67,7 @@ def check_shard(
                 findings.fault("samples", where, what)
             row = (indexed or {}).pop(key, None)
             try:
-                record = read_record(members["json"])
+                record = read_sample_record(members["json"])
                 for what in (
                     *record_faults(record, key, shard["split"], manifest["kits"]),
                     *schema_faults(validator, record),

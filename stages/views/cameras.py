@@ -70,12 +70,12 @@ def sample_views(
 
 def light_view(azimuth: float, elevation: float, sphere: Sphere) -> View:
     """Return the view from a distant light, whose square picture holds the bounding sphere; angles are in degrees."""
-    rotation = orbit_rotation(azimuth, circle(elevation)[1])
+    rotation = orbit_rotation(azimuth, cosine_and_sine(elevation)[1])
     frame = PictureFrame(1.0, 1.0, ORTHOGRAPHIC_DISTANCE_RADII, False)
     return _view(rotation, ORTHOGRAPHIC_DISTANCE_RADII * rotation[2], frame, sphere)
 
 
-def circle(degrees: float) -> tuple[float, float]:
+def cosine_and_sine(degrees: float) -> tuple[float, float]:
     """Return cosine and sine of an angle, by their power series."""
     quarter = math.floor(degrees / 90.0 + 0.5)
     angle = (degrees - 90.0 * quarter) * (math.pi / 180.0)
@@ -95,7 +95,7 @@ def orbit_rotation(azimuth: float, height: float) -> FloatArray:
 
     Rows are right, up and backwards.
     """
-    (ca, sa), ce = circle(azimuth), math.sqrt(max(1.0 - height * height, 0.0))
+    (ca, sa), ce = cosine_and_sine(azimuth), math.sqrt(max(1.0 - height * height, 0.0))
     return np.array([[ca, 0.0, -sa], [-height * sa, ce, -height * ca], [ce * sa, height, ce * ca]])
 
 
@@ -123,9 +123,9 @@ def _directions(
     """Yield azimuth in degrees and sine of the elevation of each camera."""
     if isinstance(cameras, RingCameras):
         for index in range(cameras.count):
-            yield cameras.azimuth + 360.0 * index / cameras.count, circle(cameras.elevation)[1]
+            yield cameras.azimuth + 360.0 * index / cameras.count, cosine_and_sine(cameras.elevation)[1]
         return
-    low, high = circle(cameras.min_elevation)[1], circle(cameras.max_elevation)[1]
+    low, high = cosine_and_sine(cameras.min_elevation)[1], cosine_and_sine(cameras.max_elevation)[1]
     if isinstance(cameras, RandomCameras):
         for turn, share in rng.random((cameras.count, 2)).tolist():
             yield 360.0 * turn, low + (high - low) * share
@@ -157,7 +157,7 @@ def _frame(lens: Lens, config: ViewsConfig, distance: float) -> PictureFrame:
 
 
 def _half_slope(lens: Lens) -> float:
-    cosine, sine = circle(lens.fov / 2.0)
+    cosine, sine = cosine_and_sine(lens.fov / 2.0)
     return sine / cosine
 
 

@@ -47,7 +47,7 @@ def view_files(
     if "color" in config.images:
         light = view_light(renderer, config.color.supersample, lamp)
         pixels = to_srgb(light, config.color.background == "transparent")
-        files[f"color{index}.{COLOR_SUFFIX[config.color.format]}"] = color_bytes(pixels, config.color)
+        files[f"color{index}.{COLOR_SUFFIX[config.color.format]}"] = formatted_colors(pixels, config.color)
     if SURFACE_IMAGES & set(config.images):
         surface = renderer.surface(config.normals_space == "world")
         if config.multichannel:
@@ -64,7 +64,7 @@ def view_files(
     return files, fields
 
 
-def color_bytes(pixels: ByteArray, options: ColorOptions) -> bytes:
+def formatted_colors(pixels: ByteArray, options: ColorOptions) -> bytes:
     """Return colours, uint8 (h, w, 3 or 4), in the format of the config."""
     if options.format == "png":
         return color_png_bytes(pixels)

@@ -30,7 +30,7 @@ from stages.shape.views.scene import Scene
 from stages.shape.views.screen import clip_at, eye_depth
 from stages.shape.views.surface_maps import bent_normals, emitted_light, surface_finish
 from stages.shape.views.texels import has_holes, sample_colors
-from stages.views.cameras import Sphere, circle, light_view, orbit_rotation
+from stages.views.cameras import Sphere, cosine_and_sine, light_view, orbit_rotation
 from stages.views.render import ViewRenderer
 
 KEY_LIGHT, FILL_LIGHT, SKY_LIGHT, GROUND_LIGHT = 0.70, 0.14, 0.40, 0.16
@@ -71,7 +71,7 @@ class Lamp:
 
 def lamp_of(scene: Scene, sphere: Sphere, azimuth: float, elevation: float, shadows: bool) -> Lamp:
     """Return the light from a direction in degrees, with the shadow map of a scene if wanted."""
-    direction = orbit_rotation(azimuth, circle(elevation)[1])[2]
+    direction = orbit_rotation(azimuth, cosine_and_sine(elevation)[1])[2]
     fill = orbit_rotation(azimuth + FILL_TURN_DEGREES, 0.0)[2]
     view = light_view(azimuth, elevation, sphere)
     if not shadows:
@@ -193,7 +193,7 @@ def _taps(supersample: int, radius: float) -> FloatArray:
     samples = supersample * supersample
     total = samples * SHADOW_TAPS
     points = [
-        [np.sqrt((number + 0.5) / total) * axis for axis in circle(number * GOLDEN_ANGLE_DEGREES)]
+        [np.sqrt((number + 0.5) / total) * axis for axis in cosine_and_sine(number * GOLDEN_ANGLE_DEGREES)]
         for number in range(total)
     ]
     return radius * np.array(points).reshape(SHADOW_TAPS, samples, 2).transpose(1, 0, 2).copy()

@@ -23,7 +23,7 @@ import trimesh
 from pipeline.errors import Rejected
 from stages.export.mjcf import mjcf_files
 from stages.export.model import SimulationModel, simulation_model
-from stages.export.samples import sample_shape
+from stages.export.samples import shape_of_sample
 from stages.export.settings import ExportSettings
 from stages.export.urdf import urdf_files
 from stages.export.usd import usd_files
@@ -62,7 +62,7 @@ def compare_surfaces(folder: Path, count: int) -> Counter[str]:
     """Return counts of what was compared and of what differs."""
     found, largest = Counter[str](), 0.0
     for sample in samples_of(folder, count):
-        shape = sample_shape(sample)
+        shape = shape_of_sample(sample)
         found["shapes"] += 1
         for kind in sorted(set(shape.assembly.types.tolist())):
             _compare_flags(shape.meshes[kind], found)
@@ -127,7 +127,7 @@ def open_exports(folder: Path, count: int) -> Counter[str]:
     """Return counts of what the engines opened and of what they found."""
     found = Counter[str]()
     for sample in samples_of(folder, count):
-        shape, joints = sample_shape(sample), pairs_of(sample.members[JOINTS])
+        shape, joints = shape_of_sample(sample), pairs_of(sample.members[JOINTS])
         low, high = shape_bounds(shape)
         scale = 1.0 if sample.record["unit"] == "metre" else 1.0 / float(np.linalg.norm(high - low))
         model = simulation_model(sample.key, shape, joints, ExportSettings(links="bodies", scale=scale))

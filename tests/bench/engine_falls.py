@@ -223,14 +223,14 @@ def verdicts(name: str, shape: Shape, config: PhysicsConfig) -> Verdicts:
 
 def program_shapes(folder: Path, count: int) -> Iterator[tuple[str, Shape]]:
     """Yield `count` published ShapeAssembly programs, a third of each category, with their category and number."""
-    from stages.shapeassembly.shape import shape_of_text
+    from stages.shapeassembly.shape import shape_of_program_text
     from stages.shapeassembly.sources import program_texts
 
     for category in ("chair", "table", "storage"):
         texts = sorted(program_texts(folder / "programs.tar.xz", f"data/{category}"))
         for place in np.random.default_rng(49).permutation(len(texts))[: count // 3].tolist():
             name, text = texts[place]
-            yield f"{category} {Path(name).stem}", shape_of_text(text)
+            yield f"{category} {Path(name).stem}", shape_of_program_text(text)
 
 
 def generated_shapes(count: int) -> Iterator[tuple[str, Iterator[tuple[str, Shape]]]]:
@@ -252,25 +252,28 @@ def _curve_shapes(count: int) -> Iterator[tuple[str, Shape]]:
 
 
 def _solid_shapes(count: int) -> Iterator[tuple[str, Shape]]:
-    from stages.primitives.compose import compose
+    from stages.primitives.compose import random_composition
     from stages.primitives.settings import PrimitivesConfig
     from stages.primitives.text import shape_of_solids
 
     config = PrimitivesConfig()
     for index in range(count):
         composition = config.compositions[index % len(config.compositions)]
-        yield f"{composition} {index}", shape_of_solids(compose(composition, config, np.random.default_rng(index)))
+        yield (
+            f"{composition} {index}",
+            shape_of_solids(random_composition(composition, config, np.random.default_rng(index))),
+        )
 
 
 def _random_program_shapes(count: int) -> Iterator[tuple[str, Shape]]:
     from stages.shapeassembly.random_programs import random_program
     from stages.shapeassembly.settings import RandomPrograms
-    from stages.shapeassembly.shape import shape_of_text
+    from stages.shapeassembly.shape import shape_of_program_text
     from stages.shapeassembly.syntax.printer import print_program
 
     for index in range(count):
         program = random_program(RandomPrograms(name="random", samples=1), np.random.default_rng(index))
-        yield f"random program {index}", shape_of_text(print_program(program))
+        yield f"random program {index}", shape_of_program_text(print_program(program))
 
 
 def _kit_shapes(count: int) -> Iterator[tuple[str, Shape]]:

@@ -24,7 +24,12 @@ from stages.shape.geometry.clouds import chamfer_squared
 from stages.training.recovery.augmentation import quantized_cloud
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.settings import RecoveryModelConfig
-from stages.training.recovery.shapes import TRAIN_INTERVAL, VALIDATION_INTERVAL, nearest_valid_values, random_shapes
+from stages.training.recovery.shapes import (
+    TRAIN_INTERVAL,
+    VALIDATION_INTERVAL,
+    nearest_valid_values,
+    random_training_shapes,
+)
 from stages.training.recovery.surface import sample_points, shape_points
 from stages.training.recovery.training import RecoveryTask, new_network
 from tests.bench.published_dgcnn import PublishedDGCNN
@@ -76,7 +81,7 @@ Clouds = tuple[FloatArray, np.ndarray, list[dict[str, object]]]
 
 def _clouds(program: Program, interval: tuple[float, float], count: int) -> Clouds:
     rng = np.random.default_rng(0)
-    shapes = list(islice(random_shapes(program, interval, rng), count))
+    shapes = list(islice(random_training_shapes(program, interval, rng), count))
     clouds = [sample_points(shape.parts, PUBLISHED_POINTS, rng) for shape in shapes]
     framed = np.array([frame_of(cloud).normalized(cloud) for cloud in clouds])
     return framed, np.array([shape.classes for shape in shapes]), [dict(shape.values) for shape in shapes]

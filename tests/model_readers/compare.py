@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.errors import ConfigError
 from stages.model_files.scene import GREY
 from stages.model_files.scene_file import READERS
-from stages.model_files.wavefront_text import decode_text
+from stages.model_files.wavefront_text import decode_wavefront_text
 from tests.model_readers.peers import PEERS, Contents, read_ours
 
 MAX_DIFFERENCE = 1e-4
@@ -96,7 +96,9 @@ def _explanation(field: str, path: Path, ours: Contents, peer: str, other: Conte
     if field == "bounds" and suffix in (".glb", ".gltf") and b'"skins"' in path.read_bytes():
         return f"{peer} leaves skins out"
     if field == "materials" and peer == "trimesh":
-        libraries = " ".join(" ".join(decode_text(file.read_bytes()).split()) for file in path.parent.glob("*.mtl"))
+        libraries = " ".join(
+            " ".join(decode_wavefront_text(file.read_bytes()).split()) for file in path.parent.glob("*.mtl")
+        )
         if not any(f"newmtl {name}" in libraries for name in ours.materials - other.materials):
             return "trimesh names no material that is not in a library"
     if field == "colors" and peer == "trimesh" and suffix in (".glb", ".gltf"):
@@ -108,7 +110,7 @@ def polygon_areas(path: Path) -> tuple[float, float]:
     """Return the areas of all polygons of an OBJ file: of their outlines, projected, and of fans from first corners."""
     points: list[list[float]] = []
     outlines = fans = 0.0
-    for line in decode_text(path.read_bytes()).splitlines():
+    for line in decode_wavefront_text(path.read_bytes()).splitlines():
         key, *fields = line.split() or [""]
         if key == "v":
             points.append([float(field) for field in fields[:3]])
@@ -138,7 +140,7 @@ def _agree(field: str, path: Path, ours: Contents, other: Contents) -> bool:
     if field == "volume":
         return abs(ours.volume - other.volume) <= MAX_DIFFERENCE * diagonal * ours.area
     if field == "names":
-        text = html.unescape(decode_text(path.read_bytes()))
+        text = html.unescape(decode_wavefront_text(path.read_bytes()))
         given = {name for name in ours.names if name != path.stem and not re.fullmatch(r"(node|mesh)\d+", name)}
         return given <= other.names or all(name in " ".join(text.split()) for name in given)
     if field == "materials":

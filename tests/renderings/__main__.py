@@ -28,7 +28,7 @@ from stages.inspection.config_text import dataset_name
 from stages.model_files.read import read_model
 from stages.model_files.scene import ModelScene
 from stages.package.glb import glb_bytes
-from stages.proportions.text import ProportionShapes, shape_of_text
+from stages.proportions.text import ProportionShapes, shape_of_proportion_text
 from stages.rows.draws import LayoutDraws
 from stages.rows.layout import layout_of
 from stages.rows.settings import RowsConfig
@@ -123,7 +123,7 @@ def _inspected(model: Path, folder: Path) -> Iterator[tuple[str, Shape]]:
         for number, sample in enumerate(samples, start=1):
             of_kit = shapes[sample.kit]
             if sample.text:
-                yield f"{stage} {number}", shape_of_text(of_kit, sample.text)
+                yield f"{stage} {number}", shape_of_proportion_text(of_kit, sample.text)
             else:
                 yield f"{stage} {number}", kit_shape(of_kit.kit, sample.assembly)
 

@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.errors import ConfigError
 from stages.exemplars.model import Model
 from stages.grammars.extraction.docked_pieces import DockedPiece, find_docked_pieces
-from stages.grammars.extraction.grids import GridRow, crossing_rows, cut_grid, find_rows
+from stages.grammars.extraction.grids import GridRow, crossing_rows, cut_grid, find_one_grids
 from stages.grammars.extraction.productions import extract_productions, seams_by_site
 from stages.grammars.extraction.seams import Seam
 from stages.grammars.extraction.terminals import Terminal, unshared_terminal
@@ -175,7 +175,7 @@ def extract_grammar(
     pieces = find_docked_pieces(grid, transforms)
     seams = seams_by_site(grid, pieces)
     finish("docked pieces")
-    rows = find_rows(grid, pieces, seams)
+    rows = find_one_grids(grid, pieces, seams)
     extracted_grids = [
         cut_grid(grid, pieces, [rows[index] for index in chosen], seams) for chosen in crossing_rows(grid, pieces, rows)
     ]

@@ -62,7 +62,7 @@ class ExtractedGrid:
     pieces: tuple[tuple[tuple[int, ...], Soup], ...]
 
 
-def find_rows(grid: SurfaceGrid, pieces: Sequence[DockedPiece], seams: dict[int, Seam]) -> list[GridRow]:
+def find_one_grids(grid: SurfaceGrid, pieces: Sequence[DockedPiece], seams: dict[int, Seam]) -> list[GridRow]:
     """Find the 1-grids among docked pieces, those of most cells first: chains of insertions that undo deletions.
 
     A piece contains another one of its class, and the transform from site to site goes on. A row that equals another

@@ -12,7 +12,7 @@ from stages.grammars.scans.point_neighbourhoods import estimate_noise, point_nei
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.kit import LengthUnit
 from stages.symmetry.surface.grid import CELLS_PER_RADIUS, LATTICE_OFFSET_CELLS, SurfaceGrid
-from stages.symmetry.surface.lattice import neighbours_of, pack, unpack
+from stages.symmetry.surface.lattice import neighbours_of, pack_cells, unpack_cells
 
 MIN_POINTS = 500
 MAX_COORDINATE = 1e30
@@ -98,7 +98,7 @@ def scanned_grid(cloud: ScannedCloud, share: float) -> ScannedGrid:
     radius = share * float((projected.max(axis=0) - low).max())
     size = radius / CELLS_PER_RADIUS
     origin = low - size * (np.array(LATTICE_OFFSET_CELLS) + 2)
-    packed = pack(np.floor((projected - origin) / size).astype(np.int64))
+    packed = pack_cells(np.floor((projected - origin) / size).astype(np.int64))
     order = np.lexsort((patch, packed))
     faces, patch, projected, packed = faces[order], patch[order], projected[order], packed[order]
     areas = np.pi * around.reach[faces] ** 2 / around.near.shape[1]
@@ -109,7 +109,7 @@ def scanned_grid(cloud: ScannedCloud, share: float) -> ScannedGrid:
             f"set radius to at least {share * (MIN_POINTS_PER_CELL / per_cell) ** 0.5:.3f}, or scan more densely"
         )
     keys, first = np.unique(packed, return_index=True)
-    cells = unpack(keys)
+    cells = unpack_cells(keys)
     begin = np.flatnonzero(np.r_[True, (packed[1:] != packed[:-1]) | (patch[1:] != patch[:-1])])
     count = np.diff(np.r_[begin, len(faces)])
     item_cell = np.searchsorted(keys, packed[begin]).astype(np.int32)

@@ -175,7 +175,7 @@ def _facing(a, b, c, x, y, z):
 
 
 @numba.njit(cache=True)
-def cut(vertices, quads):
+def cut_quads(vertices, quads):
     """Triangles, int32 (f, 3): each quad is cut along the diagonal with the larger smaller piece, seen from its front.
 
     A quad with a notch is cut there.

@@ -28,9 +28,9 @@ class QuadMesh:
     @cached_property
     def triangles(self) -> IntArray:
         """The faces as triangles, int32 (f, 3); each quad is cut along the diagonal with the larger smaller piece."""
-        from stages.programs.curves.kernels import cut
+        from stages.programs.curves.kernels import cut_quads
 
-        triangles: IntArray = cut(self.vertices, self.quads)
+        triangles: IntArray = cut_quads(self.vertices, self.quads)
         return triangles
 
     @cached_property

@@ -41,7 +41,7 @@ def build(values: Values) -> list[Part]:
     return [
         *case_parts(cabinet),
         *top_parts(cabinet),
-        *base_parts(cabinet),
+        *cabinet_base_parts(cabinet),
         *shelf_parts(cabinet),
         *front_parts(cabinet),
     ]
@@ -173,7 +173,7 @@ def _crown(cabinet: CabinetDimensions, flare: float) -> QuadMesh:
     return loft_rings(rings)
 
 
-def base_parts(cabinet: CabinetDimensions) -> list[Part]:
+def cabinet_base_parts(cabinet: CabinetDimensions) -> list[Part]:
     """A plinth, legs or runners."""
     kind = cabinet.values["base_kind"]
     inset = 0.1 * cabinet.values["base_inset"]

@@ -6,7 +6,7 @@ import numpy as np
 
 from stages.programs.conditions import Condition
 from stages.programs.curves import Part, Style, bezier, circle, cylinder, square_circle, sweep, translation
-from stages.programs.library.table_dimensions import METAL, OAK, WALNUT, TableDimensions, upright
+from stages.programs.library.table_dimensions import METAL, OAK, WALNUT, TableDimensions, ring_mesh
 from stages.programs.library.table_legs import leg_parts, leg_width
 from stages.programs.parameters import binary, continuous, discrete
 from stages.programs.program import Constraint, Program
@@ -20,7 +20,7 @@ def build(values: Values) -> list[Part]:
     """Build the parts of the table at `values`."""
     table = TableDimensions(values)
     centers = (table.height - table.edge[:, 1:]) * [0.0, 1.0, 0.0]
-    top = Part("top", upright(table.outline, centers, 1.0 - table.edge[:, :1] / table.half), OAK)
+    top = Part("top", ring_mesh(table.outline, centers, 1.0 - table.edge[:, :1] / table.half), OAK)
     return [top, *(pedestal_parts(table) if values["is_monoleg"] else leg_parts(table))]
 
 
@@ -138,7 +138,7 @@ def _turned(table: TableDimensions, spread: FloatArray, base: float) -> Part:
     heights = table.under + (base + lip - table.under) * outline[:, 1]
     levels = np.concatenate([[table.sunk], heights, [base]])
     radii = np.concatenate([outline[:1, 0], outline[:, 0], outline[-1:, 0]])
-    return Part("pedestal", upright(circle(1.0, 32).points, _axis(levels), radii[:, None] * spread), WALNUT)
+    return Part("pedestal", ring_mesh(circle(1.0, 32).points, _axis(levels), radii[:, None] * spread), WALNUT)
 
 
 def _column(table: TableDimensions, level: float, thick: float) -> list[Part]:
@@ -146,11 +146,11 @@ def _column(table: TableDimensions, level: float, thick: float) -> list[Part]:
     if table.values["monoleg_tent_pct"] < 0.4:
         return [_turned(table, np.maximum(0.45 * table.spread, 4.0 * thick), level - 0.6 * thick)]
     section = square_circle(table.values["legs_bevel"], 1.5 * thick).points
-    column = upright(section, _axis(np.array([table.sunk, level])), np.ones(2))
+    column = ring_mesh(section, _axis(np.array([table.sunk, level])), np.ones(2))
     rim = np.array([table.sunk, table.under - 0.012, table.under - 0.016])
-    plate = upright(circle(1.0, 32).points, _axis(rim), np.array([1.0, 1.0, 0.97])[:, None] * 0.45 * table.spread)
+    plate = ring_mesh(circle(1.0, 32).points, _axis(rim), np.array([1.0, 1.0, 0.97])[:, None] * 0.45 * table.spread)
     hub = np.array([0.75, 0.6, -0.6, -0.75]) * thick + level
-    boss = upright(circle(1.5 * thick, 32).points, _axis(hub), np.array([0.9, 1.0, 1.0, 0.9]))
+    boss = ring_mesh(circle(1.5 * thick, 32).points, _axis(hub), np.array([0.9, 1.0, 1.0, 0.9]))
     return [Part("column", column, METAL), Part("plate", plate, METAL), Part("hub", boss, METAL)]
 
 

@@ -86,7 +86,7 @@ class TableDimensions:
         return spread
 
 
-def upright(outline: FloatArray, centers: FloatArray, scale: FloatArray) -> QuadMesh:
+def ring_mesh(outline: FloatArray, centers: FloatArray, scale: FloatArray) -> QuadMesh:
     """The mesh over horizontal rings, flat on the ground however it slants.
 
     outline: (k, 2) in the plane of x and z, convex

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.programs.curves import Part, Profile, QuadMesh, loft_rings, rounded_rectangle, square_circle, symmetric
-from stages.programs.library.table_dimensions import WALNUT, TableDimensions, upright
+from stages.programs.library.table_dimensions import WALNUT, TableDimensions, ring_mesh
 from stages.shape.arrays import FloatArray
 
 LEG_RINGS = 9
@@ -29,7 +29,7 @@ def leg_parts(table: TableDimensions) -> list[Part]:
     centers = np.column_stack([frame.at(heights), heights])[:, [0, 2, 1]]
     tip = centers[:1] * [1.0, 0.0, 1.0] + [0.0, table.sunk, 0.0]
     width = leg_width(table, share)
-    mesh = upright(frame.section.points, np.concatenate([tip, centers]), np.concatenate([width[:1], width]))
+    mesh = ring_mesh(frame.section.points, np.concatenate([tip, centers]), np.concatenate([width[:1], width]))
     parts = symmetric(symmetric([Part("leg", mesh, WALNUT)], "x"), "z")
     if table.values["is_std_legs_support_x"]:
         parts += symmetric([_rail(table, frame, "x", 0)], "z")

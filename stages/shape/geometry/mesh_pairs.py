@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
-from stages.shape.geometry.polygons import cut, polygon_area
+from stages.shape.geometry.polygons import cut_polygon, polygon_area
 from stages.shape.geometry.sorting import sort_order
 
 MAX_LEAF_TRIANGLES = 4
@@ -319,10 +319,10 @@ def contact_patches(ca, cb, pairs, pose, tolerance):
         for k in range(3):
             polygon[k] = first[k]
         base = _dot(nb, tri[0])
-        count = cut(polygon, 3, nb, 1.0, base + tolerance, spare)
+        count = cut_polygon(polygon, 3, nb, 1.0, base + tolerance, spare)
         for axis in range(3):
             nb[axis] = -nb[axis]
-        count = cut(spare, count, nb, 1.0, -base + tolerance, polygon)
+        count = cut_polygon(spare, count, nb, 1.0, -base + tolerance, polygon)
         for k in range(3):
             if count == 0:
                 break
@@ -337,7 +337,7 @@ def contact_patches(ca, cb, pairs, pose, tolerance):
                 continue
             for axis in range(3):
                 edge[axis] /= length
-            count = cut(polygon, count, edge, 1.0, _dot(edge, tri[k]) + tolerance, spare)
+            count = cut_polygon(polygon, count, edge, 1.0, _dot(edge, tri[k]) + tolerance, spare)
             polygon, spare = spare, polygon
         if count == 0:
             continue

@@ -12,7 +12,7 @@ THIN_CORNER_SHARE = 1e-7
 
 
 @numba.njit(cache=True)
-def cut(polygon, count, n, sign, offset, out):
+def cut_polygon(polygon, count, n, sign, offset, out):
     """Write the part of a polygon, its first `count` rows, where sign n . x <= offset, into `out`. Returns its corner
     count.
     """

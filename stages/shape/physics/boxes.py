@@ -9,7 +9,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.shape.geometry.polygons import cut, polygon_area
+from stages.shape.geometry.polygons import cut_polygon, polygon_area
 
 SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 EDGES = np.array([[a, b] for a in range(8) for b in range(a + 1, 8) if np.abs(SIGNS[a] - SIGNS[b]).sum() == 2])
@@ -193,8 +193,8 @@ def _cut_by_box(polygon, count, c, r, h, but, slack, spare):
         if k == but:
             continue
         base = r[k, 0] * c[0] + r[k, 1] * c[1] + r[k, 2] * c[2]
-        count = cut(polygon, count, r[k], 1.0, base + h[k] + slack, spare)
-        count = cut(spare, count, r[k], -1.0, -base + h[k] + slack, polygon)
+        count = cut_polygon(polygon, count, r[k], 1.0, base + h[k] + slack, spare)
+        count = cut_polygon(spare, count, r[k], -1.0, -base + h[k] + slack, polygon)
         if count == 0:
             break
     return count
@@ -272,7 +272,7 @@ def box_contacts(centres, axes, halves, pairs, tolerance):
                 count = _cut_by_box(polygon, 4, centres[base], axes[base], halves[base], axis, slack, spare)
                 slack = tolerance if slack < tolerance else np.inf
             plane = np.dot(axes[base, axis], centres[base]) * sign + halves[base, axis]
-            count = cut(polygon, count, axes[base, axis], sign, plane + tolerance, spare)
+            count = cut_polygon(polygon, count, axes[base, axis], sign, plane + tolerance, spare)
             for k in range(count):
                 above = (sign * np.dot(axes[base, axis], spare[k]) - plane) / 2
                 polygon[k] = spare[k] - above * sign * axes[base, axis]

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.geometry.polygons import convex_hull, cut
+from stages.shape.geometry.polygons import convex_hull, cut_polygon
 from stages.shape.geometry.sorting import sort_values
 
 MIN_OPPOSED_COSINE = 0.98
@@ -82,13 +82,13 @@ def facing_polygons(ca, cb, pairs, pose, tolerance, oriented):
         count = 3
         for k in range(3):
             offset = _sides(tri, nb, k, side)
-            count = cut(polygon, count, side, 1.0, offset, spare)
+            count = cut_polygon(polygon, count, side, 1.0, offset, spare)
             polygon, spare = spare, polygon
             if count == 0:
                 break
         base = nb[0] * tri[0, 0] + nb[1] * tri[0, 1] + nb[2] * tri[0, 2]
-        count = cut(polygon, count, nb, 1.0, base + tolerance, spare)
-        count = cut(spare, count, nb, -1.0, -base + tolerance, polygon)
+        count = cut_polygon(polygon, count, nb, 1.0, base + tolerance, spare)
+        count = cut_polygon(spare, count, nb, -1.0, -base + tolerance, polygon)
         if count < 3:
             continue
         sign = -1.0 if facing < 0 else 1.0

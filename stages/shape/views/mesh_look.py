@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stages.shape.appearance import Appearance, Texture, joined
+from stages.shape.appearance import Appearance, Texture, joined_appearance
 from stages.shape.arrays import BoolArray, ByteArray, Float32Array, FloatArray, IntArray
 from stages.shape.views.palette import srgb_to_linear
 
@@ -80,7 +80,7 @@ class SurfaceMaps(NamedTuple):
 
 def mesh_look(appearances: Sequence[Appearance | None], face_counts: Sequence[int]) -> MeshLook | None:
     """Return the looks of meshes, one after another; None if no face has a material."""
-    whole = joined(appearances, face_counts)
+    whole = joined_appearance(appearances, face_counts)
     if whole is None or not whole.materials:
         return None
     materials = whole.materials
@@ -94,7 +94,7 @@ def mesh_look(appearances: Sequence[Appearance | None], face_counts: Sequence[in
 
 def surface_maps(appearances: Sequence[Appearance | None], face_counts: Sequence[int]) -> SurfaceMaps | None:
     """Return what the materials of meshes have besides base colours; None if they have nothing."""
-    whole = joined(appearances, face_counts)
+    whole = joined_appearance(appearances, face_counts)
     if whole is None:
         return None
     items = whole.materials

@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.parameters import MIN_CUBOID_SIZE
-from stages.shapeassembly.syntax.printer import rounded
+from stages.shapeassembly.syntax.printer import rounded_program
 from stages.shapeassembly.syntax.program import AssemblyProgram, Attach, Cuboid, Line, Point, Squeeze
 
 MAX_EXPONENT_CHANGE = 0.6
@@ -47,7 +47,7 @@ def edit_program(program: AssemblyProgram, log_std: float, rng: np.random.Genera
             return replace(line, u=u, v=v)
         return line
 
-    return rounded(program.with_lines(change))
+    return rounded_program(program.with_lines(change))
 
 
 def _warped(coordinates: FloatArray, exponents: FloatArray) -> FloatArray:

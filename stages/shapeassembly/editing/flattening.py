@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shapeassembly.execution.interpreter import execute
-from stages.shapeassembly.extraction.boxes import bounding_box, box_corners
+from stages.shapeassembly.extraction.boxes import bounding_box, corners_of_box
 from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES
 from stages.shapeassembly.extraction.extract import extract
 from stages.shapeassembly.extraction.hierarchy import PartHierarchy, PartNode
@@ -28,7 +28,7 @@ def without_hierarchy(program: AssemblyProgram) -> AssemblyProgram:
     executed.
     """
     boxes = execution_boxes(execute(program))
-    whole = bounding_box(np.concatenate([box_corners(box) for box in boxes]), np.eye(3))
+    whole = bounding_box(np.concatenate([corners_of_box(box) for box in boxes]), np.eye(3))
     root = PartNode("shape", whole, tuple(PartNode("part", box) for box in boxes))
     return extract(
         PartHierarchy(program.root.name, root), CATEGORY_RULES["any"], FIT_ONLY_GATES, WITHOUT_POOLING

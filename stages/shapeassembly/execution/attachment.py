@@ -109,7 +109,7 @@ def _nearest_tilted(box, target, near, far, gap):
 
 
 @numba.njit(cache=True)
-def grow(box, target, decision):
+def grow_to_target(box, target, decision):
     """Attach an aligned cuboid again, whatever its points: grow towards `target` if it is away."""
     decision[0] = STAY
     if _has_corner(target, box) or _has_corner(box, target):

@@ -16,7 +16,7 @@ from torch import Tensor
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.attachment import ADD_ALL, GROW, HINGE, MOVE, SCALE_ALL, STAY, across
 from stages.shapeassembly.execution.interpreter import check_executed
-from stages.shapeassembly.execution.kernels import ExecutedTables, run
+from stages.shapeassembly.execution.kernels import ExecutedTables, run_tables
 from stages.shapeassembly.execution.parameters import parameter_places
 from stages.shapeassembly.execution.tables import ATTACH, DECLARE, REFLECT, SQUEEZE, program_tables
 from stages.shapeassembly.syntax.program import AssemblyProgram
@@ -70,7 +70,7 @@ class DifferentiableProgram:
         rows, flat = self._flat.rows.copy(), self._flat
         rows[self._places[:, 0], self._places[:, 1]] = values.detach().numpy()
         executed: ExecutedTables
-        executed, starts, decisions = run(rows, flat.block_rows, flat.block_parts, flat.program_blocks)
+        executed, starts, decisions = run_tables(rows, flat.block_rows, flat.block_parts, flat.program_blocks)
         check_executed(executed)
         table = torch.zeros(len(rows), 6, dtype=torch.float64)
         triples = table.index_put(

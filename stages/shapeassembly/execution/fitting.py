@@ -59,7 +59,7 @@ def fit(
     )
     states = rng.spawn(2)
     before, after = (
-        chamfer_l1(surface_points(execute(candidate), samples, state), points)
+        chamfer_l1(sampled_surface_points(execute(candidate), samples, state), points)
         for candidate, state in zip((program, fitted), states, strict=True)
     )
     return FitResult(fitted, before, after)
@@ -151,7 +151,7 @@ def _bound(values: FloatArray | float) -> Tensor:
     return torch.as_tensor(values, dtype=torch.float64)
 
 
-def surface_points(execution: Execution, count: int, rng: np.random.Generator) -> FloatArray:
+def sampled_surface_points(execution: Execution, count: int, rng: np.random.Generator) -> FloatArray:
     """Sample the surfaces of all leaf cuboids uniformly by area, float64 (count, 3)."""
     cuboids, weights = _chosen_points(execution.corners, count, rng)
     points: FloatArray = (execution.corners[cuboids] * weights.numpy()[:, :, None]).sum(axis=1)

@@ -89,10 +89,10 @@ def execute_all(programs: Sequence[AssemblyProgram]) -> list[Execution]:
 
 def execute_tables(flat: ProgramTables, programs: Sequence[AssemblyProgram]) -> list[Execution]:
     """Execute the programs of some tables."""
-    from stages.shapeassembly.execution.kernels import run
+    from stages.shapeassembly.execution.kernels import run_tables
 
     executed: ExecutedTables
-    executed, _, _ = run(flat.rows, flat.block_rows, flat.block_parts, flat.program_blocks)
+    executed, _, _ = run_tables(flat.rows, flat.block_rows, flat.block_parts, flat.program_blocks)
     check_executed(executed)
     executions = []
     leaf_starts, node_starts, blocks = (
@@ -125,11 +125,11 @@ def execute_block(block: Block) -> tuple[tuple[str, ...], FloatArray]:
     Returns the names of its cuboids and copies without the bounding box, and their centre, sizes and axes in its
     coordinates, float64 (n, 15). Raises ProgramError as `execute`.
     """
-    from stages.shapeassembly.execution.kernels import run
+    from stages.shapeassembly.execution.kernels import run_tables
 
     flat = program_tables([AssemblyProgram((block,))])
     executed: ExecutedTables
-    executed, _, _ = run(flat.rows, flat.block_rows, flat.block_parts, flat.program_blocks)
+    executed, _, _ = run_tables(flat.rows, flat.block_rows, flat.block_parts, flat.program_blocks)
     check_executed(executed)
     return flat.names[0][1:], executed.boxes[1:]
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from stages.shapeassembly.execution.attachment import MOVE, grow, hinge, hold, local, point, swing
+from stages.shapeassembly.execution.attachment import MOVE, grow_to_target, hinge, hold, local, point, swing
 from stages.shapeassembly.execution.tables import ATTACH, DECLARE, REFLECT, SQUEEZE
 from stages.shapeassembly.syntax.limits import MAX_BLOCK_ATTACHMENTS, MAX_DEPTH, MAX_PARTS, MAX_REACH
 
@@ -66,7 +66,7 @@ def _attach(boxes, aligned, events, count, decision):
         hold(box, p, goal)
         return
     if aligned[moved]:
-        grow(box, boxes[target], decision)
+        grow_to_target(box, boxes[target], decision)
         return
     priors = np.empty((priors_count, 3))
     priors_count = 0
@@ -263,7 +263,7 @@ def _place(boxes, child, mirrored, block_parts, node, leaves, corners, leaf_node
 
 
 @numba.njit(cache=True)
-def run(rows, block_rows, block_parts, program_blocks):
+def run_tables(rows, block_rows, block_parts, program_blocks):
     """Execute all programs of some tables.
 
     Returns the executed tables, where the decisions of each assembly start, int64 (b + 1,), and the decisions of all

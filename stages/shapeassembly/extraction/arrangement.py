@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.boxes import angle_between, bounding_box, box_corners, nearest_axes
+from stages.shapeassembly.extraction.boxes import angle_between, bounding_box, corners_of_box, nearest_axes
 from stages.shapeassembly.extraction.category_rules import CategoryRules
 from stages.shapeassembly.extraction.hierarchy import Box, PartNode
 
@@ -17,7 +17,7 @@ ALIGNED_DEGREES = 5.0
 
 def leaf_corners(part: PartNode) -> FloatArray:
     """Return the corners of all leaves of a part, float64 (8 n, 3)."""
-    return np.concatenate([box_corners(leaf.box) for leaf in part.leaves()])
+    return np.concatenate([corners_of_box(leaf.box) for leaf in part.leaves()])
 
 
 def arrange_parts(root: PartNode, rules: CategoryRules) -> PartNode:

@@ -36,7 +36,7 @@ def local_points(box: Box, points: FloatArray) -> FloatArray:
     return np.where(box.size > 1e-12, offset / np.maximum(box.size, 1e-12), 0.0) + 0.5
 
 
-def box_corners(box: Box) -> FloatArray:
+def corners_of_box(box: Box) -> FloatArray:
     """Return the eight corners, float64 (8, 3)."""
     return world_points(box, UNIT_CORNERS)
 

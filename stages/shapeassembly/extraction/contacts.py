@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.boxes import box_corners, box_gap, inside, local_points, world_points
+from stages.shapeassembly.extraction.boxes import box_gap, corners_of_box, inside, local_points, world_points
 from stages.shapeassembly.extraction.hierarchy import Box
 
 END_BAND_SHARE = 0.05
@@ -60,7 +60,7 @@ def bottom_or_top(box: Box, bbox: Box, *, top: bool) -> FloatArray | None:
     The centre of the face in that direction is preferred.
     """
     edge = 1.0 if top else 0.0
-    heights = local_points(bbox, box_corners(box))[:, 1]
+    heights = local_points(bbox, corners_of_box(box))[:, 1]
     if np.abs(heights - edge).min() > END_BAND_SHARE:
         return None
     centers = world_points(box, _FACE_CENTERS)
@@ -71,7 +71,7 @@ def bottom_or_top(box: Box, bbox: Box, *, top: bool) -> FloatArray | None:
     points = world_points(box, _GRID)
     reaching = np.abs(local_points(bbox, points)[:, 1] - edge) <= END_BAND_SHARE
     if not reaching.any():
-        points, reaching = box_corners(box), np.abs(heights - edge) <= END_BAND_SHARE
+        points, reaching = corners_of_box(box), np.abs(heights - edge) <= END_BAND_SHARE
     mean: FloatArray = points[reaching].mean(axis=0)
     return mean
 
@@ -80,7 +80,7 @@ def _shared(first: Box, second: Box, tolerance: float) -> FloatArray:
     """Return points in both boxes, float64 (n, 3), from a grid over the overlap in the frame of either."""
     points_by_frame = []
     for own, other in ((first, second), (second, first)):
-        corners = (box_corners(other) - own.center) @ own.axes.T
+        corners = (corners_of_box(other) - own.center) @ own.axes.T
         half = own.size / 2
         low = np.clip(corners.min(axis=0) - tolerance, -half, half)
         high = np.clip(corners.max(axis=0) + tolerance, -half, half)

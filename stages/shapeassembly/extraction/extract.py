@@ -16,9 +16,9 @@ from stages.shapeassembly.extraction.hierarchy import Box, PartHierarchy, PartNo
 from stages.shapeassembly.extraction.program_builder import GroupMode, PartOrder, build_program
 from stages.shapeassembly.extraction.settings import EVERY_STEP, Cleaning, Gates
 from stages.shapeassembly.extraction.shortening import shorten_parts
-from stages.shapeassembly.extraction.validity import execution_boxes, f_score, is_rooted
+from stages.shapeassembly.extraction.validity import box_f_score, execution_boxes, is_rooted
 from stages.shapeassembly.syntax.checks import overflow, violations
-from stages.shapeassembly.syntax.printer import rounded
+from stages.shapeassembly.syntax.printer import rounded_program
 from stages.shapeassembly.syntax.program import AssemblyProgram
 
 KEPT_DIAGONALS = (1.0, 4.0)
@@ -122,7 +122,7 @@ def _attempt(shape: _Shape, root: PartNode, rules: CategoryRules, gates: Gates, 
     root = frame_parts(arrange_parts(root, rules) if steps.arrange else root)
     if not root.children:
         raise Rejected("too few parts", f"{shape.name} is one box")
-    program = rounded(build_program(root, canonical_order(rules), steps.groups, steps.pool))
+    program = rounded_program(build_program(root, part_order_key(rules), steps.groups, steps.pool))
     named = set(program.named)
     leaves = sum(cuboid.name not in named for block in program.blocks for cuboid in block.cuboids)
     if leaves < gates.min_leaves:
@@ -132,7 +132,7 @@ def _attempt(shape: _Shape, root: PartNode, rules: CategoryRules, gates: Gates, 
     return _checked(shape, program, leaves, gates)
 
 
-def canonical_order(rules: CategoryRules) -> PartOrder:
+def part_order_key(rules: CategoryRules) -> PartOrder:
     """Return the sort key of parts: semantic label, then bottom to top, left to right, back to front."""
     ranks = {label: rank for rank, label in enumerate(rules.order)}
 
@@ -152,7 +152,7 @@ def _checked(shape: _Shape, program: AssemblyProgram, leaves: int, gates: Gates)
     execution = execute(program)
     boxes = tuple(execution_boxes(execution))
     diagonal = float(np.linalg.norm(program.root.bbox.dims))
-    score = f_score(boxes, shape.input_boxes, gates.distance * diagonal)
+    score = box_f_score(boxes, shape.input_boxes, gates.distance * diagonal)
     if not score >= gates.min_f_score:
         raise Rejected("poor fit", f"{shape.name} has F-score {score:.1f}, at least {gates.min_f_score:g} is wanted")
     excess = overflow(program, execution)

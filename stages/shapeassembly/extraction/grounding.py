@@ -14,8 +14,8 @@ from stages.shapeassembly.extraction.joints import (
     TOP,
     Joint,
     PlacedBoxes,
-    attach,
     attach_contact,
+    attach_line,
     squeeze,
 )
 from stages.shapeassembly.extraction.node_layout import BBOX_INDEX, NodeLayout
@@ -171,7 +171,7 @@ class _Grounding:
         return [part for part in parts if part not in self.placed and self.layout.aligned(part) == aligned]
 
     def _at_box(self, part: int, point: FloatArray) -> Joint:
-        return attach(self.layout, self.placed, part, BBOX_INDEX, point, point)
+        return attach_line(self.layout, self.placed, part, BBOX_INDEX, point, point)
 
     def _place(self, part: int, lines: Sequence[Joint], *others: int) -> bool:
         """Add lines that ground or join a part. Returns whether there were any."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.arrangement import leaf_corners
-from stages.shapeassembly.extraction.boxes import bounding_box, box_corners
+from stages.shapeassembly.extraction.boxes import bounding_box, corners_of_box
 from stages.shapeassembly.extraction.hierarchy import PartNode
 from stages.shapeassembly.extraction.node_layout import NodeLayout, layout_parts
 from stages.shapeassembly.extraction.symmetry import (
@@ -167,7 +167,7 @@ def _bodies(layout: NodeLayout, members: Sequence[Sequence[int]]) -> list[Symmet
     bodies = []
     for indices in members:
         boxes: tuple[FloatArray, ...] = tuple(
-            box_corners(leaf.box) for i in indices for leaf in layout.parts[i].leaves()
+            corners_of_box(leaf.box) for i in indices for leaf in layout.parts[i].leaves()
         )
         bodies.append(SymmetryBody(tuple(indices), boxes, tuple(_joints(layout, indices))))
     return bodies

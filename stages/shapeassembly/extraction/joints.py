@@ -35,7 +35,7 @@ def part_name(part: int) -> str:
     return BBOX_NAME if part == BBOX_INDEX else f"cube{part}"
 
 
-def attach(
+def attach_line(
     layout: NodeLayout, placed: PlacedBoxes, part: int, target: int, own: FloatArray, goal: FloatArray
 ) -> Attach:
     """Return the line that moves point `own` (3,) of a part onto point `goal` (3,) of a target, in the node's frame."""
@@ -50,7 +50,7 @@ def attach(
 def attach_contact(layout: NodeLayout, placed: PlacedBoxes, part: int, other: int) -> Attach:
     """Return the line that attaches a part to a placed neighbour at their contact."""
     own, goal = layout.points(part, other)
-    return attach(layout, placed, part, other, own, goal)
+    return attach_line(layout, placed, part, other, own, goal)
 
 
 def squeeze(

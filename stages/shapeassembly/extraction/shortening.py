@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.boxes import UNIT_CORNERS, box_corners, inside
+from stages.shapeassembly.extraction.boxes import UNIT_CORNERS, corners_of_box, inside
 from stages.shapeassembly.extraction.hierarchy import Box, PartNode
 
 _MIN_KEPT_SHARE = 0.05
@@ -45,7 +45,7 @@ def _with_boxes(part: PartNode, boxes: Iterator[Box]) -> PartNode:
 
 def _cut(box: Box, other: Box) -> Box:
     """Return a box without its ends inside another."""
-    corners = box_corners(box)
+    corners = corners_of_box(box)
     within = inside(other, corners, 1e-9)
     if within.sum() < 4:
         return box

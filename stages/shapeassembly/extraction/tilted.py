@@ -10,7 +10,7 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.interpreter import execute_all
 from stages.shapeassembly.execution.parameters import MIN_CUBOID_SIZE
-from stages.shapeassembly.extraction.boxes import box_corners
+from stages.shapeassembly.extraction.boxes import corners_of_box
 from stages.shapeassembly.extraction.grounding import TiltedPlacement, TiltedPlacer
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.joints import (
@@ -20,13 +20,13 @@ from stages.shapeassembly.extraction.joints import (
     TOP,
     Joint,
     PlacedBoxes,
-    attach,
+    attach_line,
     part_name,
     squeeze,
 )
 from stages.shapeassembly.extraction.node_layout import BBOX_INDEX, NodeLayout
 from stages.shapeassembly.extraction.validity import execution_boxes
-from stages.shapeassembly.syntax.printer import rounded
+from stages.shapeassembly.syntax.printer import rounded_program
 from stages.shapeassembly.syntax.program import BBOX as BBOX_NAME
 from stages.shapeassembly.syntax.program import AssemblyProgram, Block, Cuboid
 
@@ -64,11 +64,11 @@ def tilted_placer(layout: NodeLayout) -> TiltedPlacer:
 
 
 def _best(layout: NodeLayout, part: int, lines: list[Joint], placed: PlacedBoxes) -> TiltedPlacement | None:
-    wanted = box_corners(layout.parts[part].box)
+    wanted = corners_of_box(layout.parts[part].box)
     candidates = list(_candidates(layout, part, placed))
     best: TiltedPlacement | None = None
     for candidate, box in zip(candidates, _executed(layout, part, lines, candidates, placed), strict=True):
-        away = float(np.linalg.norm(box_corners(box) - wanted, axis=1).mean()) / layout.diagonal
+        away = float(np.linalg.norm(corners_of_box(box) - wanted, axis=1).mean()) / layout.diagonal
         cost = away + LINE_COST * len(candidate)
         if best is None or cost < best.cost - 1e-6:
             best = TiltedPlacement(tuple(candidate), box, cost)
@@ -86,13 +86,13 @@ def _candidates(layout: NodeLayout, part: int, placed: PlacedBoxes) -> Iterator[
             if line is not None:
                 yield [line]
     ends = [point for point in (layout.bottoms[part], layout.tops[part]) if point is not None]
-    usual: list[Joint] = [attach(layout, placed, part, BBOX_INDEX, point, point) for point in ends]
+    usual: list[Joint] = [attach_line(layout, placed, part, BBOX_INDEX, point, point) for point in ends]
     turning: list[Joint] = list(usual)
     for other in others:
         own, goal = layout.points(part, other)
-        usual.append(attach(layout, placed, part, other, own, goal))
+        usual.append(attach_line(layout, placed, part, other, own, goal))
         point = _in_turning_plane(layout, part, other)
-        turning.append(attach(layout, placed, part, other, point, point))
+        turning.append(attach_line(layout, placed, part, other, point, point))
     yield from _sequences(usual)
     yield from _sequences(turning)
 
@@ -130,5 +130,5 @@ def _executed(
     programs = [
         AssemblyProgram((Block("Program_0", bbox, (*cuboids, *lines, *candidate)),)) for candidate in candidates
     ]
-    executions = execute_all([rounded(program) for program in programs])
+    executions = execute_all([rounded_program(program) for program in programs])
     return [execution_boxes(execution)[declared.index(part)] for execution in executions]

@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.interpreter import Execution
-from stages.shapeassembly.extraction.boxes import bounding_box, box_corners, box_gap, surface_distance
+from stages.shapeassembly.extraction.boxes import bounding_box, box_gap, corners_of_box, surface_distance
 from stages.shapeassembly.extraction.hierarchy import Box
 
 MAX_CONNECTED_GAP_SHARE = 0.02
@@ -24,7 +24,7 @@ def execution_boxes(execution: Execution) -> list[Box]:
     return [Box(*box) for box in zip(execution.centres, execution.sizes, frames, strict=True)]
 
 
-def surface_points(boxes: Sequence[Box], count: int) -> FloatArray:
+def even_surface_points(boxes: Sequence[Box], count: int) -> FloatArray:
     """Return about `count` points evenly on the surfaces of the boxes, float64 (n, 3), always the same."""
     areas = np.array([[box.size[(axis + 1) % 3] * box.size[(axis + 2) % 3] for axis in range(3)] for box in boxes])
     shares = np.ceil(areas / max(float(areas.sum()) * 2, 1e-12) * count).astype(int)
@@ -39,20 +39,20 @@ def surface_points(boxes: Sequence[Box], count: int) -> FloatArray:
     return np.concatenate(points)
 
 
-def f_score(boxes: Sequence[Box], reference: Sequence[Box], distance: float, count: int = 4096) -> float:
+def box_f_score(boxes: Sequence[Box], reference: Sequence[Box], distance: float, count: int = 4096) -> float:
     """Return the F-score from 0 to 100 of two sets of boxes (Knapitsch et al. 2017).
 
     It is the harmonic mean of the shares of each surface within `distance` of the other. Points on one are measured
     against the exact surface of the other.
     """
-    precision = float((surface_distance(surface_points(boxes, count), list(reference)) <= distance).mean())
-    recall = float((surface_distance(surface_points(reference, count), list(boxes)) <= distance).mean())
+    precision = float((surface_distance(even_surface_points(boxes, count), list(reference)) <= distance).mean())
+    recall = float((surface_distance(even_surface_points(reference, count), list(boxes)) <= distance).mean())
     return 200 * precision * recall / (precision + recall) if precision + recall else 0.0
 
 
 def is_rooted(boxes: Sequence[Box]) -> bool:
     """Return whether every box is connected to the ground through touching boxes."""
-    corners = np.stack([box_corners(box) for box in boxes])
+    corners = np.stack([corners_of_box(box) for box in boxes])
     whole = bounding_box(corners.reshape(-1, 3), np.eye(3))
     limit = MAX_CONNECTED_GAP_SHARE * float(np.linalg.norm(whole.size))
     low, high = corners.min(axis=1), corners.max(axis=1)

@@ -35,7 +35,7 @@ def print_line(line: Line) -> str:
     return f"translate({line.moved}, {line.axis}, {line.copies}, {line.distance!r})"
 
 
-def rounded(program: AssemblyProgram) -> AssemblyProgram:
+def rounded_program(program: AssemblyProgram) -> AssemblyProgram:
     """Round every number to three decimals, as in the published programs."""
     return program.with_lines(_rounded)
 

@@ -18,7 +18,7 @@ from stages.symmetry.surface.boundary_lines import (
     sides_that_go_on,
 )
 from stages.symmetry.surface.clip import fragments
-from stages.symmetry.surface.lattice import neighbours_of, pack, unpack
+from stages.symmetry.surface.lattice import neighbours_of, pack_cells, unpack_cells
 
 CELLS_PER_RADIUS = 4
 """The radius of similarity, in cells (symmetry §4)."""
@@ -136,11 +136,11 @@ def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
     size = radius / CELLS_PER_RADIUS
     origin = low - size * (np.array(LATTICE_OFFSET_CELLS) + 2)
     where, owner, middles = fragments(corners, origin, size)
-    packed = pack(where)
+    packed = pack_cells(where)
     order = np.argsort(packed, kind="stable")
     packed, owner, middles = packed[order], owner[order], middles[order]
     keys, first = np.unique(packed, return_index=True)
-    cells = unpack(keys)
+    cells = unpack_cells(keys)
     normals = unit_normals(corners)
     starts = np.append(first, len(packed))
     tolerance = SAME_POSITION_CELLS * size

@@ -9,13 +9,13 @@ BITS_PER_AXIS = 21
 """Bits of a packed key for the position along one axis."""
 
 
-def pack(cells: np.ndarray) -> np.ndarray:
+def pack_cells(cells: np.ndarray) -> np.ndarray:
     """Pack non-negative cells int64 (n, 3) into one number each, int64 (n,), in lexicographic order."""
     packed: np.ndarray = (cells[:, 0] << 2 * BITS_PER_AXIS) | (cells[:, 1] << BITS_PER_AXIS) | cells[:, 2]
     return packed
 
 
-def unpack(keys: np.ndarray) -> np.ndarray:
+def unpack_cells(keys: np.ndarray) -> np.ndarray:
     """Return the cells int64 (n, 3) of packed keys int64 (n,)."""
     lowest = (1 << BITS_PER_AXIS) - 1
     return np.column_stack([keys >> 2 * BITS_PER_AXIS, keys >> BITS_PER_AXIS & lowest, keys & lowest])
@@ -24,7 +24,7 @@ def unpack(keys: np.ndarray) -> np.ndarray:
 def cell_keys(cells: np.ndarray) -> np.ndarray:
     """Return packed keys of any cells int64 (n, 3); -1 for cells with a negative index."""
     negative = (cells[:, 0] | cells[:, 1] | cells[:, 2]) < 0  # the sign is the highest bit
-    keys = pack(cells)
+    keys = pack_cells(cells)
     keys[negative] = -1
     return keys
 

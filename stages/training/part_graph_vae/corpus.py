@@ -8,7 +8,7 @@ from pipeline.errors import Rejected
 from pipeline.stage import Outcome, Task
 from stages.shape.arrays import BoolArray
 from stages.shapeassembly.execution.interpreter import Execution, execute
-from stages.shapeassembly.extraction.boxes import bounding_box, box_corners, box_gap
+from stages.shapeassembly.extraction.boxes import bounding_box, box_gap, corners_of_box
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.validity import MAX_CONNECTED_GAP_SHARE, execution_boxes
 from stages.training.box_vectors import BOX_WIDTH, box_vector
@@ -39,7 +39,7 @@ def graph_nodes(execution: Execution) -> list[GraphNode]:
         within = [box for box, name in zip(leaves, execution.names, strict=True) if name.startswith(f"{path}/")]
         # An assembly without cuboids gets no box.
         if within:
-            box = bounding_box(np.concatenate([box_corners(leaf) for leaf in within]), np.eye(3))
+            box = bounding_box(np.concatenate([corners_of_box(leaf) for leaf in within]), np.eye(3))
             parts[numbers[path.rpartition("/")[0]]].append((box, number))
     for box, node in zip(leaves, execution.nodes.tolist(), strict=True):
         parts[node].append((box, -1))
@@ -56,7 +56,7 @@ def graph_nodes(execution: Execution) -> list[GraphNode]:
 
 def touching_boxes(boxes: list[Box], reach: float) -> BoolArray:
     """Return which boxes are at most `reach` apart, bool (n, n), false on the diagonal."""
-    corners = np.array([box_corners(box) for box in boxes]).reshape(-1, 8, 3)
+    corners = np.array([corners_of_box(box) for box in boxes]).reshape(-1, 8, 3)
     low, high = corners.min(axis=1), corners.max(axis=1)
     touching: BoolArray = ((low[:, None] <= high + reach) & (low <= high[:, None] + reach)).all(axis=-1)
     upright = [np.allclose(np.abs(box.axes).max(axis=1), 1.0, atol=1e-3) for box in boxes]

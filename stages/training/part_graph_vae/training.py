@@ -36,7 +36,7 @@ class PartGraphVaeTask(TrainingTask):
         """Compute means over shapes: nats of choices, absolute errors of boxes, divergence from the prior."""
         mean, log_variance = self.module.encode(batch)
         points, divergence = reparameterize(mean, log_variance, noise)
-        nats, errors = (total / len(points) for total in reconstruction(self.module, batch, points))
+        nats, errors = (total / len(points) for total in part_graph_reconstruction(self.module, batch, points))
         loss = nats + self.config.number_weight * errors + self.config.kl_weight * divergence
         return {"loss": loss, "nats": nats, "errors": errors, "divergence": divergence}
 
@@ -50,7 +50,7 @@ def new_model(config: PartGraphVaeConfig, seed: int) -> PartGraphVae:
     return seeded(seed, lambda: PartGraphVae(config))
 
 
-def reconstruction(module: PartGraphVae, levels: GraphBatch, points: Tensor) -> tuple[Tensor, Tensor]:
+def part_graph_reconstruction(module: PartGraphVae, levels: GraphBatch, points: Tensor) -> tuple[Tensor, Tensor]:
     """Return sums over the shapes at latent points: nats of choices, and absolute errors of boxes."""
     nats, errors = points.new_zeros(()), points.new_zeros(())
     codes = module.root(points)

@@ -51,7 +51,7 @@ class ProgramVaeTask(TrainingTask):
         """Compute means over programs: nats of choices, absolute errors of numbers, divergence from the prior."""
         mean, log_variance = self.module.encode(batch)
         codes, divergence = reparameterize(mean, log_variance, noise)
-        nats, errors = (total / len(codes) for total in reconstruction(self.module, batch, codes))
+        nats, errors = (total / len(codes) for total in program_reconstruction(self.module, batch, codes))
         loss = nats + self.config.number_weight * errors + self.config.kl_weight * divergence
         return {"loss": loss, "nats": nats, "errors": errors, "divergence": divergence}
 
@@ -65,7 +65,7 @@ def new_model(config: ProgramVaeConfig, seed: int) -> ProgramVae:
     return seeded(seed, lambda: ProgramVae(config))
 
 
-def reconstruction(module: ProgramVae, levels: Sequence[AssemblyLevel], codes: Tensor) -> tuple[Tensor, Tensor]:
+def program_reconstruction(module: ProgramVae, levels: Sequence[AssemblyLevel], codes: Tensor) -> tuple[Tensor, Tensor]:
     """Return sums over the programs with root codes: nats of choices, and absolute errors of numbers."""
     nats = codes.new_zeros(())
     errors = (module.root_box(codes) - levels[0].boxes).abs().sum()

@@ -44,7 +44,7 @@ class RandomShape:
     parts: tuple[Part, ...]
 
 
-def random_shapes(program: Program, interval: Interval, rng: np.random.Generator) -> Iterator[RandomShape]:
+def random_training_shapes(program: Program, interval: Interval, rng: np.random.Generator) -> Iterator[RandomShape]:
     """Yield valid shapes without end, each with one value of a visible parameter fixed and all others random.
 
     Every value of every parameter is fixed equally often (geocode §4). Shapes that the program fails to build are

@@ -30,7 +30,12 @@ from stages.training.recovery.estimate import estimate_from_probabilities
 from stages.training.recovery.model import RecoveryNet
 from stages.training.recovery.outputs import ParameterOutputs
 from stages.training.recovery.settings import RecoveryModelConfig
-from stages.training.recovery.shapes import TRAIN_INTERVAL, VALIDATION_INTERVAL, nearest_valid_values, random_shapes
+from stages.training.recovery.shapes import (
+    TRAIN_INTERVAL,
+    VALIDATION_INTERVAL,
+    nearest_valid_values,
+    random_training_shapes,
+)
 from stages.training.recovery.surface import sample_points, shape_points
 from stages.training.training_task import TrainingTask, resolve_device, seeded
 
@@ -59,7 +64,7 @@ def prepare(task: Task) -> Outcome:
     inputs: list[npt.NDArray[Any]] = []
     classes: list[npt.NDArray[np.int16]] = []
     texts: list[str] = []
-    shapes = random_shapes(program, VALIDATION_INTERVAL if split == "val" else TRAIN_INTERVAL, task.rng(split))
+    shapes = random_training_shapes(program, VALIDATION_INTERVAL if split == "val" else TRAIN_INTERVAL, task.rng(split))
     for number, shape in enumerate(islice(shapes, params["shapes"])):
         rng = task.rng(split, "input", number)
         if settings["input"] == "sketch":

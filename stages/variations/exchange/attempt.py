@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.exchange.cuts import cut
+from stages.variations.exchange.cuts import cut_connected_piece
 from stages.variations.exchange.joins import join
 from stages.variations.exchange.pose_matching import match_poses
 from stages.variations.exchange.repeated_units import insert_or_remove_unit
@@ -25,11 +25,11 @@ MAX_CUTS = 4
 def cut_piece(rng, a, b, ws, operator, large, slack):
     """Cut a piece out of A; where it must be large, cut until it is neither small nor nearly everything."""
     parts = len(a.types)
-    outcome = cut(rng, a, b, ws, operator, slack)
+    outcome = cut_connected_piece(rng, a, b, ws, operator, slack)
     for _ in range(MAX_CUTS - 1 if large else 0):
         if outcome == Outcome.OK and MIN_LARGE_SHARE * parts <= ws.counts[N_PIECE_PARTS] <= MAX_LARGE_SHARE * parts:
             break
-        outcome = cut(rng, a, b, ws, operator, slack)
+        outcome = cut_connected_piece(rng, a, b, ws, operator, slack)
     return outcome
 
 

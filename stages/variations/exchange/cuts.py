@@ -17,7 +17,7 @@ IN_HALF_SPACE, IN_BOX = 0, 2
 
 
 @numba.njit(cache=True)
-def cut(rng, a, b, ws, operator, slack):
+def cut_connected_piece(rng, a, b, ws, operator, slack):
     """Cut a random connected piece out of A into `ws.inside`, and its boundary into `ws.boundary`.
 
     The boundary are the parts with a neighbour outside, that of the rarest type in B first.

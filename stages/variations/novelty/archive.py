@@ -20,7 +20,7 @@ Place = tuple[int, int]
 _SHARES = ("mixture", "neighbourhood_mixture", "distance", "copied_share")
 
 
-def cell_of(features: Float32Array, axes: Sequence[Axis], resolution: int) -> Cell:
+def cell_of_features(features: Float32Array, axes: Sequence[Axis], resolution: int) -> Cell:
     """Return the cell of features float32 (10,).
 
     Sizes are binned by octaves, shares in equal steps with 0 apart; the dominant type is its own bin.

@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray
 from stages.shape.kit import Assembly, Kit
-from stages.variations.novelty.archive import cell_of
+from stages.variations.novelty.archive import cell_of_features
 from stages.variations.novelty.edit_distance import edit_bounds
 from stages.variations.novelty.features import AXES, MIN_MIXTURE
 from stages.variations.novelty.kit_overlap import overlap_sentence
@@ -45,7 +45,7 @@ def pool_measures(
     cells: number of filled cells of the archive
     bins: number of filled bins by axis
     """
-    cells = [cell_of(row, novelty.axes, novelty.resolution) for row in features]
+    cells = [cell_of_features(row, novelty.axes, novelty.resolution) for row in features]
     distances, parts = features[:, AXES.index("distance")], features[:, AXES.index("parts")]
     copied = features[:, AXES.index("copied_share")]
     return {

@@ -17,7 +17,7 @@ from stages.shape.kit_input import input_kit, input_oracle
 from stages.shape.physics.judge import unmet_requirement
 from stages.shape.shape import kit_shape
 from stages.variations.constraint import build_repair, build_test
-from stages.variations.novelty.archive import cell_of
+from stages.variations.novelty.archive import cell_of_features
 from stages.variations.requirements.hub_restoration import HUBS_NOT_RESTORED, auto_min_hubs, hub_restorer
 from stages.variations.requirements.identity import common_labels, share_bounds
 from stages.variations.requirements.required_labels import LABELS_MISSING, labels_test
@@ -84,7 +84,7 @@ def _fill_archive(pool: PoolIndex, search: Search) -> np.ndarray:
     for counts, features, keys in zip(pool.counts, pool.features, pool.keys, strict=True):
         types = np.repeat(np.arange(len(counts)), counts)
         search.maker.remember(types, *keys.tolist())
-        cell = cell_of(features, novelty.axes, novelty.resolution)
+        cell = cell_of_features(features, novelty.axes, novelty.resolution)
         places.append(search.archive.add(cell, search.maker.histogram(types)))
     return np.array(places, dtype=np.int64).reshape(-1, 2)
 

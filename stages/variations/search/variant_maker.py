@@ -26,7 +26,7 @@ from stages.variations.kernels.operators import REPEATED_UNIT, SUBSTITUTION
 from stages.variations.kernels.outcomes import Outcome
 from stages.variations.kernels.structs import N_PARTS
 from stages.variations.kernels.tables import kit_tables, multiset_weights, resolve_unknown, workspace
-from stages.variations.novelty.archive import Cell, cell_of
+from stages.variations.novelty.archive import Cell, cell_of_features
 from stages.variations.novelty.copied_pieces import CopyDetector
 from stages.variations.novelty.features import FeatureExtractor, material_shares
 from stages.variations.requirements.stretched_contacts import broken_contact
@@ -156,7 +156,7 @@ class VariantMaker:
 
     def cell(self, features: Float32Array) -> Cell:
         """Return the cell of features in the archive."""
-        return cell_of(features, self.config.novelty.axes, self.config.novelty.resolution)
+        return cell_of_features(features, self.config.novelty.axes, self.config.novelty.resolution)
 
     @property
     def lists(self) -> Counter[str]:

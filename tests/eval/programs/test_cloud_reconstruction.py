@@ -10,8 +10,8 @@ from eval.programs.cloud_reconstruction import (
     FIT_SUFFIXES,
     ReconstructedShapes,
     cloud_descriptors,
+    cloud_f_score,
     clouds_table,
-    f_score,
     reconstructions,
     train_cloud_encoder,
 )
@@ -47,8 +47,8 @@ def test_descriptors_differ_by_size_alone() -> None:
 def test_f_score_is_full_for_the_shape_and_zero_far_away() -> None:
     (boxes,) = boxes_of_programs(PROGRAMS[1:])
     cloud = clouds_of([boxes], 1024)[0]
-    assert f_score(boxes, cloud) == 100
-    assert f_score([replace(box, center=box.center + 5) for box in boxes], cloud) == 0
+    assert cloud_f_score(boxes, cloud) == 100
+    assert cloud_f_score([replace(box, center=box.center + 5) for box in boxes], cloud) == 0
 
 
 def test_decoded_shapes_are_fitted_as_cuboids_and_programs() -> None:

@@ -25,7 +25,7 @@ from eval.programs.part_surfaces import curve_parts, surface_of, surfaces_figure
 from eval.programs.quality import boxes_of_programs, clouds_of
 from stages.shapeassembly import execute_all, parse
 from stages.shapeassembly.analysis.structure import program_distance
-from stages.shapeassembly.extraction.boxes import box_corners
+from stages.shapeassembly.extraction.boxes import corners_of_box
 from stages.training.part_graph_vae.settings import PartGraphVaeConfig
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.part_graph_vae.training import new_model as new_part_graph_vae
@@ -95,7 +95,7 @@ def test_figure_11_keeps_surfaces_within_their_cuboids() -> None:
     assert all(torch.equal(value, again[name]) for name, value in module.state_dict().items())
     boxes = boxes_of_programs(PROGRAMS)
     cloud = surface_of(module, boxes[0], np.random.default_rng(0))
-    low, high = (bound(np.concatenate([box_corners(cuboid) for cuboid in boxes[0]])) for bound in BOUNDS)
+    low, high = (bound(np.concatenate([corners_of_box(cuboid) for cuboid in boxes[0]])) for bound in BOUNDS)
     assert (cloud >= low - 1e-6).all()
     assert (cloud <= high + 1e-6).all()
     assert surfaces_figure("tiny", "chair", module, boxes, np.random.default_rng(0)).name == "figure11_tiny"

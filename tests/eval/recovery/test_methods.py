@@ -22,7 +22,7 @@ from stages.programs.schema import Values
 from stages.recovery.inputs import RecoveryInput
 from stages.recovery.result import RecoveryResult
 from stages.training.recovery.settings import RecoveryModelConfig
-from stages.training.recovery.shapes import TEST_INTERVAL, random_shapes
+from stages.training.recovery.shapes import TEST_INTERVAL, random_training_shapes
 from stages.training.recovery.trained import TrainedRecovery
 from stages.training.recovery.training import new_network
 from tests.stages.training.recovery.toy import PROGRAM, SMALL
@@ -50,7 +50,7 @@ def test_published_chamfer_is_scaled_to_unit_sphere_and_symmetric() -> None:
 
 
 def test_true_values_are_exact_and_base_values_are_not() -> None:
-    shapes = list(islice(random_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)), 6))
+    shapes = list(islice(random_training_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)), 6))
     inputs = [RecoveryInput(str(number), points=np.zeros((40, 3))) for number in range(len(shapes))]
     truth = iter([shape.values for shape in shapes])
     true = apply_method("true", STOOL, lambda _: result(next(truth)), shapes, inputs)
@@ -79,7 +79,7 @@ def test_table_has_a_row_per_method_and_references_of_its_programs() -> None:
 
 
 def test_baselines_are_compared_with_the_first_model() -> None:
-    shapes = list(islice(random_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)), 5))
+    shapes = list(islice(random_training_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)), 5))
     inputs = [RecoveryInput(str(number), points=np.zeros((40, 3))) for number in range(len(shapes))]
     truth = iter([shape.values for shape in shapes])
     true = apply_method("classes, points", STOOL, lambda _: result(next(truth)), shapes, inputs)
@@ -97,7 +97,7 @@ def test_baselines_are_compared_with_the_first_model() -> None:
 def test_values_that_hardly_move_the_surface_are_indistinguishable() -> None:
     shape = next(
         candidate
-        for candidate in random_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0))
+        for candidate in random_training_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0))
         if candidate.values["height"] < 0.8
     )
     given = [RecoveryInput("one", points=np.zeros((40, 3)))]

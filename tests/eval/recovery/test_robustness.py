@@ -22,7 +22,7 @@ from eval.tables.recovery_robustness import RecoveryRobustnessOptions, _sections
 from pipeline.errors import ConfigError
 from stages.recovery.inputs import RecoveryInput
 from stages.training.recovery.clouds import frame_of
-from stages.training.recovery.shapes import TEST_INTERVAL, random_shapes
+from stages.training.recovery.shapes import TEST_INTERVAL, random_training_shapes
 from stages.training.recovery.surface import sample_points
 from tests.eval.recovery.test_methods import STOOL, model
 
@@ -30,7 +30,7 @@ CHAIRS = Path(__file__).resolve().parents[3] / "configs" / "chairs.yaml"
 
 
 def cloud(n: int = 2000) -> np.ndarray:
-    shape = next(random_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)))
+    shape = next(random_training_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)))
     return sample_points(shape.parts, n, np.random.default_rng(0))
 
 
@@ -80,7 +80,7 @@ def test_corruption_depends_on_seed_alone() -> None:
 
 def test_tables_have_a_row_per_method(tmp_path: Path) -> None:
     trained = model()
-    shape = next(random_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)))
+    shape = next(random_training_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)))
     corrupted = corrupted_inputs(trained, "half missing", [shape], [RecoveryInput("one", cloud())], 0)
     method = methods(trained, 10, 0)["network"]
     table = corruption_table([apply_method("stool, half missing: network", STOOL, method, [shape], corrupted)])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eval.worth.augmentation import MIN_PARTIAL_SHARE, augment
+from eval.worth.augmentation import MIN_PARTIAL_SHARE, augmented_cloud
 
 WAYS = ("turn", "stretch", "jitter", "partial", "noise")
 
@@ -20,7 +20,7 @@ def cloud() -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_without_a_way_the_cloud_stays(cloud: tuple[np.ndarray, np.ndarray]) -> None:
-    points, parts = augment(*cloud, (), np.random.default_rng(1))
+    points, parts = augmented_cloud(*cloud, (), np.random.default_rng(1))
     np.testing.assert_allclose(points, cloud[0], atol=1e-6)
     assert np.array_equal(parts, cloud[1])
 
@@ -29,7 +29,7 @@ def test_without_a_way_the_cloud_stays(cloud: tuple[np.ndarray, np.ndarray]) -> 
 def test_augmented_cloud_has_diagonal_1_and_depends_on_the_stream_alone(
     way: str, cloud: tuple[np.ndarray, np.ndarray]
 ) -> None:
-    first, second = (augment(*cloud, (way,), np.random.default_rng(2)) for _ in range(2))
+    first, second = (augmented_cloud(*cloud, (way,), np.random.default_rng(2)) for _ in range(2))
     assert np.array_equal(first[0], second[0])
     assert first[0].shape == (600, 3)
     assert np.linalg.norm(np.ptp(first[0], axis=0)) == pytest.approx(1, abs=1e-5)
@@ -37,12 +37,12 @@ def test_augmented_cloud_has_diagonal_1_and_depends_on_the_stream_alone(
 
 
 def test_turn_keeps_the_proportions_of_heights(cloud: tuple[np.ndarray, np.ndarray]) -> None:
-    points, _ = augment(*cloud, ("turn",), np.random.default_rng(3))
+    points, _ = augmented_cloud(*cloud, ("turn",), np.random.default_rng(3))
     assert np.corrcoef(points[:, 1], cloud[0][:, 1])[0, 1] == pytest.approx(1)
 
 
 def test_jitter_moves_whole_parts(cloud: tuple[np.ndarray, np.ndarray]) -> None:
-    points, parts = augment(*cloud, ("jitter",), np.random.default_rng(4))
+    points, parts = augmented_cloud(*cloud, ("jitter",), np.random.default_rng(4))
     for part in (4, 7, 9):
         for axis in range(3):
             before, after = cloud[0][parts == part, axis], points[parts == part, axis]
@@ -53,7 +53,7 @@ def test_jitter_moves_whole_parts(cloud: tuple[np.ndarray, np.ndarray]) -> None:
 def test_partial_cloud_repeats_points_of_one_side(cloud: tuple[np.ndarray, np.ndarray]) -> None:
     shares = []
     for seed in range(20):
-        points, parts = augment(*cloud, ("partial",), np.random.default_rng(seed))
+        points, parts = augmented_cloud(*cloud, ("partial",), np.random.default_rng(seed))
         shares.append(len(np.unique(points, axis=0)) / 600)
         assert len(parts) == 600
     assert MIN_PARTIAL_SHARE <= min(shares) < max(shares) <= 1

@@ -14,7 +14,7 @@ from eval.worth.learning import (
     precision_of_encoder,
     trained_encoder,
 )
-from eval.worth.network import MAX_PAIR_DISTANCE, near_pairs
+from eval.worth.network import MAX_PAIR_DISTANCE, near_point_pairs
 from eval.worth.rows import mean_and_interval
 
 
@@ -36,7 +36,7 @@ def test_average_precision_of_small_cases() -> None:
 
 def test_near_pairs_are_those_within_the_distance_and_come_once() -> None:
     points = np.random.default_rng(0).random((2, 40, 3)).astype(np.float32)
-    found = near_pairs(torch.from_numpy(points)).numpy()
+    found = near_point_pairs(torch.from_numpy(points)).numpy()
     for cloud, pairs in zip(points.astype(float), found, strict=True):
         for first in range(40):
             for second in range(40):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.abstraction.hierarchy import Boxes, hierarchy_of
+from stages.abstraction.hierarchy import Boxes, part_hierarchy
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
-from stages.shapeassembly.extraction.boxes import bounding_box, box_corners, box_gap
+from stages.shapeassembly.extraction.boxes import bounding_box, box_gap, corners_of_box
 from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES
 from stages.shapeassembly.extraction.extract import extract
 from stages.shapeassembly.extraction.hierarchy import PartNode
@@ -49,7 +49,7 @@ def nodes(part: PartNode) -> list[PartNode]:
 @pytest.mark.parametrize(("count", "storeys", "children"), [(4, 1, 9), (4, 5, 9), (6, 7, 5), (3, 4, 2)])
 def test_every_part_is_one_leaf_and_assemblies_are_small_and_connected(count: int, storeys: int, children: int) -> None:
     shape = towers(count, storeys)
-    root = hierarchy_of(shape, children, Boxes()).root
+    root = part_hierarchy(shape, children, Boxes()).root
     leaves = list(root.leaves())
     assert sorted(leaf.label for leaf in leaves) == ["cube"] * (count * storeys) + ["slab"]
     centers = {tuple(np.round(leaf.box.center, 9)) for leaf in leaves}
@@ -66,7 +66,7 @@ def test_every_part_is_one_leaf_and_assemblies_are_small_and_connected(count: in
             reached.update(near)
             edge += near
         assert len(reached) == len(below)
-        corners = np.concatenate([box_corners(leaf.box) for leaf in below])
+        corners = np.concatenate([corners_of_box(leaf.box) for leaf in below])
         assert np.allclose(bounding_box(corners, np.eye(3)).size, node.box.size)
 
 
@@ -75,7 +75,7 @@ def test_a_box_turns_with_its_part_and_a_roof_stands_upright() -> None:
     pyramid = PartMesh("roof", roof.vertices * np.where(roof.vertices[:, 1:2] > 0, [[0.01, 1, 0.01]], 1.0), roof.faces,
                        roof.face_colors)  # fmt: skip
     boxes = Boxes()
-    turned = box_corners(boxes.of(post, at(1, 2, 3, 30)))
+    turned = corners_of_box(boxes.of(post, at(1, 2, 3, 30)))
     wanted = post.vertices @ at(0, 0, 0, 30)[:3, :3].T + [1, 2, 3]
     assert max(np.linalg.norm(turned - corner, axis=1).min() for corner in wanted) < 1e-9
     assert np.allclose(np.abs(boxes.of(pyramid, np.eye(4)).axes), np.eye(3))
@@ -83,10 +83,12 @@ def test_a_box_turns_with_its_part_and_a_roof_stands_upright() -> None:
 
 def test_parts_that_do_not_touch_make_a_wider_node() -> None:
     shape = shape_of([box("cube", 1.0, 1.0, 1.0)], [(0, at(5.0 * n, 0, 0)) for n in range(6)])
-    root = hierarchy_of(shape, 3, Boxes()).root
+    root = part_hierarchy(shape, 3, Boxes()).root
     assert len(root.children) == 6
 
 
 def test_towers_on_a_slab_become_a_program_of_their_boxes() -> None:
-    found = extract(hierarchy_of(towers(4, 3), 9, Boxes()), CATEGORY_RULES["any"], Gates(min_leaves=1, max_leaves=200))
+    found = extract(
+        part_hierarchy(towers(4, 3), 9, Boxes()), CATEGORY_RULES["any"], Gates(min_leaves=1, max_leaves=200)
+    )
     assert found.f_score > 99

@@ -7,7 +7,7 @@ import pytest
 
 from stages.grammars.extraction.continuation import corner_cells, maps_enough_corners, separated_cells
 from stages.grammars.extraction.docked_pieces import find_docked_pieces, surrounding_cells
-from stages.grammars.extraction.grids import crossing_rows, find_rows
+from stages.grammars.extraction.grids import crossing_rows, find_one_grids
 from stages.grammars.extraction.productions import seams_by_site
 from stages.grammars.scans.scanned_grid import ScannedCloud, scanned_grid
 from stages.symmetry.matching.candidate_transforms import candidate_transforms
@@ -62,7 +62,7 @@ class TestRows:
             assert any(exact)
             classes.pop(exact.index(True))
         seams = seams_by_site(grid, pieces)
-        rows = find_rows(grid, pieces, seams)
+        rows = find_one_grids(grid, pieces, seams)
         grids = [tuple(sorted(rows[index].count for index in chosen)) for chosen in crossing_rows(grid, pieces, rows)]
         counts = (windows - 1,) if storeys == 1 else tuple(sorted((windows - 1, storeys - 1)))
         assert grids == [counts] * 2 * len(counts)

@@ -16,7 +16,7 @@ from stages.grammars.derived_shape import (
     compact_shape_of_text,
     exemplar_shape,
     placed_terminals,
-    shape_of_text,
+    shape_of_derivation_text,
     surface_digest,
 )
 from stages.grammars.description import describe_grammar
@@ -33,7 +33,7 @@ def original(grammar: ShapeGrammar, start: int) -> Derivation:
 
 
 def derived(grammar: ShapeGrammar, derivation: Derivation | ResizedGrid) -> np.ndarray:
-    return triangles_of(shape_of_text(grammar, format_derivation(grammar, derivation)))
+    return triangles_of(shape_of_derivation_text(grammar, format_derivation(grammar, derivation)))
 
 
 def similar_share(grammar: ShapeGrammar, shape: np.ndarray) -> float:
@@ -91,7 +91,7 @@ class TestDerivations:
 
     def test_compact_shape_has_only_its_own_meshes(self, grammar: ShapeGrammar) -> None:
         text = format_derivation(grammar, original(grammar, 0))
-        whole, compact = shape_of_text(grammar, text), compact_shape_of_text(grammar, text)
+        whole, compact = shape_of_derivation_text(grammar, text), compact_shape_of_text(grammar, text)
         assert {mesh.name for mesh in compact.meshes} == {whole.meshes[kind].name for kind in whole.assembly.types}
         assert np.array_equal(triangles_of(compact), triangles_of(whole))
         assert compact.part_labels.tolist() == whole.part_labels.tolist()
@@ -156,7 +156,9 @@ class TestFiles:
         for start in grammar.productions_of_site[START_SITE]:
             written = format_derivation(grammar, original(grammar, start))
             assert format_derivation(back, original(back, start)) == written
-            assert (triangles_of(shape_of_text(back, written)) == derived(grammar, original(grammar, start))).all()
+            assert (
+                triangles_of(shape_of_derivation_text(back, written)) == derived(grammar, original(grammar, start))
+            ).all()
         assert (derived(back, ResizedGrid(0, (6,))) == derived(grammar, ResizedGrid(0, (6,)))).all()
         assert back.labels == grammar.labels
 

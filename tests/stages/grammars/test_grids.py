@@ -8,7 +8,7 @@ import pytest
 from eval.grammars.similarity import r_similarity
 from stages.grammars.derivation import START_SITE, Derivation, grid_poses
 from stages.grammars.extraction.docked_pieces import DockedPiece, find_docked_pieces, surrounding_cells
-from stages.grammars.extraction.grids import ExtractedGrid, crossing_rows, cut_grid, find_rows
+from stages.grammars.extraction.grids import ExtractedGrid, crossing_rows, cut_grid, find_one_grids
 from stages.grammars.extraction.productions import ExtractedProduction, extract_productions, seams_by_site
 from stages.shape.geometry.pose import transform_points
 from stages.symmetry.matching.candidate_transforms import candidate_transforms
@@ -26,7 +26,7 @@ class Planted:
         self.grid: SurfaceGrid = surface_grid(triangles, RADIUS_SHARE)
         self.docked_pieces: list[DockedPiece] = find_docked_pieces(self.grid, candidate_transforms(self.grid, 40))
         self.seams = seams_by_site(self.grid, self.docked_pieces)
-        self.rows = find_rows(self.grid, self.docked_pieces, self.seams)
+        self.rows = find_one_grids(self.grid, self.docked_pieces, self.seams)
         self.sets = crossing_rows(self.grid, self.docked_pieces, self.rows)
         self.first: ExtractedGrid = cut_grid(
             self.grid, self.docked_pieces, [self.rows[index] for index in self.sets[0]], self.seams

@@ -11,7 +11,7 @@ from eval.grammars.similarity import SampledSurface, similarity_to, triangles_of
 from stages.grammars.collisions import Collisions
 from stages.grammars.derivation import Derivation, ResizedGrid
 from stages.grammars.derivation_text import format_derivation
-from stages.grammars.derived_shape import placed_terminals, shape_of_text, surface_digest
+from stages.grammars.derived_shape import placed_terminals, shape_of_derivation_text, surface_digest
 from stages.grammars.distinct_shapes import DerivationCollides, random_derivation, random_resized_grid
 from stages.grammars.extraction.extract import ExtractedGrammar, SurfaceMesh, extract_grammar
 from stages.grammars.grammar import ShapeGrammar
@@ -51,7 +51,7 @@ def shapes_of(grammar: ShapeGrammar) -> list[FloatArray]:
         for derivation in derivations:
             digest = surface_digest(grammar, placed_terminals(grammar, derivation))
             texts.setdefault(digest, format_derivation(grammar, derivation))
-    return [triangles_of(shape_of_text(grammar, text)) for text in list(texts.values())[:MAX_TESTED_SHAPES]]
+    return [triangles_of(shape_of_derivation_text(grammar, text)) for text in list(texts.values())[:MAX_TESTED_SHAPES]]
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stages.mixture.near_copies import copy_features, near_pairs, unit_clouds
+from stages.mixture.near_copies import copy_features, near_copy_pairs, unit_clouds
 from stages.programs.program import shape_from_parts
 from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.shape import Shape
@@ -32,7 +32,7 @@ def pairs_of(
     extents = sides / np.linalg.norm(sides, axis=1, keepdims=True)
     features, spacings = copy_features(clouds, extents)
     numbers = (np.arange(len(shapes)) if groups is None else np.array(groups), np.array(makers), np.array(splits))
-    return list(near_pairs(features, spacings, lambda number: clouds[number, 0], *numbers))
+    return list(near_copy_pairs(features, spacings, lambda number: clouds[number, 0], *numbers))
 
 
 def test_copies_in_other_places_sizes_and_quarter_turns_are_found() -> None:

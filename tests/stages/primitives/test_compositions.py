@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from stages.primitives.compose import compose, rest_height
+from stages.primitives.compose import random_composition, rest_height
 from stages.primitives.settings import KINDS, Composition, Kind, PrimitivesConfig
 from stages.primitives.solids import draw_numbers, solid_mesh
 from stages.primitives.text import (
@@ -21,8 +21,8 @@ from stages.primitives.text import (
     placed_solid,
     read_composition,
     rotation_of,
+    shape_of_composition_text,
     shape_of_solids,
-    shape_of_text,
 )
 from stages.programs.curves import box, mesh_defects
 from stages.shape.physics.judge import unmet_requirement
@@ -59,10 +59,12 @@ def test_volumes_are_those_of_the_numbers() -> None:
 def test_a_composition_stands_on_the_ground_and_its_text_makes_it_again(composition: Composition) -> None:
     rooted = 0
     for seed in range(8):
-        solids = compose(composition, CONFIG, np.random.default_rng(seed))
-        assert composition_text(solids) == composition_text(compose(composition, CONFIG, np.random.default_rng(seed)))
+        solids = random_composition(composition, CONFIG, np.random.default_rng(seed))
+        assert composition_text(solids) == composition_text(
+            random_composition(composition, CONFIG, np.random.default_rng(seed))
+        )
         assert read_composition(composition_text(solids)) == solids
-        shape = shape_of_text(composition_text(solids))
+        shape = shape_of_composition_text(composition_text(solids))
         assert [shape.labels[label] for label in shape.part_labels] == [solid.kind for solid in solids]
         assert len(solids) >= CONFIG.min_parts
         lowest = min(solid.vertices[:, 1].min() for solid in solids)
@@ -75,7 +77,7 @@ def test_a_composition_stands_on_the_ground_and_its_text_makes_it_again(composit
 
 def test_copies_are_equal_solids_that_share_a_mesh() -> None:
     config = PrimitivesConfig(samples=1, copies=1.0, min_parts=4, max_parts=4)
-    shape = shape_of_solids(compose("attached", config, np.random.default_rng(2)))
+    shape = shape_of_solids(random_composition("attached", config, np.random.default_rng(2)))
     assert len(shape.meshes) < len(shape)
 
 
@@ -109,13 +111,13 @@ def test_a_turn_survives_its_quaternion_and_a_mirrored_solid_is_mirrored() -> No
 @pytest.mark.parametrize("text", ["", "{}", '{"solids":[]}', '{"solids":[{"kind":"egg"}]}'])
 def test_a_text_without_solids_is_refused(text: str) -> None:
     with pytest.raises(CompositionError):
-        shape_of_text(text)
+        shape_of_composition_text(text)
 
 
 def test_numbers_that_make_no_solid_are_refused() -> None:
     solid = PlacedSolid("box", (1.0, -1.0, 1.0), False, (1, 0, 0, 0), (0, 0, 0))
     with pytest.raises(CompositionError, match="no solid"):
-        shape_of_text(composition_text([solid]))
+        shape_of_composition_text(composition_text([solid]))
 
 
 @pytest.mark.slow

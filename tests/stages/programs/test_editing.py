@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stages.programs.conditions import Condition
-from stages.programs.editing import interpolate, mix
+from stages.programs.editing import interpolate, mix_values
 from stages.programs.parameters import ParameterError, Value
 from stages.programs.program import Constraint
 from tests.stages.programs.rack import PROGRAM as RACK
@@ -29,33 +29,33 @@ class TestMix:
     def test_copied_group_is_as_in_the_source_and_valid(
         self, target: dict[str, Value], source: dict[str, Value]
     ) -> None:
-        mixed = mix(PROGRAM, target, source, ["seat"])
+        mixed = mix_values(PROGRAM, target, source, ["seat"])
         assert not PROGRAM.violated(mixed)
         assert (mixed["height"], mixed["scale x"]) == (source["height"], source["scale x"])
         assert mixed["has_rail"] == target["has_rail"]
 
     @given(valid_values)
     def test_mixing_with_itself_changes_nothing(self, values: dict[str, Value]) -> None:
-        assert mix(PROGRAM, values, values, ["rail"]) == values
+        assert mix_values(PROGRAM, values, values, ["rail"]) == values
 
     def test_uncopied_parameters_are_repaired(self) -> None:
         source = {"height": 0.3, "scale x": 1.1, "has_rail": False, "rail_height": 0.3}
-        mixed = mix(PROGRAM, {**BASE, "rail_height": 0.5}, source, ["seat"])
+        mixed = mix_values(PROGRAM, {**BASE, "rail_height": 0.5}, source, ["seat"])
         assert mixed == {"height": 0.3, "scale x": 1.1, "has_rail": True, "rail_height": 0.3}
 
     def test_copied_parameters_change_only_as_a_last_resort(self) -> None:
         # All parameters of the constraint are in the copied group.
         tight = replace(PROGRAM, constraints=(Constraint("wide", Condition("height < 0.5"), "."),))
-        assert mix(tight, {**BASE, "height": 0.4}, {**BASE, "height": 0.9}, ["seat"])["height"] == 0.4
+        assert mix_values(tight, {**BASE, "height": 0.4}, {**BASE, "height": 0.9}, ["seat"])["height"] == 0.4
 
     def test_unknown_group_is_reported_with_the_known_ones(self) -> None:
         with pytest.raises(ParameterError, match="there is no group 'legs'; groups are seat, rail"):
-            mix(PROGRAM, BASE, BASE, ["legs"])
+            mix_values(PROGRAM, BASE, BASE, ["legs"])
 
     def test_unsatisfiable_constraints_are_reported(self) -> None:
         never = replace(PROGRAM, constraints=(Constraint("never", Condition("height < 0"), "."),))
         with pytest.raises(ParameterError, match="stool: no values near these satisfy height < 0"):
-            mix(never, BASE, BASE, ["seat"])
+            mix_values(never, BASE, BASE, ["seat"])
 
 
 class TestInterpolate:
@@ -93,7 +93,9 @@ class TestInterpolate:
         between = interpolate(PROGRAM, first, last, share, ["seat"])
         assert between["has_rail"] == first["has_rail"]
         assert between["height"] == interpolate(PROGRAM, first, last, share)["height"]
-        assert text(interpolate(PROGRAM, first, last, 1.0, ["seat"])) == text(mix(PROGRAM, first, last, ["seat"]))
+        assert text(interpolate(PROGRAM, first, last, 1.0, ["seat"])) == text(
+            mix_values(PROGRAM, first, last, ["seat"])
+        )
 
     def test_unknown_group_is_reported(self) -> None:
         with pytest.raises(ParameterError, match="there is no group 'legs'"):

@@ -12,7 +12,7 @@ from stages.proportions.text import (
     exemplar_of,
     proportion_text,
     read_proportions,
-    shape_of_text,
+    shape_of_proportion_text,
 )
 from tests.stages.proportions.stools import kit, lattice
 
@@ -26,7 +26,7 @@ def test_a_text_comes_back_and_makes_the_shape_that_it_says() -> None:
     for one, other in zip(read.warp, warp, strict=True):
         np.testing.assert_array_equal(one, other)
     assert proportion_text(read) == text
-    assert len(shape_of_text(ProportionShapes(kit()), text)) == len(exemplar.whole)
+    assert len(shape_of_proportion_text(ProportionShapes(kit()), text)) == len(exemplar.whole)
 
 
 @pytest.mark.parametrize(
@@ -44,4 +44,4 @@ def test_a_text_comes_back_and_makes_the_shape_that_it_says() -> None:
 )
 def test_what_says_no_proportions_is_refused(text: str, why: str) -> None:
     with pytest.raises(ProportionError, match=why):
-        shape_of_text(ProportionShapes(kit()), text)
+        shape_of_proportion_text(ProportionShapes(kit()), text)

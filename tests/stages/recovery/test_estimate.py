@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.recovery.cloud_target import cloud_target
-from stages.recovery.refinement import refine
+from stages.recovery.refinement import refine_estimate
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.estimate import ParameterEstimate, base_estimate
 from tests.stages.recovery.test_recover import STOOL, TALL, cloud_of
@@ -52,7 +52,9 @@ def test_impossible_value_has_finite_surprise() -> None:
 def height_found(surprise_cost: float, chance_distance: float) -> float:
     rng = np.random.default_rng(0)
     target = cloud_target(cloud_of(TALL), rng)
-    return float(refine(STOOL, height_estimate(), target, 200, rng, surprise_cost, chance_distance).values["height"])
+    return float(
+        refine_estimate(STOOL, height_estimate(), target, 200, rng, surprise_cost, chance_distance).values["height"]
+    )
 
 
 def test_high_surprise_cost_keeps_the_estimate() -> None:

@@ -15,7 +15,7 @@ from stages.recovery.partial_target import PartialTarget, partial_target
 from stages.recovery.recover import recover, recover_input
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import Frame, frame_of
-from stages.training.recovery.shapes import TEST_INTERVAL, random_shapes
+from stages.training.recovery.shapes import TEST_INTERVAL, random_training_shapes
 from stages.training.recovery.surface import sample_points
 from tests.stages.recovery.test_recover import SHIPPED_MODELS, STOOL, TALL, cloud_of, off_by
 
@@ -112,7 +112,7 @@ def test_stick_is_no_part_of_a_stool() -> None:
 @pytest.mark.parametrize("program", ["chair", "table", "vase"])
 def test_network_distinguishes_partial_from_otherwise_corrupted_clouds(program: str) -> None:
     made, rng = find_program(program), np.random.default_rng(5)
-    shape = next(random_shapes(made, TEST_INTERVAL, rng))
+    shape = next(random_training_shapes(made, TEST_INTERVAL, rng))
     given = RecoveryInput("cloud", points=sample_points(shape.parts, 2048, rng))
     clouds = {
         "whole": given,

@@ -21,14 +21,14 @@ from stages.recovery.cloud_target import cloud_target
 from stages.recovery.inputs import InputError, RecoveryInput
 from stages.recovery.reading import read_inputs
 from stages.recovery.recover import recover, recover_input
-from stages.recovery.refinement import refine
+from stages.recovery.refinement import refine_estimate
 from stages.shape.geometry.clouds import chamfer_squared
 from stages.sketches.settings import SketchesConfig, SketchView
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
 from stages.training.recovery.drawings import draw_fitted
 from stages.training.recovery.estimate import base_estimate
 from stages.training.recovery.settings import RecoveryModelConfig
-from stages.training.recovery.shapes import TEST_INTERVAL, TRAIN_INTERVAL, VALIDATION_INTERVAL, random_shapes
+from stages.training.recovery.shapes import TEST_INTERVAL, TRAIN_INTERVAL, VALIDATION_INTERVAL, random_training_shapes
 from stages.training.recovery.ship import slim_bytes
 from stages.training.recovery.surface import shape_points
 from stages.training.recovery.trained import PRETRAINED_FOLDER, find_models, load_recovery
@@ -53,7 +53,7 @@ def test_intervals_share_no_shape() -> None:
     texts = [
         {
             STOOL.schema.to_text(shape.values)
-            for shape in islice(random_shapes(STOOL, interval, np.random.default_rng(0)), 60)
+            for shape in islice(random_training_shapes(STOOL, interval, np.random.default_rng(0)), 60)
         }
         for interval in (TRAIN_INTERVAL, VALIDATION_INTERVAL, TEST_INTERVAL)
     ]
@@ -63,17 +63,17 @@ def test_intervals_share_no_shape() -> None:
 
 
 def test_random_shapes_are_valid_with_hidden_classes() -> None:
-    for shape in islice(random_shapes(STOOL, TRAIN_INTERVAL, np.random.default_rng(1)), 40):
+    for shape in islice(random_training_shapes(STOOL, TRAIN_INTERVAL, np.random.default_rng(1)), 40):
         assert not STOOL.violated(shape.values)
         assert (shape.classes[3] == 6) == (not shape.values["has_rail"])
 
 
 def test_search_without_a_network_finds_a_stool() -> None:
     rng = np.random.default_rng(0)
-    found = refine(STOOL, base_estimate(STOOL), cloud_target(cloud_of(TALL), rng), 300, rng)
+    found = refine_estimate(STOOL, base_estimate(STOOL), cloud_target(cloud_of(TALL), rng), 300, rng)
     assert found.tried <= 302
     assert off_by(found.values, TALL) < 0.03
-    first = refine(STOOL, base_estimate(STOOL), cloud_target(cloud_of(TALL), rng), 1, rng)
+    first = refine_estimate(STOOL, base_estimate(STOOL), cloud_target(cloud_of(TALL), rng), 1, rng)
     assert found.distance < 0.25 * first.distance
 
 
@@ -81,7 +81,7 @@ def test_search_without_a_network_finds_a_stool() -> None:
 def test_larger_budget_is_never_worse(budget: int) -> None:
     def distance(shapes: int) -> float:
         rng = np.random.default_rng(0)
-        return refine(STOOL, base_estimate(STOOL), cloud_target(cloud_of(TALL), rng), shapes, rng).distance
+        return refine_estimate(STOOL, base_estimate(STOOL), cloud_target(cloud_of(TALL), rng), shapes, rng).distance
 
     assert distance(4 * budget) <= distance(budget)
 
@@ -265,7 +265,7 @@ def test_shipped_models_fit_the_programs() -> None:
 def test_shipped_models_are_better_than_the_base_shape(program: str, kind: str) -> None:
     model = SHIPPED_MODELS[program, kind]
     made = find_program(program)
-    shapes = list(islice(random_shapes(made, TEST_INTERVAL, np.random.default_rng(11)), 2))
+    shapes = list(islice(random_training_shapes(made, TEST_INTERVAL, np.random.default_rng(11)), 2))
     distances = []
     for shape in shapes:
         if kind == "points":

@@ -18,7 +18,7 @@ from stages.shape.appearance import (
     TextureImage,
     barycentric,
     given_normals,
-    joined,
+    joined_appearance,
 )
 from stages.shape.kit import Assembly
 from stages.shape.kit_files import load_kit, write_kit
@@ -93,12 +93,12 @@ def test_faces_that_were_turned_around_turn_their_normals() -> None:
 
 def test_joined_looks_share_equal_materials() -> None:
     other = Appearance((GLASS,), np.zeros(1, np.int32), None, FLAT[:1])
-    both = joined([look(), other, None], [2, 1, 4])
+    both = joined_appearance([look(), other, None], [2, 1, 4])
     assert both is not None
     assert both.materials == (GLASS,), "wood is on no face"
     assert both.face_material.tolist() == [0, -1, 0, -1, -1, -1, -1]
     assert both.normals is None
-    assert joined([None], [3]) is None
+    assert joined_appearance([None], [3]) is None
 
 
 def names(look: Appearance) -> list[str]:

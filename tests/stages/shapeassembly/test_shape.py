@@ -12,7 +12,7 @@ import trimesh
 
 from stages.package.glb import glb_bytes
 from stages.shapeassembly import execute, parse
-from stages.shapeassembly.shape import label_colors, shape_of_text
+from stages.shapeassembly.shape import category_label_colors, shape_of_program_text
 from stages.shapeassembly.syntax.checks import violations
 
 EXAMPLES = sorted(Path("datasets/exemplars/programs").glob("*.txt"))
@@ -23,7 +23,7 @@ def test_a_shipped_program_keeps_every_rule_and_its_meshes_are_its_cuboids(path:
     text = path.read_text(encoding="utf-8")
     program = parse(text)
     assert violations(program) == []
-    done, shape = execute(program), shape_of_text(text)
+    done, shape = execute(program), shape_of_program_text(text)
     assert shape.part_names == done.names
     assert shape.up == "y"
     assert [shape.labels[label] for label in shape.part_labels] == list(done.labels)
@@ -36,7 +36,9 @@ def test_a_shipped_program_keeps_every_rule_and_its_meshes_are_its_cuboids(path:
 
 
 def test_nodes_of_the_mesh_file_are_named_by_path() -> None:
-    shape = shape_of_text(next(path for path in EXAMPLES if path.stem == "wardrobe").read_text(encoding="utf-8"))
+    shape = shape_of_program_text(
+        next(path for path in EXAMPLES if path.stem == "wardrobe").read_text(encoding="utf-8")
+    )
     stored = glb_bytes(shape)
     header = json.loads(stored[20 : 20 + struct.unpack("<I", stored[12:16])[0]])
     names = [node["name"] for node in header["nodes"]]
@@ -46,7 +48,7 @@ def test_nodes_of_the_mesh_file_are_named_by_path() -> None:
 
 def labelled(stem: str) -> dict[str, str]:
     """The label of each part of a shipped program, by the part's name."""
-    shape = shape_of_text(next(path for path in EXAMPLES if path.stem == stem).read_text(encoding="utf-8"))
+    shape = shape_of_program_text(next(path for path in EXAMPLES if path.stem == stem).read_text(encoding="utf-8"))
     assert len(set(shape.part_names)) == len(shape)
     return dict(zip(shape.part_names, (shape.labels[label] for label in shape.part_labels), strict=True))
 
@@ -76,7 +78,7 @@ def test_a_copy_of_a_copy_is_labelled_like_the_first() -> None:
         reflect(post, X)
         reflect(cube1, Z)
     }"""
-    shape = shape_of_text(text)
+    shape = shape_of_program_text(text)
     assert shape.part_names == ("Shelf/post", "Shelf/cube1", "Shelf/cube2")
     assert shape.labels == ("Shelf/post",)
     assert shape.part_labels.tolist() == [0, 0, 0]
@@ -84,8 +86,11 @@ def test_a_copy_of_a_copy_is_labelled_like_the_first() -> None:
 
 def test_a_shape_has_the_labels_of_its_category_where_they_are_given() -> None:
     text = next(path for path in EXAMPLES if path.stem == "stool-tripod").read_text(encoding="utf-8")
-    own, given = shape_of_text(text), shape_of_text(text, ("Bed/leg", "Stool/back_leg", "Stool/leg", "Stool/seat"))
+    own, given = (
+        shape_of_program_text(text),
+        shape_of_program_text(text, ("Bed/leg", "Stool/back_leg", "Stool/leg", "Stool/seat")),
+    )
     assert own.labels == ("Stool/back_leg", "Stool/leg", "Stool/seat")
     assert (given.part_labels == own.part_labels + 1).all()
     for mesh, label in zip(given.meshes, given.part_labels.tolist(), strict=True):
-        assert (mesh.face_colors == label_colors(4)[label]).all()
+        assert (mesh.face_colors == category_label_colors(4)[label]).all()

@@ -19,7 +19,7 @@ from stages.shape.sample import Sample, read_samples
 from stages.shapeassembly import execute, parse
 from stages.shapeassembly.analysis.structure import signature
 from stages.shapeassembly.settings import ProgramFiles, ShapeAssemblyConfig
-from stages.shapeassembly.shape import shape_of_text
+from stages.shapeassembly.shape import shape_of_program_text
 from stages.shapeassembly.splits import splits_of
 from tests.command import shapemill
 
@@ -88,7 +88,7 @@ def test_samples_are_canonical_programs_split_by_structure(made: tuple[str, Path
     for sample in found:
         assert (sample.producer, sample.kit) == ("shapeassembly", "good")
         assert sample.graph == signature(parse(sample.text))
-        assert len(shape_of_text(sample.text)) > 0
+        assert len(shape_of_program_text(sample.text)) > 0
         splits.setdefault(sample.graph, set()).add(sample.split)
     assert len(splits) == len(EXAMPLES)
     assert all(len(split) == 1 for split in splits.values())

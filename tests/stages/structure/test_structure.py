@@ -20,7 +20,7 @@ from stages.shape.collection.packaged import PackagedSample
 from stages.shape.kit import Assembly
 from stages.shape.shape import Shape, kit_shape
 from stages.shapeassembly.extraction.readers.structurenet import read_structurenet
-from stages.shapeassembly.shape import shape_of_text
+from stages.shapeassembly.shape import shape_of_program_text
 from stages.structure.audit import AUDIT
 from stages.structure.hierarchy import path_hierarchy
 from stages.structure.settings import StructureConfig
@@ -110,7 +110,7 @@ def test_drawers_and_doors_of_a_cabinet_are_groups() -> None:
 
 
 def test_structurenet_json_is_read_back_with_the_same_tree_and_boxes(tmp_path: Path) -> None:
-    shape = shape_of_text(DESK.read_text(encoding="utf-8"))
+    shape = shape_of_program_text(DESK.read_text(encoding="utf-8"))
     record = structure_fields(shape, "shapeassembly", ALL)
     contacts = np.array([[0, 1]], dtype=np.int32)
     ((name, content),) = structurenet_files("desk", shape, contacts, record).items()
@@ -127,7 +127,7 @@ def test_structurenet_json_is_read_back_with_the_same_tree_and_boxes(tmp_path: P
 
 
 def test_groups_are_nodes_of_the_glb_and_parts_keep_their_places() -> None:
-    shape = shape_of_text(DESK.read_text(encoding="utf-8"))
+    shape = shape_of_program_text(DESK.read_text(encoding="utf-8"))
     hierarchy = structure_fields(shape, "shapeassembly", ALL)["hierarchy"]
     content = glb_bytes(shape, hierarchy)
     assert glb_bytes(shape, {"groups": hierarchy["groups"][:1], "part_groups": [0] * len(shape)}) == glb_bytes(shape)

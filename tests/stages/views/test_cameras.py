@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from stages.shape.views.camera_record import camera_fields
 from stages.shape.views.scene import scene_of
-from stages.views.cameras import circle, sample_views
+from stages.views.cameras import cosine_and_sine, sample_views
 from stages.views.placement import bounding_sphere
 from stages.views.settings import ViewsConfig, view_count
 from stages.views.transforms import transforms_bytes
@@ -41,7 +41,7 @@ def eyes(recorded: list[dict[str, Any]]) -> np.ndarray:
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 45.0, 90.0, 137.5, -200.0, 719.0])
 def test_sine_and_cosine_are_right_to_the_last_digits(degrees: float) -> None:
     angle = math.radians(degrees)
-    assert circle(degrees) == pytest.approx((math.cos(angle), math.sin(angle)), abs=3e-15)
+    assert cosine_and_sine(degrees) == pytest.approx((math.cos(angle), math.sin(angle)), abs=3e-15)
 
 
 def test_the_bounding_sphere_holds_every_vertex_and_touches_one() -> None:

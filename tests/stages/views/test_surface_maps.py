@@ -124,7 +124,7 @@ def test_metal_reflects_the_lamp_as_in_pyrender(roughness: float) -> None:
     from scipy.ndimage import minimum_filter
 
     from stages.shape.views.opengl import load_pyrender
-    from stages.views.cameras import circle, orbit_rotation
+    from stages.views.cameras import cosine_and_sine, orbit_rotation
     from tests.renderings.peers import camera_pose
 
     pyrender = load_pyrender()
@@ -139,7 +139,7 @@ def test_metal_reflects_the_lamp_as_in_pyrender(roughness: float) -> None:
     lens = pyrender.IntrinsicsCamera(k[0, 0], k[1, 1], k[0, 2], k[1, 2], znear=0.1, zfar=100.0)
     scene.add(lens, pose=camera_pose(view.camera))
     lamp = np.eye(4)
-    lamp[:3, :3] = orbit_rotation(azimuth, circle(elevation)[1]).T
+    lamp[:3, :3] = orbit_rotation(azimuth, cosine_and_sine(elevation)[1]).T
     scene.add(pyrender.DirectionalLight(intensity=0.7 * np.pi), pose=lamp)
     renderer = pyrender.OffscreenRenderer(view.camera["width"], view.camera["height"])
     theirs, depth = renderer.render(scene, flags=pyrender.RenderFlags.SKIP_CULL_FACES)

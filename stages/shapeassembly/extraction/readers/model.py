@@ -43,7 +43,7 @@ def read_model_hierarchy(path: Path, up: Literal["auto", "y", "z"]) -> PartHiera
     The label of a part is its name without path and trailing number. Nothing outside the folder of the file is read.
     Raises Rejected, naming the file, for one that cannot be read and for one without meshes.
     """
-    scene = scene_of(path)
+    scene = read_model_scene(path)
     if len(scene.placements) == 1:
         scene = segment_scene(scene, "components")
     turn = _Z_UP_TO_Y_UP if (up if up != "auto" else scene.up) == "z" else np.eye(3)
@@ -54,7 +54,7 @@ def read_model_hierarchy(path: Path, up: Literal["auto", "y", "z"]) -> PartHiera
     return PartHierarchy(path.stem, check_limits(_part(root, unit, path.name, 0)[0], path.name))
 
 
-def scene_of(path: Path) -> ModelScene:
+def read_model_scene(path: Path) -> ModelScene:
     """Return the scene of a model file, in the calling process. Raises Rejected, naming the file."""
     try:
         scene = read_scene(path)

@@ -19,7 +19,7 @@ from stages.shapeassembly.extraction.hierarchy import (
     check_limits,
 )
 from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
-from stages.shapeassembly.extraction.readers.model import scene_of
+from stages.shapeassembly.extraction.readers.model import read_model_scene
 
 
 def read_partnet(path: Path) -> PartHierarchy:
@@ -68,7 +68,7 @@ def _points(mesh: Any, folder: Path, location: str) -> FloatArray:
     if not path.is_file():
         raise Rejected(UNREADABLE, f"{location}: objs/{mesh}.obj is not there; download the shape again")
     try:
-        scene = scene_of(path)
+        scene = read_model_scene(path)
     except Rejected as error:
         raise Rejected(UNREADABLE, f"{location}: objs/{error.detail}") from None
     return np.concatenate(exact_vertices(scene))

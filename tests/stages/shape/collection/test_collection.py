@@ -17,7 +17,7 @@ from pipeline.paths import DatasetPaths
 from pipeline.shards import bytes_array
 from stages.programs.language import LANGUAGE
 from stages.shapeassembly import execute, parse
-from stages.verification.samples import read_packaged, read_record, sample_faults
+from stages.verification.samples import read_packaged, read_sample_record, sample_faults
 from stages.verification.shard import shard_samples
 from tests.command import shapemill
 from tests.stated import stated
@@ -115,7 +115,7 @@ def test_verify_sees_a_surface_that_the_text_does_not_make(made: tuple[Path, tup
     other = next(sample for sample in samples.values() if sample["txt"] != members["txt"])
 
     def faults(members: dict[str, bytes]) -> list[str]:
-        record = read_record(members["json"])
+        record = read_sample_record(members["json"])
         return list(sample_faults(read_packaged(key, record, members, rebuild, manifest["config"], {})))
 
     assert faults(members) == []

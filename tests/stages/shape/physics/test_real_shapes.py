@@ -11,7 +11,7 @@ from eval.dataset.physical_validity import judge_all, stays_up
 from eval.engine.shapes import box_shapes, model_shapes
 from stages.shape.physics.judge import Validity
 from stages.shape.physics.settings import PhysicsConfig
-from stages.shapeassembly.shape import shape_of_text
+from stages.shapeassembly.shape import shape_of_program_text
 from tests.stages.shapeassembly.shared_programs import shared_texts
 
 SHARED = Path(__file__).resolve().parents[5] / "shared"
@@ -58,7 +58,7 @@ def test_dropped_furniture_falls_where_it_falls_in_simulation() -> None:
     caught, false = [], 0
     for category, listed in verdicts.items():
         texts = shared_texts(category)
-        shapes = [shape_of_text(texts[f"data/{category}/{name}.txt"]) for name in listed]
+        shapes = [shape_of_program_text(texts[f"data/{category}/{name}.txt"]) for name in listed]
         for (name, (_, stable)), stays in zip(listed.items(), stays_up(shapes, PhysicsConfig()), strict=True):
             caught += [name] if not stable and not stays else []
             false += stable and not stays

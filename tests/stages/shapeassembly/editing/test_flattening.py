@@ -8,7 +8,7 @@ import pytest
 from pipeline.errors import Rejected
 from stages.shapeassembly import execute, parse
 from stages.shapeassembly.editing.flattening import without_hierarchy
-from stages.shapeassembly.extraction.validity import execution_boxes, f_score
+from stages.shapeassembly.extraction.validity import box_f_score, execution_boxes
 from stages.shapeassembly.syntax.checks import violations
 from tests.stages.shapeassembly.editing.test_ablations import same_boxes
 from tests.stages.shapeassembly.shared_programs import needs_shared, shared_texts
@@ -52,5 +52,5 @@ def test_flattened_real_programs_keep_their_shapes() -> None:
         assert len(flat.blocks) == 1
         assert not [violation for violation in violations(flat) if violation.rule != "size"]
         diagonal = float(np.linalg.norm(program.root.bbox.dims))
-        assert f_score(execution_boxes(execute(flat)), execution_boxes(execute(program)), 0.03 * diagonal, 512) > 70
+        assert box_f_score(execution_boxes(execute(flat)), execution_boxes(execute(program)), 0.03 * diagonal, 512) > 70
     assert kept >= 0.7 * len(texts)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from stages.shape.geometry.clouds import chamfer_l1
 from stages.shapeassembly import execute, parse
 from stages.shapeassembly.analysis.structure import signature
-from stages.shapeassembly.execution.fitting import fit, fit_cuboids, surface_points
+from stages.shapeassembly.execution.fitting import fit, fit_cuboids, sampled_surface_points
 from stages.shapeassembly.execution.parameters import parameter_ranges, parameters, with_parameters
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.validity import execution_boxes
@@ -21,12 +21,12 @@ CHAIR = parse(Path("datasets/exemplars/programs/chair-slats.txt").read_text(enco
 
 def test_perturbed_chair_is_fitted_back() -> None:
     rng = np.random.default_rng(4)
-    points = surface_points(execute(CHAIR), 3000, rng)
+    points = sampled_surface_points(execute(CHAIR), 3000, rng)
     low, high = parameter_ranges(CHAIR)
     values = parameters(CHAIR)
     start = with_parameters(CHAIR, np.clip(values + rng.normal(0, 0.05, len(values)) * (high > low), low, high))
     done = fit(start, points, rng, steps=80, samples=800)
-    floor = chamfer_l1(surface_points(execute(CHAIR), 800, rng), points)
+    floor = chamfer_l1(sampled_surface_points(execute(CHAIR), 800, rng), points)
     assert done.before > 1.5 * floor
     assert done.after < 1.15 * floor
     assert signature(done.program) == signature(CHAIR)
@@ -38,7 +38,7 @@ def test_free_cuboids_are_fitted_independently() -> None:
     """Moved, turned and too thick, and back: what was attached need not be so any more."""
     rng = np.random.default_rng(4)
     wanted = execution_boxes(execute(CHAIR))
-    points = surface_points(execute(CHAIR), 3000, rng)
+    points = sampled_surface_points(execute(CHAIR), 3000, rng)
     turn = Rotation.from_rotvec([0.05, 0.1, 0.0]).as_matrix()
     moved = [Box(item.center + rng.normal(0, 0.03, 3), 1.1 * item.size, item.axes @ turn) for item in wanted]
     found = fit_cuboids(moved, points, rng, steps=120, samples=800)
@@ -54,7 +54,7 @@ def test_free_cuboids_are_fitted_independently() -> None:
 
 def test_surface_points_lie_on_all_faces_by_area() -> None:
     done = execute(parse("Assembly P { bbox = Cuboid(4.0, 4.0, 4.0, True) c = Cuboid(1.0, 2.0, 3.0, True) }"))
-    points = surface_points(done, 6000, np.random.default_rng(0)) / done.sizes[0]
+    points = sampled_surface_points(done, 6000, np.random.default_rng(0)) / done.sizes[0]
     on_face = np.abs(np.abs(points) - 0.5) < 1e-12
     assert on_face.any(axis=1).all()
     assert np.abs(points).max() <= 0.5 + 1e-12
@@ -63,7 +63,7 @@ def test_surface_points_lie_on_all_faces_by_area() -> None:
 
 
 def test_the_same_seed_fits_the_same() -> None:
-    points = surface_points(execute(CHAIR), 500, np.random.default_rng(0)) * [1.0, 0.9, 1.0]
+    points = sampled_surface_points(execute(CHAIR), 500, np.random.default_rng(0)) * [1.0, 0.9, 1.0]
     first, second = (fit(CHAIR, points, np.random.default_rng(1), steps=5, samples=200) for _ in range(2))
     assert (first.program, first.after) == (second.program, second.after)
 

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from stages.shapeassembly.extraction.boxes import (
     angle_between,
-    box_corners,
     box_gap,
     boxes_match,
+    corners_of_box,
     local_points,
     mirror_points,
     nearest_axes,
@@ -39,7 +39,7 @@ def test_local_points_inverts_world_points(some: Box, place: tuple[float, float,
 @given(boxes)
 def test_renaming_the_axes_keeps_the_box_and_turns_it_less_than_half_the_cube_allows(some: Box) -> None:
     renamed = nearest_axes(some, np.eye(3))
-    assert boxes_match(box_corners(some), box_corners(renamed), 1e-9)
+    assert boxes_match(corners_of_box(some), corners_of_box(renamed), 1e-9)
     assert np.linalg.det(renamed.axes) == pytest.approx(1.0)
     assert angle_between(renamed.axes, np.eye(3)) <= 62.8 + 1e-6, "the farthest rotation from the 24 of the cube"
 
@@ -72,7 +72,7 @@ def test_surface_distance_is_exact_inside_and_outside() -> None:
 
 @given(boxes, st.sampled_from([0, 1, 2]))
 def test_reflection_twice_is_identity(some: Box, axis: int) -> None:
-    corners = box_corners(some)
+    corners = corners_of_box(some)
     np.testing.assert_allclose(
         mirror_points(mirror_points(corners, some.center, axis), some.center, axis), corners, atol=1e-12
     )
@@ -80,9 +80,9 @@ def test_reflection_twice_is_identity(some: Box, axis: int) -> None:
 
 @given(boxes)
 def test_smallest_box_around_the_corners_of_a_box_is_that_box(some: Box) -> None:
-    found = minimum_box(box_corners(some))
+    found = minimum_box(corners_of_box(some))
     assert np.prod(found.size) <= np.prod(some.size) * 1.02
-    local = np.abs((box_corners(some) - found.center) @ found.axes.T)
+    local = np.abs((corners_of_box(some) - found.center) @ found.axes.T)
     assert (local <= found.size / 2 + 1e-9).all()
 
 

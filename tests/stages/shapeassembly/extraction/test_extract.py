@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pipeline.errors import Rejected
 from stages.shapeassembly import execute, parse, print_program
 from stages.shapeassembly.analysis.structure import program_distance
-from stages.shapeassembly.extraction.boxes import box_corners, boxes_match
+from stages.shapeassembly.extraction.boxes import boxes_match, corners_of_box
 from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES
 from stages.shapeassembly.extraction.extract import ExtractedProgram, extract
 from stages.shapeassembly.extraction.hierarchy import Box, PartHierarchy, PartNode
@@ -40,9 +40,9 @@ def lines(shape: PartHierarchy, gates: Gates = GATES) -> list[str]:
 
 def covers(made: Sequence[Box], wanted: Sequence[Box], tolerance: float = 0.005) -> bool:
     """Whether each box of one list is a box of the other, and their numbers agree."""
-    corners = [box_corners(box) for box in made]
+    corners = [corners_of_box(box) for box in made]
     return len(made) == len(wanted) and all(
-        any(boxes_match(box_corners(box), corner, tolerance) for corner in corners) for box in wanted
+        any(boxes_match(corners_of_box(box), corner, tolerance) for corner in corners) for box in wanted
     )
 
 

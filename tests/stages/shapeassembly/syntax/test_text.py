@@ -7,7 +7,7 @@ from hypothesis import given
 
 from stages.shapeassembly import ProgramError, parse, print_program
 from stages.shapeassembly.syntax.limits import MAX_TEXT_CHARACTERS
-from stages.shapeassembly.syntax.printer import rounded
+from stages.shapeassembly.syntax.printer import rounded_program
 from stages.shapeassembly.syntax.program import AssemblyProgram, Attach, Block, Cuboid, Reflect, Squeeze, Translate
 from tests.stages.shapeassembly.strategies import programs
 
@@ -55,7 +55,7 @@ def test_every_number_survives_printing() -> None:
     dims = (0.1 + 0.2, 1e-5, 123456.789)
     program = AssemblyProgram((Block("P", Cuboid("bbox", dims, True), ()),))
     assert parse(print_program(program)) == program
-    assert rounded(program).root.bbox.dims == (0.3, 0.0, 123456.789)
+    assert rounded_program(program).root.bbox.dims == (0.3, 0.0, 123456.789)
 
 
 def test_a_cuboid_without_its_flag_is_not_aligned() -> None:

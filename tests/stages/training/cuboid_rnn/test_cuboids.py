@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from stages.shapeassembly import execute, parse
-from stages.shapeassembly.extraction.boxes import box_corners, boxes_match
+from stages.shapeassembly.extraction.boxes import boxes_match, corners_of_box
 from stages.shapeassembly.extraction.validity import execution_boxes
 from stages.training.box_vectors import box_from_vector, box_vector
 from stages.training.cuboid_rnn.batches import END_KIND, CuboidCorpus, batch_of
@@ -29,7 +29,7 @@ ENTRY = CuboidRnnConfig(name="tiny", kind="cuboid_rnn", hidden=48, mixtures=1, b
 def test_box_vectors_round_trip(text: str) -> None:
     for box in execution_boxes(execute(parse(text))):
         again = box_from_vector(box_vector(box))
-        assert boxes_match(box_corners(box), box_corners(again), 1e-6)
+        assert boxes_match(corners_of_box(box), corners_of_box(again), 1e-6)
 
 
 def test_mirrored_pairs_count_once_and_rows_go_from_bottom_to_top() -> None:
@@ -39,7 +39,7 @@ def test_mirrored_pairs_count_once_and_rows_go_from_bottom_to_top() -> None:
     assert (rows[0, 6:9] != 0).any(), "the leg leans"
     restored = [box_from_vector(row) for row in (*rows[:, :9], *mirror_cuboids(rows[:1, :9]))]
     for box in boxes:
-        assert any(boxes_match(box_corners(box), box_corners(item), 1e-3) for item in restored)
+        assert any(boxes_match(corners_of_box(box), corners_of_box(item), 1e-3) for item in restored)
 
 
 def test_batch_has_a_step_per_axis_and_the_step_before_as_input() -> None:
@@ -91,7 +91,7 @@ def test_network_learns_and_samples_two_shapes() -> None:
     alike = [
         sum(
             len(item) == len(boxes)
-            and all(any(boxes_match(box_corners(a), box_corners(b), 0.1) for b in item) for a in boxes)
+            and all(any(boxes_match(corners_of_box(a), corners_of_box(b), 0.1) for b in item) for a in boxes)
             for item in found
         )
         for boxes in wanted

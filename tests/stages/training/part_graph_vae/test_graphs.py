@@ -10,13 +10,13 @@ import torch
 
 from pipeline.errors import Rejected
 from stages.shapeassembly import execute, parse
-from stages.shapeassembly.extraction.boxes import box_corners, boxes_match
+from stages.shapeassembly.extraction.boxes import boxes_match, corners_of_box
 from stages.shapeassembly.extraction.validity import execution_boxes
 from stages.training.part_graph_vae.batches import GraphCorpus, batch_of
 from stages.training.part_graph_vae.corpus import graph_nodes
 from stages.training.part_graph_vae.settings import PartGraphVaeConfig
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
-from stages.training.part_graph_vae.training import PartGraphVaeTask, new_model, reconstruction
+from stages.training.part_graph_vae.training import PartGraphVaeTask, new_model, part_graph_reconstruction
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
 ENTRY = PartGraphVaeConfig(name="tiny", kind="part_graph_vae", latent=8, hidden=48, batch_size=2, kl_weight=0.0)
@@ -48,8 +48,10 @@ def test_node_with_too_many_parts_is_rejected() -> None:
 def test_loss_of_a_batch_is_the_sum_over_its_shapes() -> None:
     module = new_model(ENTRY, 1)
     points = torch.randn(2, ENTRY.latent, generator=torch.Generator().manual_seed(0))
-    together = reconstruction(module, batch_of(graphs(), np.array([0, 1])), points)
-    alone = [reconstruction(module, batch_of(graphs(), np.array([row])), points[row : row + 1]) for row in (0, 1)]
+    together = part_graph_reconstruction(module, batch_of(graphs(), np.array([0, 1])), points)
+    alone = [
+        part_graph_reconstruction(module, batch_of(graphs(), np.array([row])), points[row : row + 1]) for row in (0, 1)
+    ]
     for whole, parts in zip(together, zip(*alone, strict=True), strict=True):
         assert whole.item() == pytest.approx(sum(part.item() for part in parts), rel=1e-5)
     means = module.encode(batch_of(graphs(), np.array([0, 1])))[0]
@@ -75,7 +77,7 @@ def test_model_learns_and_samples_two_shapes() -> None:
         wanted = execution_boxes(execute(parse(text)))
         assert len(found) == len(wanted)
         for box in wanted:
-            assert any(boxes_match(box_corners(box), box_corners(item), 0.15) for item in found)
+            assert any(boxes_match(corners_of_box(box), corners_of_box(item), 0.15) for item in found)
     one, other = (model.sample(5, np.random.default_rng(0)) for _ in range(2))
     assert one[1] == other[1] >= 5
     assert all(np.array_equal(a[0].center, b[0].center) for a, b in zip(one[0], other[0], strict=True))

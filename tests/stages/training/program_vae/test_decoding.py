@@ -17,7 +17,7 @@ from stages.training.program_vae.partial_assembly import LineNumbers, PartialAss
 from stages.training.program_vae.reaching import add_line
 from stages.training.program_vae.settings import ProgramVaeConfig
 from stages.training.program_vae.trained import TrainedProgramVae
-from stages.training.program_vae.training import ProgramVaeTask, new_model, reconstruction
+from stages.training.program_vae.training import ProgramVaeTask, new_model, program_reconstruction
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
 ENTRY = ProgramVaeConfig(name="tiny", kind="program_vae", latent=16, hidden=48, kl_weight=0.0, batch_size=2)
@@ -32,8 +32,10 @@ def test_loss_of_a_batch_is_the_sum_over_its_programs() -> None:
     """Whatever stands in one batch, and whatever stands behind an end."""
     module = new_model(ENTRY, 1)
     codes = torch.randn(2, ENTRY.latent, generator=torch.Generator().manual_seed(0))
-    together = reconstruction(module, batch_of(PROGRAMS, np.array([0, 1])), codes)
-    alone = [reconstruction(module, batch_of(PROGRAMS, np.array([row])), codes[row : row + 1]) for row in (0, 1)]
+    together = program_reconstruction(module, batch_of(PROGRAMS, np.array([0, 1])), codes)
+    alone = [
+        program_reconstruction(module, batch_of(PROGRAMS, np.array([row])), codes[row : row + 1]) for row in (0, 1)
+    ]
     for whole, parts in zip(together, zip(*alone, strict=True), strict=True):
         assert whole.item() == pytest.approx(sum(part.item() for part in parts), rel=1e-5)
     means = module.encode(batch_of(PROGRAMS, np.array([0, 1])))[0]

@@ -10,7 +10,7 @@ from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.geometry.hash_tables import look_up
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly
-from stages.variations.exchange.cuts import cut
+from stages.variations.exchange.cuts import cut_connected_piece
 from stages.variations.exchange.joins import join
 from stages.variations.kernels.checks import connect
 from stages.variations.kernels.outcomes import Outcome
@@ -32,7 +32,7 @@ def test_cut_is_connected_and_bounded_by_outside_neighbours() -> None:
     ws, rng = line.maker.ws, np.random.default_rng(0)
     sizes = set()
     for number in range(300):
-        outcome = cut(rng, shape, shape, ws, number % 3, line.kit.pose_tolerance)
+        outcome = cut_connected_piece(rng, shape, shape, ws, number % 3, line.kit.pose_tolerance)
         inside = ws.inside[: len(shape.types)]
         sizes.add(int(inside.sum()))
         boundary = set(ws.boundary[: ws.counts[N_BOUNDARY]].tolist())

@@ -8,7 +8,7 @@ from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Assembly
 from stages.variations.exchange.pose_matching import lies_in
 from stages.variations.kernels.structs import N_EDGES, N_PARTS
-from stages.variations.novelty.archive import Archive, cell_of
+from stages.variations.novelty.archive import Archive, cell_of_features
 from stages.variations.novelty.features import AXES, FeatureExtractor, material_shares
 from stages.variations.search.draft import load_shape
 from stages.variations.search.search import RESERVE_FACTOR, Search
@@ -66,7 +66,7 @@ def test_cells_bin_sizes_by_octaves_and_keep_zero_apart() -> None:
     cells = []
     for parts, mixture in ((16, 0.0), (17, 0.0), (32, 0.0), (16, 0.01)):
         features[AXES.index("parts")], features[AXES.index("mixture")] = parts, mixture
-        cells.append(cell_of(features, ("parts", "mixture"), 4))
+        cells.append(cell_of_features(features, ("parts", "mixture"), 4))
     assert cells == [(16, 0), (16, 0), (20, 0), (16, 1)]
 
 
