@@ -578,15 +578,20 @@ def point_faults(
     low, high = np.array(record["bounds"])
     if (points < low - tolerance).any() or (points > high + tolerance).any():
         yield f"{cloud.name} has points outside its bounds"
-    for index in rng.permutation(len(points))[:POINTS_PER_SAMPLE].tolist():
-        near = near_triangles(triangles[instances[index]], points[index], tolerance)
-        if not len(near):
+    chosen = rng.permutation(len(points))[:POINTS_PER_SAMPLE]
+    near, of_point = near_triangles([triangles[part] for part in instances[chosen]], points[chosen], tolerance)
+    across = np.cross(near[:, 1] - near[:, 0], near[:, 2] - near[:, 0])
+    lengths = np.linalg.norm(across, axis=1)
+    products = (across * normals[chosen][of_point]).sum(axis=1)
+    has_area, is_right = lengths > 0, products >= MIN_NORMAL_COSINE * lengths
+    all_near, with_area, right = (
+        np.isin(np.arange(len(chosen)), of_point[mask]) for mask in (lengths >= 0, has_area, has_area & is_right)
+    )
+    for place, index in enumerate(chosen.tolist()):
+        if not all_near[place]:
             yield f"point {index} of {cloud.name} does not lie on its part"
             return
-        across = np.cross(near[:, 1] - near[:, 0], near[:, 2] - near[:, 0])
-        lengths = np.linalg.norm(across, axis=1)
-        cosines = across[lengths > 0] @ normals[index] / lengths[lengths > 0]
-        if len(cosines) and cosines.max() < MIN_NORMAL_COSINE:
+        if with_area[place] and not right[place]:
             yield f"the normal of point {index} of {cloud.name} is not that of its face"
             return
 
@@ -619,20 +624,31 @@ def contact_faults(
             vertices = np.unique(triangles[first].reshape(-1, 3), axis=0)
             low, high = boxes[second]
             inside = vertices[((vertices >= low - tolerance) & (vertices <= high + tolerance)).all(axis=1)]
-            for vertex in inside[rng.permutation(len(inside))[:VERTICES_PER_PAIR]]:
-                if len(near_triangles(triangles[second], vertex, 0.5 * tolerance)):
-                    yield f"{names[first]} and {names[second]} touch, and are not in contacts.npy"
-                    return
+            looked_at = inside[rng.permutation(len(inside))[:VERTICES_PER_PAIR]]
+            if len(near_triangles([triangles[second]] * len(looked_at), looked_at, 0.5 * tolerance)[0]):
+                yield f"{names[first]} and {names[second]} touch, and are not in contacts.npy"
+                return
 
 
-def near_triangles(triangles: np.ndarray, point: np.ndarray, tolerance: float) -> np.ndarray:
-    """Return the triangles (n, 3, 3) that are at most `tolerance` from a point."""
-    low, high = triangles.min(axis=1), triangles.max(axis=1)
-    near: np.ndarray = triangles[((low <= point + tolerance) & (high >= point - tolerance)).all(axis=1)]
-    if len(near):
-        closest = trimesh.triangles.closest_point(near, np.repeat(point[None], len(near), axis=0))
-        near = near[np.linalg.norm(closest - point, axis=1) <= tolerance]
-    return near
+def near_triangles(surfaces: list[np.ndarray], points: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the triangles (m, 3, 3) that are at most `tolerance` from a point of their own, and the point's index.
+
+    surfaces: triangles (n, 3, 3) that are compared with each point
+    points: (k, 3)
+    """
+    distinct = {id(surface): surface for surface in surfaces}
+    boxes = {key: (surface.min(axis=1), surface.max(axis=1)) for key, surface in distinct.items()}
+    found, counts = [np.empty((0, 3, 3))], list[int]()
+    for surface, point in zip(surfaces, points, strict=True):
+        low, high = boxes[id(surface)]
+        found.append(surface[((low <= point + tolerance) & (high >= point - tolerance)).all(axis=1)])
+        counts.append(len(found[-1]))
+    near, of_point = np.concatenate(found), np.repeat(np.arange(len(points)), np.array(counts, np.intp))
+    if not len(near):
+        return near, of_point
+    gaps = trimesh.triangles.closest_point(near, points[of_point]) - points[of_point]
+    is_near = np.linalg.norm(gaps, axis=1) <= tolerance
+    return near[is_near], of_point[is_near]
 
 
 def hierarchy_faults(record: dict[str, Any], scene: Any) -> Iterator[str]:
@@ -711,10 +727,12 @@ def union_faults(
     corners = vertices[faces]
     low, side = np.array(facts["cube_low"]), float(facts["cube_side"])
     middles = corners.mean(axis=1)
-    for face in rng.permutation(len(faces))[:DISTANCES_PER_SAMPLE].tolist():
-        if not len(near_triangles(triangles[instances[face]], middles[face], POINT_TOLERANCE_SHARE * side)):
-            yield f"face {face} of its union is not on the part that it names"
-            return
+    chosen = rng.permutation(len(faces))[:DISTANCES_PER_SAMPLE]
+    named = [triangles[part] for part in instances[chosen]]
+    is_near = np.isin(np.arange(len(chosen)), near_triangles(named, middles[chosen], POINT_TOLERANCE_SHARE * side)[1])
+    for face in chosen[~is_near][:1].tolist():
+        yield f"face {face} of its union is not on the part that it names"
+        return
     if (middles < low - 1e-6 * side).any() or (middles > low + (1 + 1e-6) * side).any():
         yield "its union is not inside its cube"
     inner = corners - low
