@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from stages.autoconfig.moved_surface import moved_distance
 from stages.rows.settings import RowsConfig
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.contact_oracle import ContactOracle
@@ -34,6 +35,8 @@ MIN_NON_COPY_RATE = 0.25
 """Share of hits that are no near copies, from which a search that rejects near copies still finishes."""
 MIN_EXEMPLAR_DISTANCE, MIN_PAIR_DISTANCE = 0.05, 0.03
 """Distances E to the nearest exemplar and between two hits, below which a pool has low diversity."""
+MIN_MOVED_DISTANCE = 0.02
+"""Distance of surfaces, as a share of the exemplar's diagonal, below which hits look like the exemplar."""
 TRIAL_METHODS: tuple[Literal["exchange", "growth"], ...] = ("exchange", "growth")
 """Each method has its own tries: one grown shape of a large kit costs as much as hundreds of exchanges."""
 MAX_GROWTH_DEGREE = 40
@@ -69,6 +72,7 @@ class TrialResult:
     by_meaning: whether exchanging one part for another of its meaning counts as a hit.
     most_different: indices into the variants, most different first.
     rejects: rejected tries by reason.
+    moved: median over the most different hits of `moved_distance`.
     """
 
     tries: int
@@ -83,6 +87,7 @@ class TrialResult:
     by_meaning: bool = False
     most_different: tuple[int, ...] = ()
     rejects: Mapping[str, int] = field(default_factory=dict)
+    moved: float = 1.0
 
     def as_json(self) -> dict[str, Any]:
         """Return what predicts a long search, for records and programs."""
@@ -103,7 +108,8 @@ def has_low_diversity(trial: TrialResult) -> bool:
     Near copies do no harm by meaning, nor if there are enough other hits, because they are rejected then.
     """
     copies = trial.copied_share >= NEAR_COPY_SHARE and trial.non_copy_rate < MIN_NON_COPY_RATE and not trial.by_meaning
-    return trial.distance < MIN_EXEMPLAR_DISTANCE or trial.pair_distance < MIN_PAIR_DISTANCE or copies
+    looks_the_same = trial.moved < MIN_MOVED_DISTANCE and not trial.by_meaning
+    return trial.distance < MIN_EXEMPLAR_DISTANCE or trial.pair_distance < MIN_PAIR_DISTANCE or copies or looks_the_same
 
 
 class TrialSearch:
@@ -280,6 +286,7 @@ class TrialSearch:
             by_meaning=self.kit.by_meaning,
             most_different=tuple(most_different.tolist()),
             rejects=rejects,
+            moved=moved_distance(self.kit, [self.variants[index].assembly for index in most_different.tolist()]),
         )
 
     def _seen_fillings_share(self, indices: Sequence[int]) -> float:
