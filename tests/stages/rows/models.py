@@ -78,7 +78,7 @@ def rail(posts: int = 8) -> tuple[Kit, Layout]:
 def arched_rail(bars: int = 6, more: tuple[float, ...] = ()) -> tuple[Kit, Layout]:
     """Bars between a sill and a rail whose underside is flat and whose upper side is an arch.
 
-    more: places of bars beside these, along x
+    more: places of further bars, along x
     """
     length = 0.5 * bars
     along = np.linspace(-length / 2, length / 2, 16)
