@@ -30,6 +30,8 @@ UNUSABLE_WORDS = {
     *("part", "parts", "piece", "object", "mesh", "type", "component"),
 }
 """Words of labels that say nothing, or that would make a sentence ambiguous."""
+PLAIN_WORDS = {"revolution": ["turned", "solid"], "sweep": ["swept", "bar"]}
+"""Words that people say, for labels that name how a solid is made."""
 HUES = (
     *((12, "red"), (42, "orange"), (70, "yellow"), (165, "green"), (195, "turquoise"), (255, "blue")),
     *((290, "purple"), (345, "pink"), (361, "red")),
@@ -120,7 +122,7 @@ def _words(name: str) -> list[str]:
     words = [word.lower() for word in re.split(r"[\s_.\-]+", spaced) if word]
     if len(words) > 1 and words[-1] in PLACES and words[0] not in PLACES:
         words = [words[-1], *words[:-1]]
-    return words
+    return PLAIN_WORDS.get(" ".join(words), words)
 
 
 def color_name(color: Sequence[int]) -> str:

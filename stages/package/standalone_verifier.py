@@ -70,6 +70,8 @@ ABOUT_SHARE = 0.07
 """Relative difference that `about` may hide."""
 COUNTERS = {"set", "sets", "pane", "panes", "flight", "flights"}
 """Words that count others in captions, such as `two panes of glass`."""
+PLAIN_WORDS = {"revolution": ["turned", "solid"], "sweep": ["swept", "bar"]}
+"""Words in captions for labels that name how a solid is made."""
 IRREGULAR_SINGULARS = {
     "shelves": "shelf",
     "leaves": "leaf",
@@ -915,8 +917,9 @@ def number_of(word: str) -> int:
 
 
 def label_words(text: str) -> list[str]:
-    """Return the words of a label, in lower case."""
-    return [word.lower() for word in re.split(r"[\s_.\-]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)) if word]
+    """Return the words of a label as captions say them, in lower case."""
+    words = [word.lower() for word in re.split(r"[\s_.\-]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)) if word]
+    return PLAIN_WORDS.get(" ".join(words), words)
 
 
 NUMBER = rf"(?:{'|'.join(NUMBER_WORDS)}|\d+)"

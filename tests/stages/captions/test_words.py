@@ -32,13 +32,15 @@ def test_things_are_counted_in_english(count: int, noun: str, words: str) -> Non
 
 def test_nouns_are_the_words_of_labels_and_unique() -> None:
     paths = ["Chair/Base/back_leg", "Bench/Seat/board", "Bench/Back/board"]
-    labels = [*paths, "column_upper", "towerBase", "part_7", "x-12"]
+    labels = [*paths, "column_upper", "towerBase", "part_7", "x-12", "revolution", "sweep"]
     assert label_nouns(labels) == {
         "Chair/Base/back_leg": "back leg",
         "Bench/Seat/board": "seat board",
         "Bench/Back/board": "back board",
         "column_upper": "upper column",
         "towerBase": "tower base",
+        "revolution": "turned solid",
+        "sweep": "swept bar",
     }
     assert label_nouns(["arm-rest", "arm rest"]) == {}, "two labels with one noun would be counted as one"
 

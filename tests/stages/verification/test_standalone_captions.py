@@ -59,13 +59,16 @@ def test_a_shape_is_called_as_the_config_says() -> None:
 
 
 def test_plurals_differ_from_labels_that_are_plurals() -> None:
-    labels = ("planks", "plank", "glass", "shelf", "base")
-    parts = [{"name": f"{place}", "label": labels[place % 5]} for place in range(10)]
-    known = CaptionFacts({"kit": "x", "parts": parts}, np.zeros((10, 2, 3)), np.empty((2, 0)), {})
-    for number, noun in (("two", "planks"), ("two", "panes of glass"), ("two", "shelves"), ("two", "bases")):
+    labels = ("planks", "plank", "glass", "shelf", "base", "revolution", "sweep")
+    parts = [{"name": f"{place}", "label": labels[place % 7]} for place in range(14)]
+    known = CaptionFacts({"kit": "x", "parts": parts}, np.zeros((14, 2, 3)), np.empty((2, 0)), {})
+    for number, noun in (
+        *(("two", "planks"), ("two", "panes of glass"), ("two", "shelves"), ("two", "bases")),
+        *(("two", "turned solids"), ("two", "swept bars")),
+    ):
         assert len(known.parts(number, noun)) == 2, noun
-    assert known.alike("set of planks") == [0, 5]
-    assert known.alike("plank") == [1, 6]
+    assert known.alike("set of planks") == [0, 7]
+    assert known.alike("plank") == [1, 8]
 
 
 @pytest.mark.parametrize("name", ["cabinet", "vase"])
