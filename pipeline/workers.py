@@ -53,6 +53,11 @@ _ENVIRONMENT = {
 # loky replaces a process that has grown by 300 MB before its next job, and warns as if a job were lost.
 warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given to the executor")
 
+# Processes of their own remove the semaphores of a killed run, and would warn of a leak in the terminal.
+os.environ["PYTHONWARNINGS"] = ",".join(
+    filter(None, [os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker:UserWarning"])
+)
+
 
 def _start_worker(parent: int, output: Path) -> None:
     """Prepare a worker: it dies with its parent, leaves Ctrl-C to it, and prints into a file of the dataset."""

@@ -15,7 +15,6 @@ from typing import Any
 from pipeline.config import Config
 from pipeline.errors import ConfigError, ShardFailed
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
 from stages.proportions.choice import chosen_texts
 from stages.proportions.settings import MAX_SAMPLES_PER_KIT, ProportionsConfig
@@ -28,7 +27,6 @@ from stages.shape.collection.assignment import (
     write_listed_samples,
     write_listings,
 )
-from stages.shape.collection.origin import missing_licenses
 from stages.shape.kit_input import input_kit
 from stages.shape.resolved_settings import FALLBACK_KEY, FALLBACK_STABLE_KEY, ROWS_FALLBACK
 from stages.variations.fallback import resolved_fallback
@@ -251,14 +249,15 @@ def report(plan: Plan) -> Sequence[str]:
                 f"warning: {kit} has fewer shapes than requested; lower proportions.min_difference, or "
                 "raise proportions.oversample or log_std"
             )
-    return [*lines, *(f"warning: {sentence}" for sentence in missing_licenses(exemplar_origins(plan.config)))]
+    return lines
 
 
 def check(config: Config) -> None:
     """Raise ConfigError if shapes are requested and there are no exemplars."""
     if config.section(ProportionsConfig).samples_per_kit and not config.section(ExemplarsConfig).kits:
         raise ConfigError(
-            f"{config.path}: proportions.samples_per_kit asks for shapes, and there are no exemplars.kits"
+            f"{config.path}: proportions.samples_per_kit asks for shapes, and there are no exemplars.kits; name your "
+            "models there, such as `kits: [{name: chairs, shapes: [chair.glb]}]`"
         )
 
 
