@@ -79,7 +79,8 @@ class StagePaths:
             for folder in (self.records, self.rejects, self.failed, self.progress, self.engine):
                 folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise Fatal(f"cannot make folders under {self.root}: {error.strerror}") from error
+            remedy = "name a folder that you can write to with --out or OUT"
+            raise Fatal(f"cannot make folders under {self.root}: {error.strerror}; {remedy}") from error
 
 
 @dataclass(frozen=True)

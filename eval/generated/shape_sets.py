@@ -21,6 +21,8 @@ from stages.shape.collection.assignment import SPLITS
 from stages.shape.input_file import without_sidecars
 from stages.shape.shape import Shape
 
+_KINDS_OF_SETS = "a folder of models, the folder of a dataset, or an .npy file of clouds"
+
 Sampler = Callable[[np.random.Generator], FloatArray]
 """Samples the cloud of a shape, float64 (n, 3)."""
 
@@ -40,7 +42,7 @@ def clouds_of_set(name: str, run: DatasetRun, kit: str, max_shapes: int, points:
     if name == "exemplars":
         return _selected(name, _exemplars(run, kit, points), max_shapes)
     if not Path(name).exists():
-        raise ConfigError(f"{name} is no set: say {', '.join(SPLITS)}, exemplars, or the path of a folder or .npy file")
+        raise ConfigError(f"{name} does not exist; name {', '.join(SPLITS)}, exemplars, {_KINDS_OF_SETS}")
     return clouds_of_path(Path(name), max_shapes, points)
 
 
@@ -49,13 +51,15 @@ def clouds_of_path(path: Path, max_shapes: int, points: int) -> FloatArray:
 
     Raises ConfigError for any other path, and for fewer than two shapes.
     """
+    if not path.exists():
+        raise ConfigError(f"{path} does not exist; name {_KINDS_OF_SETS}")
     if path.suffix == ".npy" and path.is_file():
         return _from_array(path, max_shapes, points)
     if (path / MANIFEST).is_file():
         shapes = ((key, _points_of(shape, points)) for _, _, key, shape in split_shapes(path))
         return _selected(str(path), shapes, max_shapes)
     if not path.is_dir():
-        raise ConfigError(f"{path} is no set of shapes: give a folder of models, a dataset, or an .npy of clouds")
+        raise ConfigError(f"{path} is no set of shapes; name {_KINDS_OF_SETS}")
     files, _ = without_sidecars(sorted(file for file in path.rglob("*") if file.suffix.lower() in READERS))
     samplers = ((str(file.relative_to(path)), _points_of_file(file, points)) for file in files)
     return _selected(str(path), samplers, max_shapes)

@@ -16,6 +16,7 @@ from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
 from stages.programs.program import program_module
 from stages.programs.settings import ProgramsConfig
+from stages.shape.collection.discovery import language_of, producers
 from stages.shape.collection.shards import PRODUCERS, collection_shards, planned_producer
 from stages.shapeassembly.settings import ShapeAssemblyConfig
 from stages.sketches.settings import SketchesConfig
@@ -95,6 +96,11 @@ def check(config: Config) -> None:
             if unknown or not known:
                 which = f"there is no kit {unknown[0]}" if unknown else "the config has no kits"
                 raise ConfigError(f"{where}: {which}; kits are {', '.join(known)}")
+            if model.learns_from == "strings" and not _has_strings(config):
+                raise ConfigError(
+                    f"{where}: it learns from strings, and no shape of this config has one: shapes in other "
+                    "proportions have no strings; set variations.samples_per_kit, or train another kind of model"
+                )
             continue
         programs = _programs(config, model)
         if not programs:
@@ -108,6 +114,12 @@ def check(config: Config) -> None:
                 program_module(program)
         except ConfigError as error:
             raise ConfigError(f"{where}: {error}") from error
+
+
+def _has_strings(config: Config) -> bool:
+    """Return whether a producer that the config requests makes shapes with strings."""
+    makers = [name for name, producer in producers().items() if not producer.joins and producer.is_requested(config)]
+    return any(language_of(name).graphs for name in makers)
 
 
 def uses_samples(config: Config, only: str) -> bool:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.config import Config
+from pipeline.errors import ConfigError
 from pipeline.paths import DatasetPaths, write_file
 from pipeline.randomness import decision_rng
 from pipeline.records import read_record
@@ -22,6 +23,7 @@ from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png, trimmed
 from stages.shape.views.viewpoint import best_viewpoint
+from stages.variations.settings import VariationsConfig
 from stages.variations.substructures.replacement_sheet import replacements_sheet
 
 MAX_VARIANTS_SHOWN = 24
@@ -75,14 +77,17 @@ def kit_variants_sheet(kit: Kit, samples: Sequence[Sample], low_diversity: str, 
 def write_sheets(config: Config, paths: DatasetPaths) -> list[Path]:
     """Write the sheets of each kit of a dataset to `OUT/sheets`; return their paths.
 
-    Raise FileNotFoundError where the variations are not made.
+    Raise ConfigError where the variations are not made, or not requested.
     """
+    if not config.section(VariationsConfig).samples_per_kit:
+        raise ConfigError(
+            f"{config.path}: variations.samples_per_kit is 0, and sheets show variations; preview.png in the finished "
+            "dataset shows other shapes"
+        )
     shards = sorted(paths.stage("variations").root.glob(f"{config.name}-*-*.tar"))
     record = read_record(paths.stage("variations").records / f"{config.name}-assignment.json")
     if not shards or record is None:
-        raise FileNotFoundError(
-            f"{paths.work} holds no variations; make them with: make variations CONFIG={config.path}"
-        )
+        raise ConfigError(f"{paths.work} holds no variations; make them with: make variations CONFIG={config.path}")
     samples = sorted((sample for shard in shards for sample in read_samples(shard)), key=lambda sample: sample.key)
     written = []
     for kit_config in config.section(ExemplarsConfig).kits:

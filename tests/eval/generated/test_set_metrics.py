@@ -117,8 +117,11 @@ def test_sets_of_files(tmp_path: Path) -> None:
     np.save(tmp_path / "flat.npy", np.zeros((5, 256, 2)))
     with pytest.raises(ConfigError, match=r"flat.npy has the shape \(5, 256, 2\)"):
         clouds_of_path(tmp_path / "flat.npy", 4, 100)
-    with pytest.raises(ConfigError, match="no set of shapes"):
+    with pytest.raises(ConfigError, match="nothing does not exist; name a folder of models"):
         clouds_of_path(tmp_path / "nothing", 4, 100)
+    (tmp_path / "cloud.txt").touch()
+    with pytest.raises(ConfigError, match=r"cloud.txt is no set of shapes"):
+        clouds_of_path(tmp_path / "cloud.txt", 4, 100)
     (tmp_path / "one").mkdir()
     with pytest.raises(ConfigError, match="holds 0 shapes"):
         clouds_of_path(tmp_path / "one", 4, 100)

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pyarrow.parquet
 import pytest
+import yaml
 
 from pipeline.config import Config, load_config
 from pipeline.errors import ConfigError
+from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
 from pipeline.shards import read_shard
 from stages.captions.settings import CaptionsConfig
@@ -21,9 +23,12 @@ from stages.sketches.settings import SketchesConfig
 from stages.strings.settings import StringsConfig
 from stages.structure.settings import StructureConfig
 from stages.surface.settings import SurfaceConfig
+from stages.variations.report.sheet import write_sheets
 from stages.verification.verify import verify_dataset
 from stages.views.settings import RingCameras, ViewsConfig
 from tests.stages.package.toy import make_toy, toy_config
+
+TEMPLE = Path(__file__).resolve().parents[3] / "datasets" / "exemplars" / "temple"
 
 
 def images_alone() -> Config:
@@ -95,3 +100,25 @@ def test_a_model_of_strings_needs_strings(tmp_path: Path) -> None:
     config = load_config(path, {name: stage.config for name, stage in stages.items()})
     with pytest.raises(ConfigError, match="m: it learns from strings, which are turned off"):
         stages["training"].check(config)
+
+
+def test_a_model_of_strings_needs_shapes_with_strings(tmp_path: Path) -> None:
+    path = tmp_path / "c.yaml"
+    settings = {
+        "name": "c",
+        "exemplars": {"kits": [{"name": "k", "shapes": [str(next(TEMPLE.glob("*.glb")))]}]},
+        "variations": {"samples_per_kit": 0},
+        "proportions": {"samples_per_kit": 5},
+        "training": {"models": [{"name": "m", "kind": "string_vae"}]},
+    }
+    stages = find_stages()
+    for samples_per_kit in (5, 0):
+        settings["variations"] = {"samples_per_kit": samples_per_kit}
+        path.write_text(yaml.safe_dump(settings), encoding="utf-8")
+        config = load_config(path, {name: stage.config for name, stage in stages.items()})
+        if samples_per_kit:
+            stages["training"].check(config)
+    with pytest.raises(ConfigError, match="no shape of this config has one: shapes in other proportions"):
+        stages["training"].check(config)
+    with pytest.raises(ConfigError, match=r"variations\.samples_per_kit is 0, and sheets show variations"):
+        write_sheets(config, DatasetPaths(tmp_path, "c"))
