@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pipeline.config import nearest_word
 from pipeline.display import counting
 from pipeline.errors import ConfigError
 from pipeline.options import DATASETS, DEFAULT_CONFIG, DEFAULT_OUT, ConfigOption, OutOption, load_dataset
@@ -52,7 +53,9 @@ def export(
 
     chosen = next((name for name in FORMATS if name == kind), None)
     if chosen is None:
-        raise ConfigError(f"there is no format {kind!r} to export to; formats are {', '.join(FORMATS)}")
+        close = nearest_word(kind, FORMATS)
+        hint = f"did you mean {close}?" if close else f"formats are {', '.join(FORMATS)}"
+        raise ConfigError(f"there is no format {kind!r} to export to; {hint}")
     if links not in ("parts", "bodies"):
         raise ConfigError(f"--links {links}: must be parts or bodies")
     settings = ExportSettings("parts" if links == "parts" else "bodies", density, shell_thickness, scale, fixed_base)
@@ -67,7 +70,7 @@ def export(
             try:
                 files = export_files(sample, chosen, settings)
             except ValueError as error:
-                raise ConfigError(f"{sample.key}: cannot be exported: {error}") from error
+                raise ConfigError(f"{sample.key}: cannot be exported: {error}") from None
             for name, content in files.items():
                 write_file(target / sample.key / name, content)
             done += 1
@@ -94,4 +97,5 @@ def _chosen(dataset: Dataset, wanted: tuple[str, ...], total: int) -> Iterator[D
         if wanted and not left:
             return
     if left:
-        raise ConfigError(f"{dataset.location} has no sample {', '.join(sorted(left))}")
+        keys = f"; its keys look like {sample.key}" if len(dataset) else ""
+        raise ConfigError(f"{dataset.location} has no sample {', '.join(sorted(left))}{keys}")

@@ -126,7 +126,7 @@ def simulation_model(name: str, shape: Shape, connected: IntArray, settings: Exp
     placed = _placed(shape, settings.scale)
     masses = part_masses(placed, settings.density, settings.shell_thickness)
     if not len(placed) or not (masses.masses > 0).all():
-        raise ValueError("a shape needs parts, and each a volume or an area, to have weight")
+        raise ValueError("it has no parts, or a part without volume and area, which has no weight")
     neighbours = replace(placed.assembly, edges=connected).neighbours()
     bases, moving = _groups(placed, neighbours, masses.masses)
     links: list[Link] = []

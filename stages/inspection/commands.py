@@ -184,7 +184,7 @@ def _label_map(labels: list[str]) -> dict[str, tuple[str, ...]]:
         name, _, patterns = text.partition("=")
         if not name or not patterns:
             raise typer.BadParameter(
-                f"{text!r} is no NAME=PATTERN,..., such as leg='*leg*,foot*'", param_hint="--label"
+                f"must be NAME=PATTERN,..., such as leg='*leg*,foot*', and is {text!r}", param_hint="--label"
             )
         label_map[name] = tuple(patterns.split(","))
     return label_map

@@ -23,7 +23,7 @@ def models_of(paths: Sequence[Path]) -> list[Path]:
     for path in paths:
         found = model_files(path) if path.is_dir() else [path]
         if not path.exists():
-            raise ConfigError(f"there is no file or folder {path}")
+            raise ConfigError(f"there is no file or folder {path}; name models, or a folder of them, with MESH")
         if not found:
             raise ConfigError(f"{path} holds no models; name a folder with files in {', '.join(READERS)}")
         models += found

@@ -54,8 +54,8 @@ def joined_sources(decoders: Mapping[str, ShapeDecoder], share_classes: bool) ->
         for name, source in decoder.sources.items():
             if name in joined and joined[name].labels != source.labels:
                 raise ConfigError(
-                    f"{made_by[name]} and {producer} both make samples of {name!r}, with other part labels; rename one "
-                    "of them in the config"
+                    f"{made_by[name]} and {producer} both make samples of {name!r}, but with different part labels; "
+                    "rename one of them in the config"
                 )
             joined.setdefault(name, replace(source, shares_classes=share_classes))
             made_by.setdefault(name, producer)

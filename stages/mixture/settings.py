@@ -50,5 +50,5 @@ class MixtureConfig(StrictModel):
     @model_validator(mode="after")
     def _contrast_needs_a_mixture(self) -> Self:
         if self.contrast and not self.enabled:
-            raise ValueError("contrast adds samples to a mixture, also to one of a single producer: say enabled: true")
+            raise ValueError("contrast needs `enabled: true`, also for the samples of one producer")
         return self

@@ -133,7 +133,7 @@ def run_assignment(task: Task) -> Outcome:
     unknown = sorted(set(config.max_samples) - {row["kit"] for row in rows})
     if unknown:
         kits = ", ".join(dict.fromkeys(row["kit"] for row in rows))
-        raise ConfigError(f"mixture.max_samples names {', '.join(unknown)}; there are samples of {kits}")
+        raise ConfigError(f"mixture.max_samples: there are no samples of {', '.join(unknown)}; it may name {kits}")
     splits = np.array([SPLITS.index(row["split"]) for row in rows], dtype=np.int64)
     out: dict[int, str] = {}
     for number in _copies(task, rows, splits):
@@ -315,7 +315,7 @@ def check_contrast(config: Config) -> None:
     """Raise ConfigError for a config that asks for pairs whose records would not say which of the two falls."""
     if config.section(MixtureConfig).contrast and not config.section(ValidityConfig).falls:
         raise ConfigError(
-            f"{config.path}: mixture.contrast needs records that say what falls: add validity.falls: true"
+            f"{config.path}: mixture.contrast needs to know which shapes fall; set `validity.falls: true`"
         )
 
 

@@ -53,11 +53,13 @@ def read_change(stated: Mapping[str, Any]) -> Change:
         centre = np.array(stated["centre"], dtype=np.float64).reshape(3)
         sectors, count = int(stated["sectors"]), int(stated["count"])
         if stated["axis"] not in ("x", "y", "z") or not np.isfinite(centre).all() or not 0 < count <= MAX_TIMES:
-            raise ValueError(f"sectors are about axis x, y or z, and 1 to {MAX_TIMES}: {stated}")
+            raise ValueError(f"a row about an axis (x, y or z) has 1 to {MAX_TIMES} sectors, unlike {stated}")
         return Turn("xyz".index(stated["axis"]), centre, sectors, count)
     normal, shift = (np.array(stated[key], dtype=np.float64).reshape(3) for key in ("normal", "shift"))
     at, times = float(stated["at"]), int(stated["times"])
     numbers = [*normal.tolist(), *shift.tolist(), at]
     if not np.isfinite(numbers).all() or normal @ shift <= 0 or not (times == -1 or 0 < times <= MAX_TIMES):
-        raise ValueError(f"a row changes by 1 to {MAX_TIMES} or -1 periods, with a step along its normal: {stated}")
+        raise ValueError(
+            f"a row changes by -1 or by 1 to {MAX_TIMES} periods, and its step follows its normal, unlike {stated}"
+        )
     return RowChange(normal, shift, at, times, bool(stated.get("is_bay", False)))

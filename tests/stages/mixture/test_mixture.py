@@ -227,4 +227,4 @@ def test_a_maximum_of_an_unknown_kit_is_refused_and_one_producer_may_be_mixed_al
         assert shapemill("run", "programs", *config)[0] == 0
         code, printed = shapemill("run", "mixture", *config)
         assert (code == 0) == done
-        assert done or "mixture.max_samples names rock; there are samples of tests.stages.programs.rack" in printed
+        assert done or "max_samples: there are no samples of rock; it may name tests.stages.programs.rack" in printed
