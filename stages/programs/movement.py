@@ -16,7 +16,7 @@ from stages.programs.draws import Share
 from stages.programs.parameters import Parameter, Value
 from stages.programs.program import BuildError, Program
 from stages.programs.sampling import NoMoreShapes, Sampler
-from stages.shape.arrays import FloatArray
+from stages.shape.arrays import Float32Array, FloatArray, IntArray
 
 MIN_RANGE_MOVEMENT, MIN_CLASS_MOVEMENT = 0.005, 0.0025
 """A parameter whose whole range, or whose next value, moves the surface less is hard to read; in diagonals."""
@@ -144,11 +144,15 @@ class _Surface:
     """A surface ready for distances.
 
     points: float32 (n, 3), on it
+    part_of_point: int (n,)
+    parts: bytes of the vertices of each part
     scene: the surface in Open3D
     diagonal: of its bounding box
     """
 
-    points: Any
+    points: Float32Array
+    part_of_point: IntArray
+    parts: tuple[bytes, ...]
     scene: Any
     diagonal: float
 
@@ -157,19 +161,28 @@ class _Surface:
         return max(self._max_distance(other), other._max_distance(self)) / self.diagonal
 
     def _max_distance(self, other: _Surface) -> float:
-        """The greatest distance of a point of the other surface from this one."""
-        return float(self.scene.compute_distance(other.points, nthreads=1).numpy().max())
+        """The greatest distance of a point of the other surface from this one; 0 on parts that both have."""
+        import open3d as o3d
+
+        own = set(self.parts)
+        is_moved = np.array([part not in own for part in other.parts])[other.part_of_point]
+        if not is_moved.any():
+            return 0.0
+        points = o3d.core.Tensor(other.points[is_moved])
+        return float(self.scene.compute_distance(points, nthreads=1).numpy().max())
 
 
 def _surface(program: Program, values: Mapping[str, Value]) -> _Surface:
     import open3d as o3d
 
-    mesh = QuadMesh.joined(part.mesh for part in program.parts(values))
-    # The same random numbers for each surface, so that unmoved parts have the same points.
-    points, _, _ = sample_surface(mesh.vertices, mesh.triangles, SURFACE_SAMPLES, np.random.default_rng(0))
+    meshes = [part.mesh for part in program.parts(values)]
+    mesh, part_of_vertex = QuadMesh.joined(meshes), np.repeat(np.arange(len(meshes)), [len(m.vertices) for m in meshes])
+    points, _, faces = sample_surface(mesh.vertices, mesh.triangles, SURFACE_SAMPLES, np.random.default_rng(0))
     scene = o3d.t.geometry.RaycastingScene(nthreads=1)
     scene.add_triangles(
         o3d.core.Tensor(mesh.vertices.astype(np.float32)), o3d.core.Tensor(mesh.triangles.astype(np.uint32))
     )
     tested = np.concatenate([mesh.vertices, points]).astype(np.float32)
-    return _Surface(o3d.core.Tensor(tested), scene, float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))))
+    part_of_point = np.concatenate([part_of_vertex, part_of_vertex[mesh.triangles[faces, 0]]])
+    parts = tuple(part.vertices.tobytes() for part in meshes)
+    return _Surface(tested, part_of_point, parts, scene, float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))))
