@@ -23,6 +23,11 @@ GLOBAL_RANDOMNESS = {"default_rng", "Generator", "SeedSequence", "PCG64", "BitGe
 EXECUTING = {"pickle", "cloudpickle", "dill", "shelve", "marshal"}
 """Modules that execute what they read."""
 
+REQUIRED_KEYWORDS = {"torch.load": "weights_only=True"} | {
+    f"{module}.{function}": "allow_pickle=False" for module in ("np", "numpy") for function in ("load", "save")
+}
+"""Calls that execute what they read, or write what would be executed, without a keyword."""
+
 CLOCKS = {"time.time", "time.time_ns", "datetime.now", "datetime.utcnow", "datetime.today", "date.today"}
 
 HOOKS = {"build", "new_task", "new_model", "prepare", "batches", "batch_of", "main"}
@@ -64,10 +69,15 @@ def imports(tree: ast.AST) -> Iterator[str]:
 
 
 def calls(tree: ast.AST) -> Iterator[tuple[str, ast.Call]]:
-    """Yield every call with its dotted name."""
+    """Yield every call with its dotted name, such as `np.load` and `().read_text`."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Call):
-            yield ast.unparse(node.func), node
+            words, function = list[str](), node.func
+            while isinstance(function, ast.Attribute):
+                words.append(function.attr)
+                function = function.value
+            words.append(function.id if isinstance(function, ast.Name) else "()")
+            yield ".".join(reversed(words)), node
 
 
 def faults(rule: Callable[[Path], Iterator[str]], files: list[Path]) -> list[str]:
@@ -157,8 +167,8 @@ def unnamed_encodings(path: Path) -> Iterator[str]:
         words = {keyword.arg for keyword in call.keywords}
         method = name.rpartition(".")[2]
         reads, writes = method == "read_text" and not call.args, method == "write_text" and len(call.args) == 1
-        mode = ast.unparse(call.args[1]) if len(call.args) > 1 else "'r'"
-        if (reads or writes or (name == "open" and "b" not in mode)) and "encoding" not in words:
+        opens = name == "open" and (len(call.args) < 2 or "b" not in ast.unparse(call.args[1]))
+        if (reads or writes or opens) and "encoding" not in words:
             yield f"line {call.lineno}: {method} without encoding depends on the locale"
 
 
@@ -178,11 +188,9 @@ def executing(path: Path) -> Iterator[str]:
     for name, call in calls(tree):
         if name in {"yaml.load", "yaml.unsafe_load", "yaml.full_load", "eval", "exec"}:
             yield f"line {call.lineno}: {name}"
-        keywords = {keyword.arg: ast.unparse(keyword.value) for keyword in call.keywords}
-        if name == "torch.load" and keywords.get("weights_only") != "True":
-            yield f"line {call.lineno}: say weights_only=True"
-        if name in {"np.load", "numpy.load", "np.save", "numpy.save"} and keywords.get("allow_pickle") != "False":
-            yield f"line {call.lineno}: say allow_pickle=False"
+        required = REQUIRED_KEYWORDS.get(name)
+        if required and required not in {f"{keyword.arg}={ast.unparse(keyword.value)}" for keyword in call.keywords}:
+            yield f"line {call.lineno}: say {required}"
 
 
 def test_nothing_executes_what_it_reads() -> None:
@@ -206,9 +214,9 @@ READERS = {
 def parses_by_itself(path: Path) -> Iterator[str]:
     """Yield calls of parsers outside `read_model`, `read_cloud` and `read_drawing`; samples are in memory."""
     for name, call in calls(parsed(path)):
-        allowed_files = READERS.get(name)
-        in_memory = call.args and ast.unparse(call.args[0]).startswith("io.BytesIO(")
-        if allowed_files is not None and not in_memory and not relative(path).startswith(allowed_files or ("-",)):
+        if name not in READERS or relative(path).startswith(READERS[name] or ("-",)):
+            continue
+        if not call.args or not ast.unparse(call.args[0]).startswith("io.BytesIO("):
             yield f"line {call.lineno}: {name}"
 
 
