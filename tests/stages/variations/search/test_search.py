@@ -58,7 +58,8 @@ def test_search_finds_every_chain_within_the_size_limits(matching: str) -> None:
 
 def test_search_finds_every_rectangle_within_the_size_limits() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
-    _, found = search(kit, tries=120_000, min_size=1.0, max_size=1.6)
+    # It finds the last one after 4,527 tries, and after 18,011 with the slowest of four seeds.
+    _, found = search(kit, tries=30_000, min_size=1.0, max_size=1.6)
     rectangles = {
         tuple(sorted((width, depth))): 4 + 2 * (width + depth) for width in range(1, 10) for depth in range(1, 10)
     }
