@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -114,6 +115,13 @@ class Layout:
         """A number of each contact, seen from both parts, int64 (2 m,): `part * len(layout) + other`."""
         edges = self.edges.astype(np.int64)
         return np.concatenate([edges[:, 0] * len(self) + edges[:, 1], edges[:, 1] * len(self) + edges[:, 0]])
+
+    @cached_property
+    def neighbours(self) -> tuple[np.ndarray, ...]:
+        """Parts in contact with each part, int64 (k,) ascending."""
+        both = np.sort(self.contact_keys)
+        starts = np.searchsorted(both, np.arange(len(self) + 1) * len(self))
+        return tuple(both[start:end] % len(self) for start, end in pairwise(starts.tolist()))
 
     @property
     def extent(self) -> FloatArray:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stages.rows.layout import Layout
-from stages.rows.slabs import RowChange, Slab, SlabError, repeat
+from stages.rows.slabs import RowChange, Slab, SlabError, parts_of_dense_row, repeat
 from stages.rows.steps import ROUNDING_DECIMALS, Step, bay_ends, longest_row, steps_of, with_long_rows
 from stages.shape.arrays import BoolArray, FloatArray
 
@@ -172,6 +172,7 @@ def _rows_along(
     else:
         planes = _planes(layout, low, high, recurs)
         planes = planes[_may_end_slabs(layout, planes, float(normal @ step.shift), low, high, recurs)]
+    dense = [parts_of_dense_row(layout, other, normal, step.shift) for other in others]
     for at in planes.tolist():
         slab = Slab(layout, normal, step.shift, at, mates, previous, low, high, step.is_bay)
         may_insert = slab.insertion_fault() is None
@@ -179,7 +180,8 @@ def _rows_along(
         if not (may_insert or may_remove) or not (may_stretch or slab.is_regular or not len(slab.stretched)):
             continue
         fits = may_insert, may_remove
-        may_insert = may_insert and not any(slab.tears(other, 1) or slab.leaves_gap(other) for other in others)
+        may_insert = may_insert and not any(slab.tears(other, 1) for other in others)
+        may_insert = may_insert and not any(map(slab.leaves_gap, dense))
         may_insert = may_insert and not slab.leaves_end_behind(ends)
         may_remove = may_remove and not any(slab.tears(other, -1) for other in others)
         if fits != (may_insert, may_remove):

@@ -157,6 +157,13 @@ class Slab:
         return np.flatnonzero(spans | self._overhangs)
 
     @cached_property
+    def _is_spanning(self) -> BoolArray:
+        """Whether each part is one of `spanning`, bool (n,)."""
+        is_spanning = np.zeros(len(self.layout), dtype=bool)
+        is_spanning[self.spanning] = True
+        return is_spanning
+
+    @cached_property
     def before(self) -> BoolArray:
         """Which parts begin before the slab and end before its end."""
         left: BoolArray = ~self.within & ~self.beyond
@@ -245,10 +252,8 @@ class Slab:
 
         It holds no row: a long drawer front has one handle, and a longer one has no two.
         """
-        is_spanning = np.zeros(len(self.layout), dtype=bool)
-        is_spanning[self.spanning] = True
         i, j = self._both_ways
-        held = self.recurs[i] & is_spanning[j]
+        held = self.recurs[i] & self._is_spanning[j]
         parts, holders, count = i[held], j[held].astype(np.int64), len(self.layout)
         holds_row = np.zeros(len(parts), dtype=bool)
         for beside in (self.mates[parts], self.previous[parts]):
@@ -261,8 +266,7 @@ class Slab:
         mates: the part one step of that row after each, or -1, int64 (n,)
         times: 1 for insertions, -1 for a removal
         """
-        first = np.flatnonzero((mates >= 0) & ~self.beyond)
-        first = first[~np.isin(first, self.spanning)]
+        first = np.flatnonzero((mates >= 0) & ~self.beyond & ~self._is_spanning)
         second = mates[first]
         if times > 0:
             first, second = first[self.beyond[second]], second[self.beyond[second]]
@@ -274,22 +278,16 @@ class Slab:
         removed = second[self.within[second]]
         return not self._leads_into(removed, self.beyond)
 
-    def leaves_gap(self, mates: np.ndarray) -> bool:
+    def leaves_gap(self, members: np.ndarray) -> bool:
         """Return whether a part that another row fills would become longer where none of that row is copied.
 
         A ladder whose handrail gets more brackets would have no rungs there.
-        mates: as for `tears`, of a row of at least three parts
+        members: parts of that row, int64 (k,), as of `parts_of_dense_row`
         """
-        first = np.flatnonzero(mates >= 0)
-        members = np.union1d(first, mates[first])
-        if not len(self.spanning) or self.recurs[members].any():
-            return False
-        steps = self.layout.anchors[mates[first]] - self.layout.anchors[first]
-        length = float(self.normal @ self.shift)
-        if abs(float(np.median(steps @ self.normal))) > length or not are_along(steps[:1], self.shift).all():
+        if not len(members) or not len(self.spanning) or self.recurs[members].any():
             return False
         for holder in self.spanning.tolist():
-            held = members[np.isin(members.astype(np.int64) * len(self.layout) + holder, self.layout.contact_keys)]
+            held = np.intersect1d(members, self.layout.neighbours[holder])
             if len(held) < MIN_FILLING_PARTS:
                 continue
             filled = float(self.high[held].max() - self.low[held].min())
@@ -353,6 +351,15 @@ class Slab:
 
     def span(self, part: int) -> Span:
         """Return a spanning part with the slab."""
+        if part not in self._spans:
+            self._spans[part] = self._new_span(part)
+        return self._spans[part]
+
+    @cached_property
+    def _spans(self) -> dict[int, Span]:
+        return {}
+
+    def _new_span(self, part: int) -> Span:
         layout = self.layout
         points = layout.points[part]
         heights = points @ self.normal
@@ -362,6 +369,19 @@ class Slab:
             start = end = self.at - 2.0 * layout.tolerance
         slab = start, end, self.shift, layout.tolerance
         return Span(layout.meshes[part], layout.poses[part], points, mates, previous, heights, *slab)
+
+
+def parts_of_dense_row(layout: Layout, mates: np.ndarray, normal: FloatArray, shift: FloatArray) -> np.ndarray:
+    """Return the parts of a row that is parallel to a shift, with a step of at most its length, int64 (k,); else none.
+
+    mates: the part one step of that row after each, or -1, int64 (n,)
+    """
+    first = np.flatnonzero(mates >= 0)
+    steps = layout.anchors[mates[first]] - layout.anchors[first]
+    is_dense = len(first) and abs(float(np.median(steps @ normal))) <= float(normal @ shift)
+    if not is_dense or not are_along(steps[:1], shift).all():
+        return np.empty(0, dtype=np.int64)
+    return np.union1d(first, mates[first])
 
 
 def are_along(steps: FloatArray, shift: FloatArray) -> BoolArray:
