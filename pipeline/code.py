@@ -155,7 +155,11 @@ def _parsed(source: bytes, file: str) -> _Summary:
     with _without_garbage_collection():
         words: list[str] = []
         imported: list[tuple[int, str]] = []
-        code_words(ast.parse(source, file), words.append, imported)
+        try:
+            tree = ast.parse(source, file)
+        except SyntaxError:  # a file that nobody can import, such as a table that is being written
+            return hashlib.sha256(source).hexdigest()[:16], ()
+        code_words(tree, words.append, imported)
         return hashlib.sha256("\n".join(words).encode()).hexdigest()[:16], tuple(dict.fromkeys(imported))
 
 

@@ -244,4 +244,6 @@ def _reason(key: str, chosen: CandidateSetting, candidates: Sequence[CandidateSe
             return f"{trial_text(chosen.trial)}; the next stricter: {trial_text(candidate.trial)}"
     if chosen.is_sufficient:
         return "the strictest, and it finds enough"
+    if not chosen.trial.graphs:
+        return f"no setting finds anything in {chosen.trial.tries:,} tries"
     return f"nothing else finds more than {trial_text(chosen.trial)}"

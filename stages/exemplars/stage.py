@@ -83,7 +83,9 @@ def report(plan: Plan) -> Sequence[str]:
                 f"{name}: {parts} parts of {summary['types']} types, {summary['rules']} neighbourhoods, "
                 f"{summary['dockings']} dockings"
             )
-            lines.extend(f"{name}: {kind} is also {', '.join(names)}" for kind, names in summary["aliases"].items())
+            lines.extend(
+                f"{name}: type {kind} is also called {', '.join(names)}" for kind, names in summary["aliases"].items()
+            )
             lines.extend(f"{name}: warning: {warning}" for warning in summary["warnings"])
     lines.extend(f"warning: {sentence}" for sentence in missing_licenses(exemplar_origins(plan.config)))
     return lines

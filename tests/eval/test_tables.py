@@ -153,6 +153,7 @@ def test_failing_table_is_reported_and_others_are_made(tmp_path: Path) -> None:
         "TABLE = Evaluation('Is it?', (Requirement('nothing', lambda _: ''),), lambda _: 1.0, compute)\n"
     )
     (tables / "broken.py").write_text(text.format("raise ValueError('no such luck')"), encoding="utf-8")
+    (tables / "unparsed.py").write_text("def (\n", encoding="utf-8")
     (tables / "sound.py").write_text(
         text.format(
             "return TableResult([Table('T', ('a', 'b'), (('one', 2),))], figures=[Figure('drawn', 'D', b'png')])"
@@ -179,6 +180,7 @@ def test_failing_table_is_reported_and_others_are_made(tmp_path: Path) -> None:
     assert (results / "sound_drawn.png").read_bytes() == b"png"
     report = (results / "report.html").read_text(encoding="utf-8")
     assert "it failed: ValueError: no such luck" in report
+    assert f"it cannot be read: {tables / 'unparsed.py'}:1: SyntaxError" in report
     assert 'id="sound"' in report
     assert all(f"<td>{name}</td>" in report for name in find_tables()), "what was not made is listed"
     alone = subprocess.run(
