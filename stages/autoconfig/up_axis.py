@@ -22,9 +22,9 @@ MAX_FOOT_HEIGHT = 0.01
 STANDING_WEIGHT, FOOT_WEIGHT, MIRROR_WEIGHT = 0.8, 0.27, 0.19
 """Log odds fitted to 286 public models: that a model would fall over along the other axis, that its foot is e times as
 large, and that an upside-down flip moves its surface e times as far."""
-FORMAT_WEIGHT = 1.0
-"""Log odds of the format's convention. It tells more of household objects than their shapes do, which decide 73 %."""
-FORMAT_AXES: Mapping[str, Literal["y", "z"]] = {".obj": "y", ".stl": "z"}
+FORMAT_LOG_ODDS: Mapping[str, float] = {".obj": 2.0, ".stl": -1.0}
+"""Log odds of a format's convention for y. It tells more of household objects than their shapes do, which decide 73 %.
+Of 142 OBJ files of a furniture library 139 are y up, and what hangs on a wall or has its door open would fall over."""
 MAX_LOG_RATIO = 3.0
 MIN_FOOT_AREA, MIN_MIRROR_DISTANCE = 3e-3, 2e-3
 """Noise levels of feet and of distances, as shares of a model's size (squared, for feet)."""
@@ -116,12 +116,11 @@ def _evidence(model: Model) -> dict[str, float]:
     corners = np.concatenate([transform_points(part.pose, part.vertices)[part.faces] for part in model.parts])
     (y_foot, y_stands), (z_foot, z_stands) = _foot(corners, 1), _foot(corners, 2)
     y_moved, z_moved = _upside_down(corners)
-    convention = FORMAT_AXES.get(model.path.suffix.lower())
     odds = (
         STANDING_WEIGHT * (float(y_stands) - float(z_stands)),
         FOOT_WEIGHT * _log_ratio(y_foot, z_foot, MIN_FOOT_AREA),
         MIRROR_WEIGHT * _log_ratio(y_moved, z_moved, MIN_MIRROR_DISTANCE),
-        0.0 if convention is None else FORMAT_WEIGHT if convention == "y" else -FORMAT_WEIGHT,
+        FORMAT_LOG_ODDS.get(model.path.suffix.lower(), 0.0),
     )
     return dict(zip(REASONS, odds, strict=True))
 

@@ -91,6 +91,14 @@ class TestUpAxis:
         axis, reason = resolve_up_axis(models, identify_parts(models, config_of([shape])))
         assert (axis, "set `up: y` to keep to it" in reason) == ("z", True)
 
+    @pytest.mark.parametrize(("suffix", "axis"), [(".obj", "y"), (".off", "z"), (".stl", "z")])
+    def test_sign_on_a_wall_stands_in_a_file_whose_format_is_y_up(self, suffix: str, axis: str) -> None:
+        # seen alone it would fall over along y, since its centre is in front of its thin lower edge
+        shape = [("plate", pose(0, 0, 0)), ("box", pose(0, 0, 1.5))]
+        models = models_of({"plate": box(6.0, 4.0, 0.2), "box": box(5.0, 3.0, 2.8)}, [shape])
+        signs = [replace(model, path=model.path.with_suffix(suffix)) for model in models]
+        assert resolve_up_axis(signs, identify_parts(signs, config_of([shape])))[0] == axis
+
     def test_specification_of_gltf_says_nothing_of_files_of_trimesh(self) -> None:
         shape = turned(ring(2, 3))
         models = models_of(ROAD, [shape])
