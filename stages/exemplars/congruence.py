@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import rotation_angle
 from stages.shape.geometry.triangles import triangle_areas
 
@@ -27,6 +27,7 @@ class ComparableMesh:
     centroid: float64 (3,), area-weighted.
     tree: box tree of the mesh relative to the centroid.
     probes: float64 (p, 3), corners and triangle centres.
+    radius: distance of the farthest corner from the centroid.
     """
 
     vertices: FloatArray
@@ -35,6 +36,12 @@ class ComparableMesh:
     tree: tuple[FloatArray, FloatArray, np.ndarray]
     probes: FloatArray
     diagonal: float
+    radius: float
+
+    @property
+    def size(self) -> tuple[float, float, float]:
+        """Area, radius and diagonal."""
+        return self.area, self.radius, self.diagonal
 
 
 def comparable_mesh(vertices: FloatArray, faces: IntArray) -> ComparableMesh:
@@ -55,7 +62,20 @@ def comparable_mesh(vertices: FloatArray, faces: IntArray) -> ComparableMesh:
         tree=build_tree(vertices - centroid, faces),
         probes=np.ascontiguousarray(np.concatenate([distinct, centres])),
         diagonal=diagonal,
+        radius=float(np.linalg.norm(distinct, axis=1).max()),
     )
+
+
+def are_alike_in_size(sizes: FloatArray, target: ComparableMesh, tolerance: float) -> BoolArray:
+    """Return which meshes may be congruent to `target`, bool (k,).
+
+    sizes: `size` of each, float64 (k, 3)
+    """
+    area, radius, diagonal = sizes.T
+    slack = tolerance * diagonal
+    has_area = np.abs(area - target.area) <= np.maximum(8 * slack * diagonal, 1e-2 * area)
+    alike: BoolArray = has_area & (np.abs(radius - target.radius) <= 4 * slack)
+    return alike
 
 
 def congruences(source: ComparableMesh, target: ComparableMesh, tolerance: float, reflections: bool) -> FloatArray:
@@ -69,9 +89,7 @@ def congruences(source: ComparableMesh, target: ComparableMesh, tolerance: float
     rotation of a long thin part about itself. It only counts if it is exact.
     """
     slack = tolerance * source.diagonal
-    if abs(source.area - target.area) > max(8 * slack * source.diagonal, 1e-2 * source.area):
-        return np.empty((0, 4, 4))
-    if np.ptp([np.linalg.norm(mesh.vertices, axis=1).max() for mesh in (source, target)]) > 4 * slack:
+    if not are_alike_in_size(np.array([source.size]), target, tolerance)[0]:
         return np.empty((0, 4, 4))
     # On a very thin part the frames of two corners are rounding errors, and no candidate may be the identity.
     accepted: list[FloatArray] = [np.eye(3)] if source is target else []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.errors import ConfigError
-from stages.exemplars.congruence import ComparableMesh, comparable_mesh, congruences
+from stages.exemplars.congruence import ComparableMesh, are_alike_in_size, comparable_mesh, congruences
 from stages.exemplars.extremal_frame import extremal_frame
 from stages.exemplars.label_map import apply_label_map
 from stages.exemplars.model import Model, RawPart
@@ -68,6 +68,41 @@ class _Type:
     looks: dict[frozenset[Any], int]
 
 
+class _Types:
+    """The types found so far, and their sizes, which rule most of them out for a part at once."""
+
+    def __init__(self) -> None:
+        self.found: list[_Type] = []
+        self._names: set[str] = set()
+        self._numbers: dict[str, int] = {}
+        self._sizes = np.empty((64, 3))
+
+    def add(self, new: _Type) -> int:
+        """Add a type, and return its index."""
+        number = len(self.found)
+        if number == len(self._sizes):
+            self._sizes = np.concatenate([self._sizes, np.empty_like(self._sizes)])
+        self._sizes[number] = new.mesh.size
+        self.found.append(new)
+        self._names.add(new.part.name)
+        return number
+
+    def alike(self, shape: ComparableMesh, label: str | None, tolerance: float) -> Iterator[tuple[int, _Type]]:
+        """Yield the types of a label that may be congruent to a mesh, with their indices."""
+        for number in np.flatnonzero(are_alike_in_size(self._sizes[: len(self.found)], shape, tolerance)).tolist():
+            if self.found[number].label == label:
+                yield number, self.found[number]
+
+    def fresh_name(self, part: RawPart) -> str:
+        """Return a name for the type of a part that no other type has, of letters, digits, `-` and `_`."""
+        stem = _type_name(part)
+        name, number = stem, self._numbers.get(stem, 2)
+        while name in self._names:
+            name, number = f"{stem}_{number}", number + 1
+        self._numbers[stem] = max(number - 1, 2)
+        return name
+
+
 class _Identified(NamedTuple):
     """The type of a part, the transform (4, 4) from type to part coordinates, its look, and whether that is its own."""
 
@@ -85,7 +120,7 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> IdentifiedPart
     ConfigError for a model in which no part has any area, and for a pattern that fits no part.
     """
     repairs: Counter[str] = Counter()
-    types: list[_Type] = []
+    types = _Types()
     assemblies: list[Assembly] = []
     part_names: list[tuple[str, ...]] = []
     left_out: list[tuple[Model, str, str]] = []
@@ -107,7 +142,7 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> IdentifiedPart
                 continue
             index = identified.part_type
             if model.segmentation != "components":  # whose names are only numbers
-                types[index].names[_type_name(part)] = None
+                types.found[index].names[_type_name(part)] = None
             if not identified.is_own_look:
                 other_looks.append((model, part.name))
             names.append(part.name)
@@ -120,8 +155,8 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> IdentifiedPart
         look_of = np.array(looks, dtype=np.int16)
         assemblies.append(Assembly(np.array(indices, dtype=np.int16), np.array(poses), no_edges, looks=look_of))
         part_names.append(tuple(names))
-    part_types = tuple(known_type.part for known_type in types)
-    aliases = tuple(tuple(known_type.names)[1:] for known_type in types)
+    part_types = tuple(known_type.part for known_type in types.found)
+    aliases = tuple(tuple(known_type.names)[1:] for known_type in types.found)
     whole = IdentifiedParts(
         *(part_types, tuple(assemblies), tuple(part_names), dict(sorted(repairs.items())), (), aliases),
         tuple(other_looks),
@@ -157,7 +192,7 @@ def coincident_parts(types: Sequence[PartType], assembly: Assembly, tolerance: f
 
 
 def _identify(
-    part: RawPart, label: str | None, config: KitConfig, types: list[_Type], repairs: Counter[str]
+    part: RawPart, label: str | None, config: KitConfig, types: _Types, repairs: Counter[str]
 ) -> _Identified | None:
     """Return the type of a part, added to `types` if new, and its look, added to its type if new and if the config
     keeps it; None for a part without area.
@@ -167,31 +202,30 @@ def _identify(
     if len(faces) == 0:
         return None
     shape = comparable_mesh(vertices, faces)
-    for index, known_type in enumerate(types):
-        if known_type.label == label:
-            transforms = congruences(known_type.mesh, shape, config.congruence_tolerance, config.mirror_images_match)
-            if len(transforms):
-                # Both meshes are compared about their centroids; the type's coordinates start at its own.
-                transforms[:, :3, 3] = shape.centroid
-                shown = _look_of(part)
-                if shown in known_type.looks:
-                    return _Identified(index, transforms[0].copy(), known_type.looks[shown], True)
-                if config.appearance.keep == "textures":
-                    own = Surface(part.name, vertices, faces, part.face_colors[sources])
-                    own = replace(own, appearance=_repaired_look(part, vertices[faces], sources))
-                    found = look_on(known_type.part, own, transforms, config.congruence_tolerance)
-                    if found is not None:
-                        into_part, look = found
-                        known_type.looks[shown] = len(known_type.looks)
-                        others = (*known_type.part.other_looks, look)
-                        known_type.part = replace(known_type.part, other_looks=others)
-                        return _Identified(index, into_part, known_type.looks[shown], True)
-                return _Identified(index, transforms[0].copy(), 0, False)
+    for index, known_type in types.alike(shape, label, config.congruence_tolerance):
+        transforms = congruences(known_type.mesh, shape, config.congruence_tolerance, config.mirror_images_match)
+        if len(transforms):
+            # Both meshes are compared about their centroids; the type's coordinates start at its own.
+            transforms[:, :3, 3] = shape.centroid
+            shown = _look_of(part)
+            if shown in known_type.looks:
+                return _Identified(index, transforms[0].copy(), known_type.looks[shown], True)
+            if config.appearance.keep == "textures":
+                own = Surface(part.name, vertices, faces, part.face_colors[sources])
+                own = replace(own, appearance=_repaired_look(part, vertices[faces], sources))
+                found = look_on(known_type.part, own, transforms, config.congruence_tolerance)
+                if found is not None:
+                    into_part, look = found
+                    known_type.looks[shown] = len(known_type.looks)
+                    others = (*known_type.part.other_looks, look)
+                    known_type.part = replace(known_type.part, other_looks=others)
+                    return _Identified(index, into_part, known_type.looks[shown], True)
+            return _Identified(index, transforms[0].copy(), 0, False)
     centred = vertices - shape.centroid
     symmetries = congruences(shape, shape, config.congruence_tolerance, config.mirror_images_match)
     symmetries[:, :3, 3] = 0.0
     part_type = PartType(
-        name=_fresh_name(part, [known_type.part.name for known_type in types]),
+        name=types.fresh_name(part),
         vertices=centred,
         faces=faces,
         face_colors=part.face_colors[sources],
@@ -200,10 +234,10 @@ def _identify(
         meaning=_type_name(part) if config.types == "meaning" else "",
         appearance=_repaired_look(part, vertices[faces], sources),
     )
-    types.append(_Type(shape, part_type, label, {_type_name(part): None}, {_look_of(part): 0}))
+    added = types.add(_Type(shape, part_type, label, {_type_name(part): None}, {_look_of(part): 0}))
     into_part = np.eye(4)
     into_part[:3, 3] = shape.centroid
-    return _Identified(len(types) - 1, into_part, 0, True)
+    return _Identified(added, into_part, 0, True)
 
 
 def _look_of(part: RawPart) -> frozenset[Any]:
@@ -221,15 +255,6 @@ def _repaired_look(part: RawPart, corners: FloatArray, sources: np.ndarray) -> A
     given = part.vertices[part.faces[sources]]
     place = (corners[:, :, None] == given[:, None]).all(axis=3).argmax(axis=2)
     return part.appearance.select(sources, place).facing(corners)
-
-
-def _fresh_name(part: RawPart, taken: Sequence[str]) -> str:
-    """Return a type name that is not yet taken, of letters, digits, `-` and `_`."""
-    stem = _type_name(part)
-    name, number = stem, 2
-    while name in taken:
-        name, number = f"{stem}_{number}", number + 1
-    return name
 
 
 def _type_name(part: RawPart) -> str:
