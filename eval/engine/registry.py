@@ -11,11 +11,6 @@ from eval.engine.evaluation import Evaluation
 from pipeline.package_groups import missing_group
 
 
-def find_tables(package: str = "eval.tables") -> dict[str, Evaluation]:
-    """Return the `TABLE` of each `eval/tables/<name>.py` that can be read, by name."""
-    return read_tables(package)[0]
-
-
 def read_tables(package: str = "eval.tables") -> tuple[dict[str, Evaluation], dict[str, str]]:
     """Return the `TABLE` of each `eval/tables/<name>.py`; and for a file without one, its line and what is wrong."""
     tables: dict[str, Evaluation] = {}

@@ -132,11 +132,6 @@ class Schema:
                 raise ParameterError(f"parameter {name} is missing; it may be {self.by_name[name].range}")
         return canonical
 
-    def to_vector(self, values: Values) -> FloatArray:
-        """The canonical values as numbers, float64 (parameters,)."""
-        canonical, _ = self.canonical(values)
-        return np.array([float(value) for value in canonical.values()])
-
     def from_vector(self, vector: Sequence[float] | FloatArray) -> dict[str, Value]:
         """The values of a vector (parameters,). Raises ParameterError for another length and values out of range."""
         if len(vector) != len(self.parameters):

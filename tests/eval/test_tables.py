@@ -15,7 +15,7 @@ import pytest
 
 from eval.engine.dataset_run import DatasetRun, load_dataset_run
 from eval.engine.evaluation import Evaluation
-from eval.engine.registry import find_tables, read_tables
+from eval.engine.registry import read_tables
 from eval.engine.requirements import FINISHED_DATASET, KITS, STRING_VAE
 from eval.engine.table import ReferenceRow, Table
 from tests.command import shapemill
@@ -25,7 +25,7 @@ DEFAULT, CHAIRS = ROOT / "configs" / "default.yaml", ROOT / "configs" / "chairs.
 
 
 def test_every_module_is_a_table_with_question_and_requirements() -> None:
-    tables = find_tables()
+    tables = read_tables()[0]
     assert list(tables) == sorted(path.stem for path in (ROOT / "eval" / "tables").glob("[!_]*.py"))
     for table in tables.values():
         assert isinstance(table, Evaluation)
@@ -77,10 +77,10 @@ def test_list_of_tables_shows_missing_requirements(tmp_path: Path) -> None:
     code, printed = shapemill("eval", *arguments)
     assert code == 0
     before = printed
-    for name, table in find_tables().items():
+    for name, table in read_tables()[0].items():
         assert f"  {name} " in before
         assert table.question in before
-    assert before.count("missing:") == len(find_tables())
+    assert before.count("missing:") == len(read_tables()[0])
     finished(tmp_path, DEFAULT)
     code, printed = shapemill("eval", *arguments, "--", "")
     assert code == 0
@@ -182,7 +182,7 @@ def test_failing_table_is_reported_and_others_are_made(tmp_path: Path) -> None:
     assert "it failed: ValueError: no such luck" in report
     assert f"it cannot be read: {tables / 'unparsed.py'}:1: SyntaxError" in report
     assert 'id="sound"' in report
-    assert all(f"<td>{name}</td>" in report for name in find_tables()), "what was not made is listed"
+    assert all(f"<td>{name}</td>" in report for name in read_tables()[0]), "what was not made is listed"
     alone = subprocess.run(
         [*command[:4], "sound", *command[5:]], cwd=ROOT, env=environment, capture_output=True, text=True
     )

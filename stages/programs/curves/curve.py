@@ -204,12 +204,6 @@ class Curve:
         share = 0.0 if before[first] == after[first] else before[first] / (before[first] - after[first])
         return float((self._reached[first] + share * self._measured[1][first]) / self._reached[-1])
 
-    def resampled(self, count: int) -> Curve:
-        """A curve of `count` segments of equal length, and its corners."""
-        even = np.linspace(0.0, 1.0, count, endpoint=False) if self.closed else np.linspace(0.0, 1.0, count + 1)
-        positions = np.unique(np.concatenate([even, self.positions[self.corners]]))
-        return Curve.through(self.at(positions), self.closed)
-
     def part(self, start: float, end: float) -> Curve:
         """The piece from one relative position to a later one, an open curve. Raises ValueError unless start < end."""
         if not 0.0 <= start < end <= 1.0:

@@ -1,15 +1,11 @@
-"""Statistics of programs: lines, macros, leaf parts (shapeassembly tables 3 and 5), clusters (figure 10)."""
+"""Statistics of programs: lines, macros, leaf parts (shapeassembly tables 3 and 5)."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from stages.shape.arrays import FloatArray
-from stages.shapeassembly.analysis.structure import block_signatures, signature
 from stages.shapeassembly.execution.interpreter import execute_all
 from stages.shapeassembly.syntax.program import AssemblyProgram, Reflect, Squeeze, Translate
 
@@ -51,16 +47,3 @@ def program_statistics(programs: Sequence[AssemblyProgram]) -> ProgramStatistics
         squeezes=kinds[Squeeze] / lines,
         leaf_parts=leaves / len(programs),
     )
-
-
-def cluster_curve(signatures: Iterable[str]) -> FloatArray:
-    """Return the share of all items that have the 1, 2, 3, ... most frequent structures, float64 (structures,)."""
-    counts = np.array(sorted(Counter(signatures).values(), reverse=True), dtype=np.float64)
-    curve: FloatArray = np.cumsum(counts) / max(counts.sum(), 1)
-    return curve
-
-
-def cluster_curves(programs: Sequence[AssemblyProgram]) -> tuple[FloatArray, FloatArray]:
-    """Return `cluster_curve` of whole programs, and of single assemblies."""
-    whole = cluster_curve(signature(program) for program in programs)
-    return whole, cluster_curve(block for program in programs for block in block_signatures(program))

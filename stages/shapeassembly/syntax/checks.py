@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -40,7 +40,6 @@ Rule = Literal[
     "range",
     "too many cuboids",
 ]
-RULE_NAMES: tuple[Rule, ...] = get_args(Rule)
 
 MAX_CUBOIDS = 10
 """Cuboids that an assembly declares (shapeassembly §6.1)."""

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from eval.engine.dataset_run import DatasetRun, load_dataset_run
-from eval.engine.registry import find_tables
+from eval.engine.registry import read_tables
 from eval.strings.compression import COLUMNS as SIZES
 from eval.strings.compression import StoredSample, compression_row, round_trip
 from eval.strings.corpora import COLUMNS, corpus_row
@@ -107,7 +107,7 @@ def test_generation_is_one_above_the_highest_parent(run: DatasetRun) -> None:
 
 
 def test_growth_table_has_rows_and_pictures_of_every_kit(run: DatasetRun, tmp_path: Path) -> None:
-    table = find_tables()["growth"]
+    table = read_tables()[0]["growth"]
     assert table.missing(run) == ""
     assert "make exemplars" in table.missing(load_dataset_run(run.config.path, tmp_path))
     result = table.compute(run, table.options())
@@ -147,7 +147,7 @@ def test_disconnected_shapes_count_as_without_strings(run: DatasetRun) -> None:
 
 
 def test_corpora_table_has_inputs_and_variants(run: DatasetRun) -> None:
-    table = find_tables()["corpora"].compute(run, None).tables[0]
+    table = read_tables()[0]["corpora"].compute(run, None).tables[0]
     assert [row[:2] for row in table.rows[:4]] == [
         ("castle, inputs", "all"),
         ("castle, inputs", "faces"),

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from eval.programs.structure_clusters import captured_shares
 from stages.shapeassembly import execute, execute_all, parse, print_program
-from stages.shapeassembly.analysis.statistics import cluster_curves, program_statistics
+from stages.shapeassembly.analysis.statistics import program_statistics
+from stages.shapeassembly.analysis.structure import block_signatures, signature
 from stages.shapeassembly.syntax.checks import overflow, violations
 from stages.shapeassembly.syntax.program import AssemblyProgram
 from tests.stages.shapeassembly.shared_programs import CATEGORIES, SHARED, needs_shared, shared_texts
@@ -77,9 +79,11 @@ def test_statistics_match_the_published_ones(category: str, programs: list[Assem
 
 
 def test_assemblies_share_their_structure_more_than_whole_programs_do() -> None:
-    whole, parts = cluster_curves([parse(text) for text in shared_texts("chair").values()])
-    assert whole[99] < 0.35 < 0.5 < parts[99]
-    assert whole[-1] == parts[-1] == pytest.approx(1.0)
+    chairs = [parse(text) for text in shared_texts("chair").values()]
+    whole = captured_shares([signature(program) for program in chairs])
+    parts = captured_shares([block for program in chairs for block in block_signatures(program)])
+    assert whole[99] < 35 < 50 < parts[99]
+    assert whole[-1] == parts[-1] == pytest.approx(100)
 
 
 def test_nearly_all_programs_keep_every_rule() -> None:

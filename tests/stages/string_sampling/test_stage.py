@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from eval.engine.dataset_run import load_dataset_run
-from eval.engine.registry import find_tables
+from eval.engine.registry import read_tables
 from pipeline.paths import DatasetPaths, file_digest
 from stages.exemplars.language import dataset_kits
 from stages.shape.graphs.canonical import graph_digest
@@ -162,7 +162,7 @@ def test_generated_shapes_become_a_verified_dataset(sampled: tuple[Path, str], b
 
 
 def test_table_compares_generated_and_training_shapes(sampled: tuple[Path, str], bare: Path) -> None:
-    folder, table = sampled[0], find_tables()["generated"]
+    folder, table = sampled[0], read_tables()[0]["generated"]
     assert run(bare / "sampled.yaml", folder, *FINISHING)[0] == 0
     dataset = load_dataset_run(bare / "sampled.yaml", folder)
     assert "no finished dataset parent" in table.missing(dataset)

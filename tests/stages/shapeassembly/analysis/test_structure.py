@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from eval.programs.structure_clusters import captured_shares
 from stages.shapeassembly import parse
 from stages.shapeassembly.analysis.edit_distance import edit_distance
-from stages.shapeassembly.analysis.statistics import cluster_curve, program_statistics
+from stages.shapeassembly.analysis.statistics import program_statistics
 from stages.shapeassembly.analysis.structure import block_signatures, program_distance, signature, tokens
 from stages.shapeassembly.execution.parameters import parameters, with_parameters
 from stages.shapeassembly.syntax.program import AssemblyProgram
@@ -70,4 +72,4 @@ def test_statistics_and_clusters_of_few_programs() -> None:
     found = program_statistics([parse(TEXT), parse("Assembly E { bbox = Cuboid(1.0, 1.0, 1.0, True) }")])
     assert (found.programs, found.lines, found.leaf_parts) == (2, 4.5, 1.0)
     assert (found.reflects, found.translates, found.squeezes, found.macros) == (1 / 9, 1 / 9, 1 / 9, 3 / 9)
-    assert cluster_curve("abbcbc").tolist() == [0.5, 5 / 6, 1.0]
+    assert captured_shares("abbcbc") == pytest.approx([50, 500 / 6, 100])

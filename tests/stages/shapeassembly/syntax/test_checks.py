@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import pytest
 from hypothesis import given
 
 from stages.shapeassembly import execute, parse
-from stages.shapeassembly.syntax.checks import RULE_NAMES, overflow, protruding_parts, violations
+from stages.shapeassembly.syntax.checks import Rule, overflow, protruding_parts, violations
 from stages.shapeassembly.syntax.program import AssemblyProgram
 from tests.stages.shapeassembly.strategies import programs
 
@@ -60,7 +62,7 @@ def test_a_broken_rule_is_named_with_its_line(rule: str, number: int, text: str)
 
 def test_every_rule_has_a_case() -> None:
     [cases] = test_a_broken_rule_is_named_with_its_line.pytestmark  # type: ignore[attr-defined]
-    assert {case[0] for case in cases.args[1]} == set(RULE_NAMES)
+    assert {case[0] for case in cases.args[1]} == set(get_args(Rule))
 
 
 def test_top_and_bottom_of_the_bounding_box_can_both_be_attached_to() -> None:
