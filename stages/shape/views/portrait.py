@@ -8,7 +8,6 @@ from typing import Literal
 import numba
 import numpy as np
 
-from pipeline.errors import ShardFailed
 from stages.shape.arrays import BoolArray, ByteArray, Float32Array, FloatArray, IntArray
 from stages.shape.views.buffers import RendererName, Visible, visible_triangles
 from stages.shape.views.camera import Camera, View
@@ -42,7 +41,8 @@ def portrait(
 
     A soft key light from the upper left with shadows, sky and ground light, darker corners, thin lines where parts
     meet, and a shadow on the ground. Materials have their textures, bent normals, emission and alpha, unless
-    `part_colors` are given; what is seen through is rasterised. Raises ShardFailed for a blank picture.
+    `part_colors` are given; what is seen through is rasterised. Where textures leave nothing to see, such as part of a
+    fine net, the scene is drawn without them. Raises ShardFailed for a blank picture.
     """
     from stages.shape.views.pixel_normals import smooth_normals
     from stages.shape.views.screen import surface_buffers
@@ -53,9 +53,12 @@ def portrait(
     look = scene.meshes.look if part_colors is None else None
     maps = scene.meshes.maps if part_colors is None else None
     layers: list[tuple[IntArray, Float32Array]] = []
-    if look is not None and has_holes(scene):
-        seen, layers = _solid_and_layers(scene, camera, width, height)
+    through = _solid_and_layers(scene, camera, width, height) if look is not None and has_holes(scene) else None
+    if through is not None:
+        seen, layers = through
     else:
+        if look is not None and has_holes(scene):
+            look = maps = None
         seen = visible_triangles(scene, camera, (width, height), renderer)
     depth, _, part, color = surface_buffers(scene, seen.view, seen.triangles, seen.screen, seen.normals)
     normal = smooth_normals(seen)
@@ -95,8 +98,10 @@ def portrait(
 
 def _solid_and_layers(
     scene: Scene, camera: Camera, width: int, height: int
-) -> tuple[Visible, list[tuple[IntArray, Float32Array]]]:
-    """Return what is seen of solid surfaces, and the layers of what is seen through, nearest first."""
+) -> tuple[Visible, list[tuple[IntArray, Float32Array]]] | None:
+    """Return what is seen of solid surfaces, and the layers of what is seen through, nearest first; None if textures
+    leave nothing to see.
+    """
     from stages.shape.views.layers import layered_moves
     from stages.shape.views.screen import project_triangles, screen_normals, screen_triangles
     from stages.shape.views.texels import see_through_layers, visible_solid
@@ -107,7 +112,7 @@ def _solid_and_layers(
     solid = visible_solid(scene, layered, width, height)
     layers = see_through_layers(scene, layered, screen, view.projection, solid)
     if solid.max() < 0 and not layers:
-        raise ShardFailed(f"blank picture: {len(scene)} parts, none seen from {camera}")
+        return None
     return Visible(scene, view, solid, screen, screen_normals(scene, view, screen)), layers
 
 

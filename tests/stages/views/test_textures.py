@@ -11,8 +11,11 @@ import pytest
 
 from stages.shape.appearance import Appearance, Material, Texture, TextureImage, barycentric
 from stages.shape.shape import Shape
+from stages.shape.views.camera import Camera
 from stages.shape.views.mesh_look import mesh_look
 from stages.shape.views.palette import linear_to_srgb, srgb_to_linear
+from stages.shape.views.portrait import portrait
+from stages.shape.views.scene import scene_of
 from stages.views.reading import SampleView
 from tests.stages.views.rendered import cast, lopsided, rays_of, triangles_of, views_of
 
@@ -109,6 +112,15 @@ def test_alpha_mixes_in_linear_light_and_masks_cut_holes() -> None:
     behind = shows.color[before.instances == 0]
     assert (behind != linear_to_srgb(np.array([0.0, 0.0, 1.0]))).any(axis=1).all()
     assert np.array_equal(shows.depth, before.depth), "depth is that of the surface, whatever its alpha"
+
+
+def test_portrait_of_what_its_texture_hides_shows_the_surface_without_it() -> None:
+    """The part alone of a net whose texture leaves nothing to see has a portrait, that of its bare surface."""
+    bare = lopsided()
+    hidden = dressed(Material("net", (0.0, 0.0, 1.0, 0.25), alpha_mode="mask", alpha_cutoff=0.5), bare)
+    pictures = [portrait(scene_of(shape), Camera(-40.0, 25.0), (120, 90)) for shape in (hidden, bare)]
+    assert np.ptp(pictures[1]) > 0
+    np.testing.assert_array_equal(*pictures)
 
 
 def mixing(layers: int, behind: np.ndarray) -> np.ndarray:
