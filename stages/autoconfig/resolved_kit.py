@@ -109,6 +109,8 @@ def use_sections_if_empty(first: ResolvedKit, limits: ReadLimits, tries: int, re
     resolution = resolve_settings(config.resolve(strictest), models, identified, tries, require)
     values = {**strictest, **resolution.values}
     reasons = {**dict.fromkeys(strictest, "the strictest, and it finds enough"), **resolution.reasons}
+    if resolution.trial is not None and resolution.trial.looks_like_exemplar:
+        return first  # slabs that are inserted and removed are too thin to be seen
     if not resolution.is_sufficient:
         resolution = resolve_settings(config, models, identified, tries, require)
         values, reasons = dict(resolution.values), dict(resolution.reasons)

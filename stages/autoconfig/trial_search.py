@@ -95,6 +95,11 @@ class TrialResult:
         return {key: getattr(self, key) for key in keys}
 
     @property
+    def looks_like_exemplar(self) -> bool:
+        """Whether there are hits, and their surfaces are next to nowhere away from an exemplar's."""
+        return bool(self.graphs) and self.moved < MIN_MOVED_DISTANCE and not self.by_meaning
+
+    @property
     def text(self) -> str:
         """What was found, in words, without the diversity."""
         if not self.graphs:
@@ -108,8 +113,8 @@ def has_low_diversity(trial: TrialResult) -> bool:
     Near copies do no harm by meaning, nor if there are enough other hits, because they are rejected then.
     """
     copies = trial.copied_share >= NEAR_COPY_SHARE and trial.non_copy_rate < MIN_NON_COPY_RATE and not trial.by_meaning
-    looks_the_same = trial.moved < MIN_MOVED_DISTANCE and not trial.by_meaning
-    return trial.distance < MIN_EXEMPLAR_DISTANCE or trial.pair_distance < MIN_PAIR_DISTANCE or copies or looks_the_same
+    is_alike = trial.distance < MIN_EXEMPLAR_DISTANCE or trial.pair_distance < MIN_PAIR_DISTANCE
+    return is_alike or copies or trial.looks_like_exemplar
 
 
 class TrialSearch:

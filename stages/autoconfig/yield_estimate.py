@@ -12,7 +12,7 @@ from pipeline.randomness import decision_rng
 from stages.autoconfig.lost_support import lost_support
 from stages.autoconfig.setting_search import MIN_USEFUL_GRAPHS
 from stages.autoconfig.settings import RANDOM_STREAM
-from stages.autoconfig.trial_search import MIN_MOVED_DISTANCE, TrialResult, TrialSearch, has_low_diversity, type_counts
+from stages.autoconfig.trial_search import TrialResult, TrialSearch, has_low_diversity, type_counts
 from stages.rows.settings import RowsConfig
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.patterns import observed_patterns, unique_pattern_share
@@ -159,7 +159,7 @@ def _sentence(
         why = f"nothing is close above or below {names}, as it is in the exemplar"
         return f"{count} of {size} that look broken: {why}; {LOOK_FIRST}, and bring {another_model(kit)}"
     if has_low_diversity(trial):
-        is_like_exemplar = trial.pair_distance >= trial.distance or trial.moved < MIN_MOVED_DISTANCE
+        is_like_exemplar = trial.pair_distance >= trial.distance or trial.looks_like_exemplar
         alike = "like the exemplar" if is_like_exemplar else "like each other"
         return f"{count} of {size} that look {alike}; {LOOK_FIRST}, and bring {another_model(kit)}"
     if trial.histograms < MIN_PARTS_LISTS and not trial.by_meaning:

@@ -47,4 +47,4 @@ def test_the_nearest_exemplar_counts() -> None:
 @pytest.mark.parametrize(("moved", "is_low"), [(0.015, True), (0.03, False)])
 def test_hits_that_look_like_the_exemplar_have_low_diversity(moved: float, is_low: bool) -> None:
     trial = TrialResult(1000, 300, 300, distance=0.4, pair_distance=0.3, copied_share=0.6, moved=moved)
-    assert has_low_diversity(trial) is is_low
+    assert has_low_diversity(trial) is trial.looks_like_exemplar is is_low
