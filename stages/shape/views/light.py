@@ -29,16 +29,16 @@ class KeyLight:
     view: View
     depth: Float32Array
 
-    def reaches(self, points: FloatArray, softness: float) -> FloatArray:
-        """Return the share 0..1 of the light that reaches world points (n, 3), blurred over `softness`, world units."""
-        local = points @ self.view.eye[:3, :3].T + self.view.eye[:3, 3]
-        size = len(self.depth)
-        x = (local[:, 0] * self.view.projection[0, 0] + 1) / 2 * size
-        y = (1 - local[:, 1] * self.view.projection[1, 1]) / 2 * size
-        pixel = 2.0 / (self.view.projection[0, 0] * size)
+    def reaches(self, points: FloatArray, *softness: float) -> list[FloatArray]:
+        """Return the share 0..1 of the light that reaches world points (n, 3), blurred over each `softness`, in units.
+
+        float64 (n,)
+        """
+        turned, shift = points @ self.view.eye[:3, :3].T, self.view.eye[:3, 3].copy()
+        across, upwards = self.view.projection[0, 0], self.view.projection[1, 1]
+        pixel = 2.0 / (across * len(self.depth))
         bias = 2.0 * pixel + 0.004 * self.view.radius
-        share: FloatArray = _filtered(self.depth, x, y, -local[:, 2], softness / pixel, bias)
-        return share
+        return [_filtered(self.depth, turned, shift, across, upwards, width / pixel, bias) for width in softness]
 
 
 def key_light(scene: Scene, azimuth: float, elevation: float, renderer: RendererName) -> KeyLight:
@@ -81,12 +81,13 @@ def ground_seen(
     return seen
 
 
-def openness(depth: Float32Array, normal: Float32Array, view: View, reach: float) -> FloatArray:
+def openness(depth: Float32Array, normal: Float32Array, positions: FloatArray, view: View, reach: float) -> FloatArray:
     """Return how much of the half-sphere over each pixel is free of nearby surfaces, float64 (h, w), 1 for background.
+
+    positions: of the pixels in eye space, as `eye_positions` returns them
 
     Nearby means within `reach` (world units). Only surfaces in the picture count.
     """
-    positions = eye_positions(depth, view)
     across = 2.0 / (view.projection[0, 0] * depth.shape[1])
     raw = _openness(depth, normal.astype(np.float64), positions, reach, across, view.perspective)
     smooth: FloatArray = _smoothed(raw, depth, reach)
@@ -126,9 +127,12 @@ def _ground_seen(wanted, across, upwards, perspective, rotation, shift, axis, he
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _filtered(depth, x, y, distance, radius, bias):
-    """Return the share of unshadowed taps of a disc of `radius` pixels around each (x, y)."""
-    lit = np.empty(len(x))
+def _filtered(depth, turned, shift, across, upwards, radius, bias):
+    """Return the share of unshadowed taps of a disc of `radius` pixels around each point.
+
+    turned, shift: points in the light's eye space, before they are moved by `shift`
+    """
+    lit = np.empty(len(turned))
     size = len(depth)
     taps = 32
     # Taps on a sunflower's spiral cover the disc evenly.
@@ -140,17 +144,20 @@ def _filtered(depth, x, y, distance, radius, bias):
             if np.isfinite(depth[row, column]):
                 top, bottom = min(top, row), max(bottom, row)
                 first, last = min(first, column), max(last, column)
-    for k in range(len(x)):
-        outside = x[k] < first - radius or x[k] >= last + 1 + radius
-        if outside or y[k] < top - radius or y[k] >= bottom + 1 + radius:
+    for k in range(len(turned)):
+        x = ((turned[k, 0] + shift[0]) * across + 1) / 2 * size
+        y = (1 - (turned[k, 1] + shift[1]) * upwards) / 2 * size
+        distance = -(turned[k, 2] + shift[2])
+        outside = x < first - radius or x >= last + 1 + radius
+        if outside or y < top - radius or y >= bottom + 1 + radius:
             lit[k] = 1.0
             continue
         free = 0
         for tap in range(taps):
             away = spread[tap]
-            column, row = int(np.floor(x[k] + right[tap])), int(np.floor(y[k] + down[tap]))
+            column, row = int(np.floor(x + right[tap])), int(np.floor(y + down[tap]))
             outside = column < 0 or row < 0 or column >= size or row >= size
-            free += outside or depth[row, column] + bias * (1.0 + away * 0.5) >= distance[k]
+            free += outside or depth[row, column] + bias * (1.0 + away * 0.5) >= distance
         lit[k] = free / taps
     return lit
 

@@ -74,13 +74,15 @@ def portrait(
     shown = part >= 0
     picture = np.broadcast_to(srgb_to_linear(np.array(PAPER, dtype=np.uint8)), (height, width, 3)).copy()
     if camera.elevation > 0.0:
-        picture *= _ground_light(scene, seen.view, light, shown)
-    world = to_world(eye_positions(depth, seen.view)[shown], seen.view)
+        pixels, left = _ground_light(scene, seen.view, light, shown)
+        picture.reshape(-1, 3)[pixels] *= left
+    positions = eye_positions(depth, seen.view)
+    world = to_world(positions[shown], seen.view)
     upright = normal[shown] @ seen.view.eye[:3, :3]
-    lit = np.clip(upright @ light.direction, 0.0, None) * light.reaches(world, 0.012 * seen.view.radius)
+    lit = np.clip(upright @ light.direction, 0.0, None) * light.reaches(world, 0.012 * seen.view.radius)[0]
     up = upright[:, 1 if scene.up == "y" else 2]
     sky = (0.5 + 0.5 * up)[:, None] * SKY + (0.5 - 0.5 * up)[:, None] * GROUND
-    open_sky = openness(depth, normal, seen.view, 0.10 * seen.view.radius)[shown][:, None]
+    open_sky = openness(depth, normal, positions, seen.view, 0.10 * seen.view.radius)[shown][:, None]
     # Bright albedos are reduced a little, so that white models keep their shading.
     base = srgb_to_linear(color[shown])
     if look is not None:
@@ -125,7 +127,7 @@ def _blend_layer(picture: FloatArray, seen: Visible, colors: Float32Array, light
     depth, _, _, _ = surface_buffers(seen.scene, seen.view, seen.triangles, seen.screen, seen.normals)
     world = to_world(eye_positions(depth, seen.view)[shown], seen.view)
     upright = smooth_normals(seen)[shown] @ seen.view.eye[:3, :3]
-    lit = np.clip(upright @ light.direction, 0.0, None) * light.reaches(world, 0.012 * seen.view.radius)
+    lit = np.clip(upright @ light.direction, 0.0, None) * light.reaches(world, 0.012 * seen.view.radius)[0]
     up = upright[:, 1 if seen.scene.up == "y" else 2]
     sky = (0.5 + 0.5 * up)[:, None] * SKY + (0.5 - 0.5 * up)[:, None] * GROUND
     alpha = colors[shown, 3:].astype(np.float64)
@@ -159,31 +161,31 @@ def points_portrait(
     above = upright[:, 1 if up == "y" else 2]
     lit = np.clip(normal[shown] @ np.array([-0.5, 0.68, 0.54]), 0.0, None)
     sky = (0.5 + 0.5 * above)[:, None] * SKY + (0.5 - 0.5 * above)[:, None] * GROUND
-    open_sky = openness(depth, normal, view, 0.10 * view.radius)[shown][:, None]
+    open_sky = openness(depth, normal, eye_positions(depth, view), view, 0.10 * view.radius)[shown][:, None]
     colors = label_colors(int(labels.max()) + 1) if paint is None else paint
     albedo = srgb_to_linear(colors)[labels[owner[shown]]]
     picture[shown] = albedo * (lit[:, None] * KEY * 0.9 + 1.15 * sky) * (0.25 + 0.75 * open_sky)
     return linear_to_srgb(_reduced(picture))
 
 
-def _ground_light(scene: Scene, view: View, light: KeyLight, hidden: BoolArray) -> FloatArray:
-    """Return what the ground shadow leaves of the light, float64 (h, w, 3); 1 where ground is `hidden` or not seen."""
+def _ground_light(scene: Scene, view: View, light: KeyLight, hidden: BoolArray) -> tuple[IntArray, FloatArray]:
+    """Return the pixels of ground in shadow, int64 (n,), and what is left of the light there, float64 (n, 3).
+
+    hidden: pixels without ground, bool (h, w)
+    """
     height, width = hidden.shape
     axis = 1 if scene.up == "y" else 2
     middle = (scene.points.min(axis=0) + scene.points.max(axis=0)) / 2
+    pixels, points = ground_seen(~hidden, view, axis, float(scene.points[:, axis].min()), middle, 4.0 * view.radius)
+    soft, wide = light.reaches(points, 0.05 * view.radius, 0.22 * view.radius)
+    left = 0.6 * soft + 0.4 * wide
+    pixels, left = pixels[left < 1.0], left[left < 1.0]
     # A shadow fades out at the border, so that pictures join without a seam.
-    rows, columns = np.arange(height) + 0.5, np.arange(width) + 0.5
-    edge = np.minimum(np.minimum(rows, height - rows)[:, None], np.minimum(columns, width - columns)[None, :])
+    rows, columns = pixels // width + 0.5, pixels % width + 0.5
+    edge = np.minimum(np.minimum(rows, height - rows), np.minimum(columns, width - columns))
     inside = np.clip(edge / (0.10 * min(height, width)), 0.0, 1.0)
     fade = inside**2 * (3.0 - 2.0 * inside)
-    pixels, points = ground_seen(~hidden, view, axis, float(scene.points[:, axis].min()), middle, 4.0 * view.radius)
-    soft = light.reaches(points, 0.05 * view.radius)
-    wide = light.reaches(points, 0.22 * view.radius)
-    left = np.ones(height * width)
-    left[pixels] = 0.6 * soft + 0.4 * wide
-    shadow = ((1.0 - left.reshape(height, width)) * fade)[..., None]
-    light_left: FloatArray = 1.0 - shadow * (1.0 - SHADOW)
-    return light_left
+    return pixels, 1.0 - ((1.0 - left) * fade)[:, None] * (1.0 - SHADOW)
 
 
 def _ink(seen: Visible, size: tuple[int, int]) -> FloatArray:
