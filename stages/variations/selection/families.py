@@ -8,7 +8,7 @@ in val or test is left for train.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -97,27 +97,32 @@ def _cut(
     return best, best_regions
 
 
-@dataclass(frozen=True)
 class _Ground:
     """What is near what in a pool of `count` variants, remembered; the variants `sample` estimate the rest."""
 
-    near: Near
-    count: int
-    sample: Indices
-    _around: dict[int, npt.NDArray[np.uint8]] = field(default_factory=dict)
-    _near_sample: dict[int, Indices] = field(default_factory=dict)
+    def __init__(self, near: Near, count: int, sample: Indices) -> None:
+        self.near, self.count, self.sample = near, count, sample
+        self._known: dict[int, int] = {}  # rows of `_around` by variant
+        self._around = np.empty((16, -(-count // 8)), dtype=np.uint8)  # a bit for each variant of the pool
+        self._near_sample: dict[int, Indices] = {}
 
     def around(self, variant: int) -> Indices:
         """Return all that is near a variant; what earlier answers tell is not computed again."""
-        if variant not in self._around:
+        row = self._known.get(variant)
+        if row is None:
+            row = len(self._known)
+            if row == len(self._around):
+                self._around = np.concatenate([self._around, np.empty_like(self._around)])
             is_near = np.zeros(self.count, dtype=np.bool_)
-            known = np.array(list(self._around), dtype=np.int64)
+            known = np.array(list(self._known), dtype=np.int64)
             byte, bit = divmod(variant, 8)
-            is_near[known] = [bool(row[byte] >> bit & 1) for row in self._around.values()]
-            open_ = np.setdiff1d(np.arange(self.count), known)
-            is_near[self.near(variant, open_)] = True
-            self._around[variant] = np.packbits(is_near, bitorder="little")
-        return np.flatnonzero(np.unpackbits(self._around[variant], count=self.count, bitorder="little"))
+            is_near[known] = self._around[:row, byte] >> bit & 1
+            unknown = np.ones(self.count, dtype=np.bool_)
+            unknown[known] = False
+            is_near[self.near(variant, np.flatnonzero(unknown))] = True
+            self._around[row] = np.packbits(is_near, bitorder="little")
+            self._known[variant] = row
+        return np.flatnonzero(np.unpackbits(self._around[row], count=self.count, bitorder="little"))
 
     def cost(self, variant: int, spent: npt.NDArray[np.bool_]) -> float:
         """Return about how many variants that are not `spent` yet are near a variant."""

@@ -31,6 +31,11 @@ SHARE_FLOORS = (0.7, 0.4, 0.0)
 """The largest share is sought above each of these in turn: high shares are found fastest."""
 MIN_UPRIGHT_COSINE = 1.0 - 1e-3
 """Cosine from which an alignment keeps the vertical."""
+MAX_ROTATIONS_KEPT = 4096
+"""Rotations of one seed that are kept while a shape is compared with others."""
+BITS_PER_PART = 8
+CELL_TOLERANCES = 8.0
+"""Width of the cells whose occupation is noted, in tolerances: a part occupies two of them on average."""
 
 Indices = npt.NDArray[np.int64]
 
@@ -50,6 +55,8 @@ class _Tables(NamedTuple):
     areas: FloatArray  # float64 (shapes,)
     up: int  # axis that alignments keep, or -1
     tolerance: float  # largest gap of coinciding centroids, in kit units
+    cell: float  # width of a cell, in kit units
+    occupied: npt.NDArray[np.uint64]  # uint64 (shapes, words): a bit for each cell and type where a part may be met
 
 
 class PackedShapes:
@@ -86,11 +93,13 @@ class PackedShapes:
             begin += len(own)
         first = np.array(firsts, dtype=np.int64).reshape(-1, len(area) + 1)
         self._counts = np.diff(first, axis=1)
+        packed = np.concatenate([np.empty((0, 3), np.float32), *centres])
+        tolerance = CENTROID_TOLERANCES * kit.pose_tolerance
         self._tables = _Tables(
             area=area,
             symmetries=np.concatenate([part_type.symmetries[:, :3, :3] for part_type in kit.types]),
             symmetries_from=np.cumsum([0, *(len(part_type.symmetries) for part_type in kit.types)]),
-            centres=np.concatenate([np.empty((0, 3), np.float32), *centres]),
+            centres=packed,
             turns=np.concatenate([np.empty(0, np.int32), *turns]),
             rotations=np.array(kept).reshape(-1, 3, 3),
             firsts=first,
@@ -98,7 +107,9 @@ class PackedShapes:
             kinds=np.array(kinds, dtype=np.int64).reshape(-1, SEEDS_PER_SHAPE),
             areas=self._counts @ area,
             up={"y": 1, "z": 2}[kit.up] if upright else -1,
-            tolerance=CENTROID_TOLERANCES * kit.pose_tolerance,
+            tolerance=tolerance,
+            cell=CELL_TOLERANCES * tolerance,
+            occupied=_occupied_cells(packed, first, CELL_TOLERANCES * tolerance, tolerance),
         )
 
     def __len__(self) -> int:
@@ -147,24 +158,77 @@ def _seeds(areas: FloatArray) -> Indices:
 
 @numba.njit(cache=True)
 def _shares(tables, shape, others, least, enough):
+    # Arrays of their own: a call with all tables costs more than what most calls do.
+    kinds, seeds, firsts, centres, turns = tables.kinds, tables.seeds, tables.firsts, tables.centres, tables.turns
+    areas, symmetries_from, symmetries, occupied = (
+        tables.areas,
+        tables.symmetries_from,
+        tables.symmetries,
+        tables.occupied,
+    )
+    rotations, up, per_unit = tables.rotations, tables.up, 1.0 / tables.cell
+    bits = occupied.shape[1] * 64
     shares = np.zeros(len(others))
     alignment = np.empty((3, 4))
     work = np.empty(SEEDS_PER_SHAPE, dtype=np.int64)
-    area = tables.areas[shape]
+    area = areas[shape]
+    most_symmetries = 1
+    for kind in range(len(symmetries_from) - 1):
+        most_symmetries = max(most_symmetries, symmetries_from[kind + 1] - symmetries_from[kind])
+    # Rotations that lay a seed on parts of its type in each rotation, by its symmetries: 0 until known, 2 if tilted.
+    kept = len(rotations) * most_symmetries <= MAX_ROTATIONS_KEPT
+    known = np.zeros((SEEDS_PER_SHAPE, len(rotations) if kept else 1, most_symmetries), dtype=np.int8)
+    laid = np.empty((SEEDS_PER_SHAPE, len(rotations) if kept else 1, most_symmetries, 3, 3))
     for place in range(len(others)):
         other = others[place]
-        larger = max(area, tables.areas[other])
+        larger = max(area, areas[other])
         # Of `misses` + 1 seeds, however chosen, one must hit: the cheapest are tried.
         misses = min(int(SEEDS_PER_SHAPE * (1.0 - least * larger / area) + 1e-9) + SPARE_MISSES, SEEDS_PER_SHAPE - 1)
         for seed in range(SEEDS_PER_SHAPE):
-            kind = tables.kinds[shape, seed]
-            targets = tables.firsts[other, kind + 1] - tables.firsts[other, kind]
-            work[seed] = targets * (tables.symmetries_from[kind + 1] - tables.symmetries_from[kind])
+            kind = kinds[shape, seed]
+            targets = firsts[other, kind + 1] - firsts[other, kind]
+            work[seed] = targets * (symmetries_from[kind + 1] - symmetries_from[kind])
         order = sort_order(work)
         best = floor = np.nextafter(least * larger, 0.0)
         stop = max(min(enough * larger, 0.999 * area), least * larger)
         for first in range(misses + 1):
-            best = _best_of_seed(tables, shape, other, order, first, misses, best, stop, alignment)
+            seed = order[first]
+            part, kind = seeds[shape, seed], kinds[shape, seed]
+            for target in range(firsts[other, kind], firsts[other, kind + 1]):
+                turn = turns[target] if kept else 0
+                for number in range(symmetries_from[kind + 1] - symmetries_from[kind]):
+                    if not kept or known[seed, turn, number] == 0:
+                        symmetry = symmetries[symmetries_from[kind] + number]
+                        level = _lay_upon(rotations, turns[part], turns[target], symmetry, up, laid[seed, turn, number])
+                        known[seed, turn, number] = 1 if level else 2
+                    if known[seed, turn, number] == 2:
+                        continue
+                    turned = laid[seed, turn, number]
+                    # Most alignments are wrong, and the cells alone tell it of nearly all of them.
+                    missed = first
+                    for later in range(first + 1, SEEDS_PER_SHAPE):
+                        moved = seeds[shape, order[later]]
+                        a = np.float64(centres[moved, 0]) - centres[part, 0]
+                        b = np.float64(centres[moved, 1]) - centres[part, 1]
+                        c = np.float64(centres[moved, 2]) - centres[part, 2]
+                        x = turned[0, 0] * a + turned[0, 1] * b + turned[0, 2] * c + centres[target, 0]
+                        y = turned[1, 0] * a + turned[1, 1] * b + turned[1, 2] * c + centres[target, 1]
+                        z = turned[2, 0] * a + turned[2, 1] * b + turned[2, 2] * c + centres[target, 2]
+                        bit = _bit(
+                            kinds[shape, order[later]], _cell(x, per_unit), _cell(y, per_unit), _cell(z, per_unit), bits
+                        )
+                        if not (occupied[other, bit >> 6] >> np.uint64(bit & 63)) & np.uint64(1):
+                            missed += 1
+                            if missed > misses:
+                                break
+                    if missed <= misses:
+                        _shift_to(centres, part, target, turned, alignment)
+                        if _missed_seeds(tables, shape, other, order, first, misses, alignment) <= misses:
+                            best = max(best, _met(tables, shape, other, best, alignment))
+                            if best >= stop:
+                                break
+                if best >= stop:
+                    break
             if best >= stop:
                 break
         if best > floor:
@@ -173,31 +237,20 @@ def _shares(tables, shape, others, least, enough):
 
 
 @numba.njit(cache=True)
-def _best_of_seed(tables, shape, other, order, first, misses, best, stop, alignment):
-    """Return the largest coinciding area above `best` under an alignment of the `first` seed in this order; else
-    `best`.
+def _missed_seeds(tables, shape, other, order, first, misses, alignment):
+    """Return how many seeds miss under an alignment of the `first` seed in this order, or more than `misses`.
 
-    The first area of at least `stop` is returned at once. Seeds are tested in the same order: those with few
-    counterparts reject a wrong alignment fastest. Seeds before `first` have missed with every good alignment, so they
-    count as misses.
+    Seeds are tested in the same order: those with few counterparts reject a wrong alignment fastest. Seeds before
+    `first` have missed with every good alignment, so they count as misses.
     """
-    part, kind = tables.seeds[shape, order[first]], tables.kinds[shape, order[first]]
-    for target in range(tables.firsts[other, kind], tables.firsts[other, kind + 1]):
-        for symmetry in range(tables.symmetries_from[kind], tables.symmetries_from[kind + 1]):
-            if not _lay_upon(tables, part, target, tables.symmetries[symmetry], alignment):
-                continue
-            missed = first
-            for place in range(first + 1, SEEDS_PER_SHAPE):
-                seed = order[place]
-                if not _meets(tables, alignment, tables.seeds[shape, seed], other, tables.kinds[shape, seed]):
-                    missed += 1
-                    if missed > misses:
-                        break
-            if missed <= misses:
-                best = max(best, _met(tables, shape, other, best, alignment))
-                if best >= stop:
-                    return best
-    return best
+    missed = first
+    for place in range(first + 1, SEEDS_PER_SHAPE):
+        seed = order[place]
+        if not _meets(tables, alignment, tables.seeds[shape, seed], other, tables.kinds[shape, seed]):
+            missed += 1
+            if missed > misses:
+                break
+    return missed
 
 
 @numba.njit(cache=True)
@@ -216,12 +269,11 @@ def _met(tables, shape, other, best, alignment):
 
 
 @numba.njit(cache=True)
-def _lay_upon(tables, part, target, symmetry, alignment):
-    """Write the alignment (3, 4) that takes a part to another of its type, turned by a symmetry; return False if it
+def _lay_upon(rotations, turn, target_turn, symmetry, up, turned):
+    """Write the rotation (3, 3) that takes a part to another of its type, turned by a symmetry; return False if it
     tilts.
     """
-    rotation, onto = tables.rotations[tables.turns[part]], tables.rotations[tables.turns[target]]
-    up = tables.up
+    rotation, onto = rotations[turn], rotations[target_turn]
     if up >= 0:
         level = 0.0
         for k in range(3):
@@ -229,17 +281,58 @@ def _lay_upon(tables, part, target, symmetry, alignment):
                 level += onto[up, k] * symmetry[k, m] * rotation[up, m]
         if level < MIN_UPRIGHT_COSINE:
             return False
-    centre, target_centre = tables.centres[part], tables.centres[target]
     for i in range(3):
         a = onto[i, 0] * symmetry[0, 0] + onto[i, 1] * symmetry[1, 0] + onto[i, 2] * symmetry[2, 0]
         b = onto[i, 0] * symmetry[0, 1] + onto[i, 1] * symmetry[1, 1] + onto[i, 2] * symmetry[2, 1]
         c = onto[i, 0] * symmetry[0, 2] + onto[i, 1] * symmetry[1, 2] + onto[i, 2] * symmetry[2, 2]
         for j in range(3):
-            alignment[i, j] = a * rotation[j, 0] + b * rotation[j, 1] + c * rotation[j, 2]
+            turned[i, j] = a * rotation[j, 0] + b * rotation[j, 1] + c * rotation[j, 2]
+    return True
+
+
+@numba.njit(cache=True)
+def _shift_to(centres, part, target, turned, alignment):
+    """Write the alignment (3, 4) with a rotation that takes the centroid of a part to that of another."""
+    centre, target_centre = centres[part], centres[target]
     for i in range(3):
+        for j in range(3):
+            alignment[i, j] = turned[i, j]
         moved = alignment[i, 0] * centre[0] + alignment[i, 1] * centre[1] + alignment[i, 2] * centre[2]
         alignment[i, 3] = target_centre[i] - moved
-    return True
+
+
+@numba.njit(cache=True)
+def _bit(kind, i, j, k, bits):
+    """Return the bit of a type and a cell, of a power of two of `bits`; others may share it."""
+    mixed = (kind * 73856093 + i * 19349663 + j * 83492791 + k * 49979687) * 0x9E3779B97F4A7C1
+    return (mixed >> 24) & (bits - 1)
+
+
+@numba.njit(cache=True)
+def _occupied_cells(centres, firsts, cell, tolerance):
+    """Return the bits of the cells in which a part of each shape may be met, uint64 (shapes, words)."""
+    shapes = len(firsts)
+    bits = 64
+    while bits * shapes < BITS_PER_PART * len(centres):
+        bits *= 2
+    occupied = np.zeros((shapes, bits // 64), dtype=np.uint64)
+    per_unit = 1.0 / cell
+    gap = 1.001 * tolerance  # rounding must not take a place out of its cells
+    for shape in range(shapes):
+        for kind in range(firsts.shape[1] - 1):
+            for part in range(firsts[shape, kind], firsts[shape, kind + 1]):
+                a, b, c = np.float64(centres[part, 0]), np.float64(centres[part, 1]), np.float64(centres[part, 2])
+                for i in range(_cell(a - gap, per_unit), _cell(a + gap, per_unit) + 1):
+                    for j in range(_cell(b - gap, per_unit), _cell(b + gap, per_unit) + 1):
+                        for k in range(_cell(c - gap, per_unit), _cell(c + gap, per_unit) + 1):
+                            bit = _bit(kind, i, j, k, bits)
+                            occupied[shape, bit >> 6] |= np.uint64(1) << np.uint64(bit & 63)
+    return occupied
+
+
+@numba.njit(cache=True)
+def _cell(place, per_unit):
+    return np.int64(place * per_unit + 2.0**20)  # no rounding down, which takes longer: no place is that far off
 
 
 @numba.njit(cache=True)

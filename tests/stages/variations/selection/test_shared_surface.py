@@ -73,6 +73,22 @@ def test_tipped_shape_is_no_copy_if_upright() -> None:
     assert PackedShapes(kit, shapes, upright=False).shares(0, np.array([1]), 0.5)[0] == pytest.approx(1.0)
 
 
+def test_turned_and_drifted_copies_far_away_share_everything() -> None:
+    kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
+    one, rng = kit.exemplars[1].assembly, np.random.default_rng(0)
+    shapes = [one]
+    for x, z, angle in rng.uniform((-500, -500, 0), (500, 500, 6.3), (40, 3)).tolist():
+        motion = np.eye(4)
+        motion[[0, 0, 2, 2], [0, 2, 0, 2]] = np.cos(angle), np.sin(angle), -np.sin(angle), np.cos(angle)
+        motion[:3, 3] = x, 0.0, z
+        copy = moved(one, motion)
+        drift = rng.uniform(-0.4, 0.4, (len(copy), 3)) * CENTROID_TOLERANCES * kit.pose_tolerance
+        copy.poses[:, :3, 3] += drift
+        shapes.append(copy)
+    shared = PackedShapes(kit, shapes, upright=True).shares(0, np.arange(1, len(shapes)), 0.99)
+    assert shared.tolist() == [pytest.approx(1.0)] * 40
+
+
 def test_shared_surface_equals_brute_force() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     _, found = search(kit, tries=1500, max_size=3.0)
