@@ -22,6 +22,8 @@ MAKEFLAGS   += --warn-undefined-variables --no-builtin-rules
 CONFIG  ?= configs/default.yaml
 ## OUT      folder that datasets are written to
 OUT     ?= datasets
+## WORK     folder of records and shards where OUT is a URL, such as s3://bucket/prefix; datasets if empty
+WORK    ?=
 ## WORKERS  number of worker processes; one for each core if empty
 WORKERS ?=
 ## SEED     seed in place of the config's
@@ -65,7 +67,7 @@ VERSION ?=
 
 # Their values are text: make expands none of it, and recipes read it from the environment, as "$$CONFIG", so that no
 # shell expands it either. A recipe never says $(CONFIG).
-VARIABLES := CONFIG OUT WORKERS SEED STALL_TIMEOUT CLUSTER MESH PROGRAM INPUT UP MODEL TABLE PAPER SCALE SAMPLES \
+VARIABLES := CONFIG OUT WORK WORKERS SEED STALL_TIMEOUT CLUSTER MESH PROGRAM INPUT UP MODEL TABLE PAPER SCALE SAMPLES \
              FORMAT KEY DEST DRY_RUN SHARD ROUNDS VERSION
 $(foreach name,$(VARIABLES),$(eval override $(name) := $$(value $(name))))
 ifeq ($(value WORKERS),)
@@ -86,7 +88,8 @@ DATASET   := --config "$$CONFIG" --out "$$OUT"
 SEEDED    := $${SEED:+--seed "$$SEED"}
 OPTIONS   := $(DATASET) $(SEEDED) --workers "$$WORKERS"
 RUNNING   := $${STALL_TIMEOUT:+--stall-timeout "$$STALL_TIMEOUT"} $${CLUSTER:+--cluster "$$CLUSTER"}
-RUN        = @$(SHAPEMILL) run $@ $(OPTIONS) $(RUNNING)
+STORING   := $${WORK:+--work "$$WORK"}
+RUN        = @$(SHAPEMILL) run $@ $(OPTIONS) $(RUNNING) $(STORING)
 
 # Making datasets ----------------------------------------------------------------------------------------------------
 
@@ -94,8 +97,10 @@ RUN        = @$(SHAPEMILL) run $@ $(OPTIONS) $(RUNNING)
 .PHONY: string_sampling primitives mixture validity abstraction strings points sketches views surface structure
 .PHONY: captions exports package
 dataset: setup  ## Make the dataset of CONFIG in OUT, with MESH in place of its kits: whatever is missing or outdated
-	@[ -z "$$MESH" ] || { CONFIG=$$($(SHAPEMILL) with-models $(DATASET) -- "$$MESH"); echo "config: $$CONFIG"; }; \
-	$(SHAPEMILL) run $(OPTIONS) $(RUNNING)
+	@FOLDER=$$OUT; case "$$OUT" in *://*) FOLDER=$${WORK:-datasets};; esac; \
+	[ -z "$$MESH" ] || { CONFIG=$$($(SHAPEMILL) with-models --config "$$CONFIG" --out "$$FOLDER" -- "$$MESH"); \
+	  echo "config: $$CONFIG"; }; \
+	$(SHAPEMILL) run $(OPTIONS) $(RUNNING) $(STORING)
 
 autoconfig: setup  ## Choose the settings that the config leaves at auto: up axis, contacts, grammar, hubs
 	$(RUN)

@@ -32,14 +32,17 @@ from pipeline.options import (
     ConfigOption,
     OnlyOption,
     OutOption,
+    RunOutOption,
     SeedOption,
     StallOption,
     WorkersOption,
+    WorkOption,
     load_dataset,
     run_or_exit,
 )
 from pipeline.package_groups import missing_group
 from pipeline.registry import find_stages, folders_with
+from pipeline.remote_output import open_remote_output, store_url
 from pipeline.stall_timeout import DEFAULT_STALL_MINUTES
 
 DATASET_COMMANDS = typer.Typer()
@@ -51,7 +54,8 @@ def run(
     context: typer.Context,
     stage: Annotated[str, typer.Argument(help="one stage; without, the whole dataset", show_default=False)] = "",
     config: ConfigOption = DEFAULT_CONFIG,
-    out: OutOption = DEFAULT_OUT,
+    out: RunOutOption = DEFAULT_OUT,
+    work: WorkOption = DEFAULT_OUT,
     workers: WorkersOption = DEFAULT_WORKERS,
     seed: SeedOption = None,
     shards: Annotated[str, typer.Option(help="part i of n, from 1, as one job of a job array: i/n")] = "1/1",
@@ -69,9 +73,12 @@ def run(
         close = nearest_word(stage, stages)
         hint = f"did you mean {close}?" if close else f"stages are {', '.join(stages)}"
         raise ConfigError(f"there is no stage {stage}; {hint}")
-    _, loaded, paths = load_dataset(context, config, out, seed)
+    url = store_url(out)
+    _, loaded, paths = load_dataset(context, config, work if url else out, seed)
     names = [stage] if stage else [name for name in stages if not stages[name].publishes_incomplete]
     options = {"part": part, "retries": retries, "only": only, "stall_minutes": stall_timeout, "cluster": cluster}
+    if url:
+        options["output"] = open_remote_output(url, loaded.name, paths)
     run_or_exit(names, stages, loaded, paths, workers, **options)
 
 

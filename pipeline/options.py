@@ -7,7 +7,6 @@ command of `shapemill`, and a Typer with a name becomes a group. Heavy imports b
 from __future__ import annotations
 
 import os
-import re
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -19,6 +18,7 @@ from pipeline.config import Config, load_config
 from pipeline.errors import ConfigError
 from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
+from pipeline.remote_output import store_url
 from pipeline.stage import Stage
 
 DATASETS = "Make a dataset"
@@ -34,16 +34,23 @@ DEFAULT_WORKERS = os.cpu_count() or 1
 
 def _local_folder(out: Path) -> Path:
     """Return an output folder. Raises ConfigError for a URL."""
-    if re.match(r"\w+:/", str(out)):
-        url = str(out).replace(":/", "://", 1)
+    url = store_url(out)
+    if url:
         raise ConfigError(
-            f"OUT={url}: datasets are made in a local folder; put the finished one there by `make publish`"
+            f"OUT={url}: only `make dataset` and its stages write to a store; name the local folder of their records, "
+            f"{DEFAULT_OUT} unless WORK named another"
         )
     return out
 
 
 ConfigOption = Annotated[Path, typer.Option("--config", help="config of the dataset, a YAML file")]
 OutOption = Annotated[Path, typer.Option("--out", callback=_local_folder, help="folder that datasets are written to")]
+RunOutOption = Annotated[
+    Path, typer.Option("--out", help="folder that datasets are written to, or a URL such as s3://bucket/prefix")
+]
+WorkOption = Annotated[
+    Path, typer.Option("--work", callback=_local_folder, help="folder of records and shards where --out is a URL")
+]
 WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="number of worker processes")]
 SeedOption = Annotated[int | None, typer.Option("--seed", min=0, help="seed in place of the config's")]
 OnlyOption = Annotated[str, typer.Option("--only", help="only the shards named so or so-..., and those they read")]

@@ -29,6 +29,7 @@ from pipeline.progress import closing_line, shard_count_text, stage_progress
 from pipeline.prune import prune_inputs
 from pipeline.rebuild_reasons import rebuild_reasons
 from pipeline.registry import upstream
+from pipeline.remote_output import RemoteOutput
 from pipeline.slices import WHOLE, Slice, locked
 from pipeline.stage import Shard, Stage
 from pipeline.stall_timeout import DEFAULT_STALL_MINUTES, StallWatch
@@ -66,6 +67,7 @@ class RunOptions:
     stall_minutes: minutes without progress after which a shard fails and its worker is killed; 0: never
     cluster: address of a scheduler whose workers make the shards
     target: in each stage that plans a shard of this name make it alone, with the shards of the stage that it reads
+    output: store that finished shards go to
     """
 
     part: Slice = WHOLE
@@ -74,6 +76,7 @@ class RunOptions:
     stall_minutes: float = DEFAULT_STALL_MINUTES
     cluster: str = ""
     target: str = ""
+    output: RemoteOutput | None = None
 
 
 def run_stage(
@@ -103,6 +106,7 @@ def run_stages(
     works here), and Fatal when everything had to stop. Complete files and their records stay for the next run.
     """
     names, results = list(names), dict[str, RunResult]()
+    output = RunOptions(**options).output
     shared = _Shared(names, stages, paths, Inventory(config, stages, paths), workers, RunOptions(**options).cluster)
     shared.inventory.code_of(names)  # before any worker starts
     try:
@@ -112,8 +116,14 @@ def run_stages(
                 break
     except BaseException:
         shared.stop_workers(kill=True)
+        if output:
+            output.finish(whole=False)
         raise
     shared.stop_workers(kill=False)
+    if output:
+        output.finish(
+            whole=all(shared.inventory.complete(name) for name in stages if not stages[name].publishes_incomplete)
+        )
     return results
 
 
@@ -383,6 +393,8 @@ class _Run:
             self._result.made += 1
             self._made.add(job.shard.name)
             self._inventory.accept(self._name, job.shard.name)
+            if self._options.output:
+                self._options.output.shard_done(self._name, job.shard.name)
         elif report.status == "corrupted":
             self._corrupted[report.corrupted] = report.message
         else:

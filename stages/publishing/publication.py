@@ -58,16 +58,28 @@ class Publication:
         Raises ConfigError for shards of another dataset.
         """
         kept = {file.path for file in self.files}
-        shards = [path for path in stored if path.startswith("data/") and path not in kept]
-        for path in shards:
-            if not re.fullmatch(rf"data/\w+/{re.escape(self.name)}-\w+-\w+-\d+\.tar", path):
-                raise ConfigError(f"{destination} holds {path}, which is not of {self.name}: publish it elsewhere")
-        return shards
+        return [path for path in shards_of(self.name, stored, destination) if path not in kept]
 
 
-def read_publication(folder: Path) -> Publication:
-    """Return what is published of a dataset. Raises ConfigError unless it was verified without faults."""
-    require_verification(folder)
+def shards_of(name: str, stored: Iterable[str], destination: str) -> list[str]:
+    """Return the shards of a dataset among the paths that are at a destination.
+
+    Raises ConfigError for shards of another dataset.
+    """
+    shards = [path for path in stored if path.startswith("data/")]
+    for path in shards:
+        if not re.fullmatch(rf"data/\w+/{re.escape(name)}-\w+-\w+-\d+\.tar", path):
+            raise ConfigError(f"{destination} holds {path}, which is not of {name}: publish it elsewhere")
+    return shards
+
+
+def read_publication(folder: Path, verified: bool = True) -> Publication:
+    """Return what is published of a dataset.
+
+    verified: raise ConfigError unless it was verified without faults
+    """
+    if verified:
+        require_verification(folder)
     manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
     lines = (folder / CHECKSUMS).read_text(encoding="utf-8").splitlines()
     digests = {path: digest for digest, _, path in (line.partition("  ") for line in lines)}

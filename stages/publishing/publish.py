@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from pipeline.display import counting
 from pipeline.errors import Fatal
 from stages.publishing.hub import Hub
 from stages.publishing.publication import read_publication
-from stages.publishing.store import Store
+from stages.publishing.store import Store, failed_requests
 
 
 def publish_dataset(folder: Path, destination: str, dry_run: bool) -> None:
@@ -35,12 +34,6 @@ def publish_dataset(folder: Path, destination: str, dry_run: bool) -> None:
             return
         with counting("publish", total, "bytes") as show:
             place.send(files, show)
-    except _failed_requests() as error:
+    except failed_requests() as error:
         raise Fatal(f"{destination}: {error}") from error
     print(f'sent {len(files):,} files of {total:,} bytes; open it with stages.api.open_dataset("{destination}")')
-
-
-def _failed_requests() -> tuple[type[Exception], ...]:
-    """Return what the clients of stores that are in use raise for a failed request."""
-    classes = {"botocore.exceptions": "BotoCoreError", "httpx2": "HTTPError"}
-    return (OSError, *(getattr(sys.modules[module], name) for module, name in classes.items() if module in sys.modules))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -61,7 +62,7 @@ class Store:
         for target, file in self._targets.items():
             if file in changed or (changes and target == manifest):
                 file.check()
-                self._put(target, file)
+                put_file(self._files, target, file)
                 sent += file.size
                 show(sent)
 
@@ -70,21 +71,29 @@ class Store:
         facts = self._stored.get(target)
         if facts is None or facts["size"] != file.size:
             return False
-        if self._keeps_metadata:
+        if _keeps_metadata(self._files):
             stated = self._files.metadata(target).get("sha256")
             if stated:
                 return bool(stated == file.sha256)
         with self._files.open(target, "rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest() == file.sha256
 
-    def _put(self, target: str, file: PublishedFile) -> None:
-        if self._keeps_metadata:
-            self._files.put_file(str(file.source), target, Metadata={"sha256": file.sha256})
-            return
-        if "file" in self._files.protocol:  # stores have no folders, and s3fs would make a bucket of a wrong name
-            self._files.makedirs(target.rpartition("/")[0], exist_ok=True)
-        self._files.put_file(str(file.source), target)
 
-    @property
-    def _keeps_metadata(self) -> bool:
-        return "s3" in self._files.protocol
+def put_file(files: Any, target: str, file: PublishedFile) -> None:
+    """Send a file to an fsspec file system, with its sha256 where that keeps metadata."""
+    if _keeps_metadata(files):
+        files.put_file(str(file.source), target, Metadata={"sha256": file.sha256})
+        return
+    if "file" in files.protocol:  # stores have no folders, and s3fs would make a bucket of a wrong name
+        files.makedirs(target.rpartition("/")[0], exist_ok=True)
+    files.put_file(str(file.source), target)
+
+
+def failed_requests() -> tuple[type[Exception], ...]:
+    """Return what the clients of stores that are in use raise for a failed request."""
+    classes = {"botocore.exceptions": "BotoCoreError", "httpx2": "HTTPError"}
+    return (OSError, *(getattr(sys.modules[module], name) for module, name in classes.items() if module in sys.modules))
+
+
+def _keeps_metadata(files: Any) -> bool:
+    return "s3" in files.protocol

@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 VARIABLES = (
     "CONFIG",
     "OUT",
+    "WORK",
     "WORKERS",
     "SEED",
     "STALL_TIMEOUT",
@@ -130,11 +131,10 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     assert all(len(row) > 2 for row in rows.values()), "each is explained"
     values = {name: rows[name][1] for name in VARIABLES}
     assert values == {
-        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "STALL_TIMEOUT": "-",
-        "CLUSTER": "-", "MESH": "-", "PROGRAM": "-", "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-",
-        "PAPER": "-", "SCALE": "minutes", "SAMPLES": "100", "FORMAT": "-", "KEY": "-", "DEST": "-", "DRY_RUN": "-",
-        "SHARD": "-", "ROUNDS": "20",
-        "VERSION": "-",
+        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORK": "-", "WORKERS": "3", "SEED": "-",
+        "STALL_TIMEOUT": "-", "CLUSTER": "-", "MESH": "-", "PROGRAM": "-", "INPUT": "-", "UP": "-", "MODEL": "-",
+        "TABLE": "-", "PAPER": "-", "SCALE": "minutes", "SAMPLES": "100", "FORMAT": "-", "KEY": "-", "DEST": "-",
+        "DRY_RUN": "-", "SHARD": "-", "ROUNDS": "20", "VERSION": "-",
     }  # fmt: skip
 
 
@@ -147,7 +147,7 @@ def test_every_target_gets_every_value_unchanged(tmp_path: Path) -> None:
     reached = calls(*targets, *arguments)
     assert len(reached) == 22 + len(targets[1:]) + 1, "22 stages; inspect looks at a program and a model"
     assert all(any(said in argument for argument in call) for call in reached)
-    assert sum(call.count(said) for call in reached if call[2] == "run") == 22 * 6
+    assert sum(call.count(said) for call in reached if call[2] == "run") == 22 * 7
     assert make("help", *arguments).stdout.count(said) == len(VARIABLES)
     assert not list(tmp_path.iterdir())
 

@@ -94,11 +94,11 @@ def test_file_corrupted_since_verification_is_named_and_nothing_opens(dataset: P
 
 
 @pytest.mark.parametrize("command", ["status", "doctor"])
-def test_output_in_a_store_is_refused_with_the_remedy(command: str) -> None:
+def test_command_that_reads_records_is_refused_a_store_with_the_remedy(command: str) -> None:
     code, text = shapemill(command, "--out", "s3://bucket/prefix")
     assert code == 2
-    assert "OUT=s3://bucket/prefix: datasets are made in a local folder" in text
-    assert "put the finished one there by `make publish`" in text
+    assert "OUT=s3://bucket/prefix: only `make dataset` and its stages write to a store" in text
+    assert "name the local folder of their records, datasets unless WORK named another" in text
 
 
 def test_publishing_to_s3_goes_on_after_a_kill(tmp_path: Path, bucket: str) -> None:
