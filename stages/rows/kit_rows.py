@@ -52,7 +52,7 @@ def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
     for exemplar in kit.exemplars:
         layout = layout_of(kit, exemplar)
         circles = [_turning(kit, exemplar.name, layout, circle) for circle in find_circles(layout)]
-        rows = [_described(kit, exemplar.name, row) for row in _main_rows(layout) if is_visible(layout, row)]
+        rows = [_described(kit, exemplar.name, row) for row in _main_rows(layout)]
         along_bays = [row for row in find_rows(layout, bays_of(layout), may_stretch=True) if is_visible(layout, row)]
         bays = [_described_bay(kit, exemplar.name, layout, row) for row in along_bays]
         found += dict.fromkeys([*circles, *rows, *bays])
@@ -60,8 +60,9 @@ def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
 
 
 def _main_rows(layout: Layout) -> list[Row]:
-    """Return one row for each step, that with most places, longest first; without steps of several periods."""
-    order = sorted(find_rows(layout, may_stretch=True), key=lambda row: (-row.count, -len(row.insertions), row.copied))
+    """Return one visible row for each step, that with most places, longest first; without steps of several periods."""
+    visible = [row for row in find_rows(layout, may_stretch=True) if is_visible(layout, row)]
+    order = sorted(visible, key=lambda row: (-row.count, -len(row.insertions), row.copied))
     main: list[Row] = []
     for row in order:
         ratios = [np.linalg.norm(row.shift) / np.linalg.norm(other.shift) for other in main if _same_way(row, other)]

@@ -29,7 +29,7 @@ LENGTHENING, CUTTING, STRETCHING = range(3)
 """What happens to parts that hold a row, the best first."""
 MIN_STRETCHING_ROW = 3
 """Parts of a row from which a part that holds it is stretched; two handles do not tell how many drawers there are."""
-MAX_STRETCHING_PLACES = 4
+MAX_STRETCHING_PLACES = 2
 """Places of a row that are tried where parts are stretched: a try moves all vertices and looks for contacts."""
 
 
@@ -106,8 +106,13 @@ def find_rows(
 
 def is_visible(exemplar: Layout, row: Row) -> bool:
     """Return whether the parts of a row have at least MIN_AREA_SHARE of the surface of an exemplar."""
-    period = sum(float(exemplar.areas[exemplar.types == kind].mean()) for kind in row.copied)
-    return row.count * period >= MIN_AREA_SHARE * float(exemplar.areas.sum())
+    return _is_visible(exemplar, row.copied, row.count)
+
+
+def _is_visible(exemplar: Layout, copied: Sequence[int], count: int) -> bool:
+    """Return whether `count` periods that copy parts of these types have that share of the surface of an exemplar."""
+    period = sum(float(exemplar.areas[exemplar.types == kind].mean()) for kind in copied)
+    return count * period >= MIN_AREA_SHARE * float(exemplar.areas.sum())
 
 
 def _bay_ends_along(
@@ -196,6 +201,8 @@ def _rows_along(
         # A cut leaves vertices, after which a part may no longer repeat itself elsewhere.
         cost = min(place.cost for place in places)
         best = [place for place in places if place.cost == cost]
+        if cost == STRETCHING and not _is_visible(layout, copied, count):
+            continue
         if cost == STRETCHING:
             best = list(_tried(layout, normal, step, best))
         insertions = np.array([place.at for place in best if place.may_insert])

@@ -68,6 +68,13 @@ class PartMesh:
         return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
 
     @cached_property
+    def box_tree(self) -> tuple[FloatArray, FloatArray, np.ndarray]:
+        """The tree of boxes around the triangles, as of `stages.shape.geometry.mesh_pairs`."""
+        from stages.shape.geometry.mesh_pairs import build_tree
+
+        return build_tree(self.vertices, self.faces)
+
+    @cached_property
     def area(self) -> float:
         """Area of the surface, in squared units."""
         return float(triangle_areas(self.vertices[self.faces]).sum())

@@ -35,26 +35,19 @@ class ContactTest:
     def __init__(self, types: Sequence[PartMesh], tolerance: float) -> None:
         self.types = tuple(types)
         self.tolerance = tolerance
-        self._meshes: dict[int, Mesh] = {}
 
     @cached_property
     def diagonals(self) -> FloatArray:
         """Diagonal of each type, float64 (types,)."""
         return np.array([kind.diagonal for kind in self.types])
 
-    def mesh(self, index: int) -> Mesh:
-        """Return the box tree of a type (`stages.shape.geometry.mesh_pairs`), built at first use."""
-        from stages.shape.geometry.mesh_pairs import build_tree
-
-        if index not in self._meshes:
-            self._meshes[index] = build_tree(self.types[index].vertices, self.types[index].faces)
-        return self._meshes[index]
-
     def touches(self, a: int, b: int, pose: FloatArray, tolerance: float | None = None) -> bool:
         """Return whether a part of type `b` at `pose` (4, 4) in coordinates of a part of type `a` touches that part."""
         from stages.shape.geometry.mesh_pairs import first_contact
 
-        return first_contact(self.mesh(a), self.mesh(b), pose, self.tolerance if tolerance is None else tolerance)
+        return first_contact(
+            self.types[a].box_tree, self.types[b].box_tree, pose, self.tolerance if tolerance is None else tolerance
+        )
 
     def area(self, a: int, b: int, pose: FloatArray) -> FloatArray:
         """Return points (q, 3) that span the touching area, in coordinates of the part of type `a`; empty without
@@ -67,9 +60,9 @@ class ContactTest:
         """Return points, areas and crossings of `contact_patches`, all empty without contact."""
         from stages.shape.geometry.mesh_pairs import contact_patches, near_pairs
 
-        pairs = near_pairs(self.mesh(a), self.mesh(b), pose, self.tolerance)
+        pairs = near_pairs(self.types[a].box_tree, self.types[b].box_tree, pose, self.tolerance)
         patches: tuple[FloatArray, FloatArray, np.ndarray] = contact_patches(
-            self.mesh(a)[0], self.mesh(b)[0], pairs, pose, self.tolerance
+            self.types[a].box_tree[0], self.types[b].box_tree[0], pairs, pose, self.tolerance
         )
         return patches
 

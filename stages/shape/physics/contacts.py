@@ -56,7 +56,6 @@ class PairContacts:
     def __init__(self, meshes: Sequence[PartMesh], solids: MeshSolids) -> None:
         self.meshes = tuple(meshes)
         self.solids = solids
-        self._trees: dict[int, Any] = {}
         self._answers: dict[tuple[Any, ...], Any] = {}
         self._diagonals = np.array([mesh.diagonal for mesh in self.meshes])
 
@@ -131,13 +130,6 @@ class PairContacts:
             locked,
         )
 
-    def _tree(self, mesh: int) -> Any:
-        from stages.shape.geometry.mesh_pairs import build_tree
-
-        if mesh not in self._trees:
-            self._trees[mesh] = build_tree(self.meshes[mesh].vertices, self.meshes[mesh].faces)
-        return self._trees[mesh]
-
     def _questions(self, placed: PlacedParts, pairs: IntArray) -> Iterator[_Question]:
         """Yield the question of each pair (m, 2)."""
         kinds = placed.types[pairs]
@@ -160,7 +152,9 @@ class PairContacts:
         asked = ("near", question.key, distance)
         if asked in self._answers:
             return bool(self._answers[asked])
-        near = first_contact(self._tree(question.a), self._tree(question.b), question.pose, distance)
+        near = first_contact(
+            self.meshes[question.a].box_tree, self.meshes[question.b].box_tree, question.pose, distance
+        )
         if not near:
             inner = (placed.spans[i] - placed.spans[j]) * [[1], [-1]]
             near = bool((inner >= 0).all() or (inner <= 0).all()) and self._overlap(question)[0] > 0
@@ -181,7 +175,7 @@ class PairContacts:
         high = np.minimum(self.meshes[a].bounds[1], moved.max(axis=0))
         answer = (0.0, 0.0)
         if (high > low).all():
-            answer = overlap(self._tree(a)[0], self._tree(b)[0], pose, low, high)
+            answer = overlap(self.meshes[a].box_tree[0], self.meshes[b].box_tree[0], pose, low, high)
         remembered: tuple[float, float] = self._remember(asked, answer)
         return remembered
 
@@ -200,8 +194,8 @@ class PairContacts:
         if asked in self._answers:
             cached: tuple[bool, FloatArray, FloatArray] = self._answers[asked]
             return cached
-        pairs = near_pairs(self._tree(a), self._tree(b), pose, tolerance)
-        corners_a, corners_b = self._tree(a)[0], self._tree(b)[0]
+        pairs = near_pairs(self.meshes[a].box_tree, self.meshes[b].box_tree, pose, tolerance)
+        corners_a, corners_b = self.meshes[a].box_tree[0], self.meshes[b].box_tree[0]
         closed = bool(self.solids.closed[a] and self.solids.closed[b])
         points, normals = facing_polygons(corners_a, corners_b, pairs, pose, tolerance, closed)
         if not closed:
