@@ -31,7 +31,7 @@ REQUIRED_KEYWORDS = {"torch.load": "weights_only=True"} | {
 CLOCKS = {"time.time", "time.time_ns", "datetime.now", "datetime.utcnow", "datetime.today", "date.today"}
 
 HOOKS = {"build", "new_task", "new_model", "prepare", "batches", "batch_of", "main", "open_remote_output"}
-"""Functions that every program of the library, kind of model and process has, and one that the engine asks a room for."""
+"""Functions that every program of the library, kind of model and process has, or that the engine asks a room for."""
 
 FRONT_DOORS = {ROOT / "stages" / "api.py", ROOT / "stages" / "package" / "standalone_verifier.py"}
 """The facade, whose functions are called like those behind it, and a program that imports nothing of ours."""
