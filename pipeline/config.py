@@ -239,9 +239,9 @@ def explain_mistakes(
         yield detail["loc"], _explain(schema, detail, section)
 
 
-def _page_hint(section: str) -> str:
+def _page_hint(section: str, shows: str = "its keys are") -> str:
     page = SECTION_PAGES / f"{section}.md"
-    return f"; its keys are in {page}" if (Path(__file__).parents[1] / page).is_file() else ""
+    return f"; {shows} in {page}" if (Path(__file__).parents[1] / page).is_file() else ""
 
 
 def _shown(text: str) -> str:
@@ -269,7 +269,7 @@ def _explain(schema: Mapping[str, Any], error: Mapping[str, Any], section: str) 
         return f"{key} {'is missing' if given is None else f'is {given}'}; it is one of {', '.join(kinds)}"
     suffix = f" ({field['description']})" if field.get("description") else ""
     if kind == "missing":
-        return f"is missing{suffix}{_page_hint(section).replace('its keys are', 'an example is')}"
+        return f"is missing{suffix}{_page_hint(section, 'an example is')}"
     if kind == "value_error":
         return str(error["ctx"]["error"])
     given = _shown(json.dumps(error["input"], ensure_ascii=False, default=str))

@@ -54,9 +54,10 @@ _ENVIRONMENT = {
 warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given to the executor")
 
 # Processes of their own remove the semaphores of a killed run, and would warn of a leak in the terminal.
-os.environ["PYTHONWARNINGS"] = ",".join(
-    filter(None, [os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker:UserWarning"])
-)
+_NO_LEAKS = "ignore:resource_tracker:UserWarning"
+_STATED = os.environ.get("PYTHONWARNINGS", "")
+if _NO_LEAKS not in _STATED:  # workers of workers have it already
+    os.environ["PYTHONWARNINGS"] = f"{_STATED},{_NO_LEAKS}" if _STATED else _NO_LEAKS
 
 
 def _start_worker(parent: int, output: Path) -> None:

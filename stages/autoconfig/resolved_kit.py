@@ -86,8 +86,8 @@ def use_sections_if_empty(first: ResolvedKit, limits: ReadLimits, tries: int, re
     and a trial search found nothing in them. Pieces that have rows or bays stay, since these become longer and shorter.
 
     Sections are taken if they yield enough under the strictest rules, or under other rules what a longer search makes
-    a dataset of: the first hit of slabs is rare, since all that crosses a section must fit at the same time. Otherwise
-    the models stay as they were read first.
+    a dataset of: the first hit of slabs is rare, since all that crosses a section must fit at the same time. Otherwise,
+    and where the first hits look like the exemplar, the models stay as they were read first.
     """
     trial = first.resolution.trial
     by_author = any(

@@ -128,8 +128,8 @@ class LayoutDraws:
             counted = self.refused if layout is self.exemplar else Counter[str]()
             rows = find_rows(layout, self.steps, lambda reason: counted.update([reason]), may_stretch=self._is_alone)
             if self._is_alone:
-                counted.update([TOO_SMALL] * sum(not is_visible(self.exemplar, row) for row in rows))
-                rows = [row for row in rows if is_visible(self.exemplar, row)]
+                counted.update([TOO_SMALL] * sum(not is_visible(self.exemplar, row.copied, row.count) for row in rows))
+                rows = [row for row in rows if is_visible(self.exemplar, row.copied, row.count)]
             self._rows[key] = rows
         return self._rows[key]
 

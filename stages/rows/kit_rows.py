@@ -53,7 +53,11 @@ def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
         layout = layout_of(kit, exemplar)
         circles = [_turning(kit, exemplar.name, layout, circle) for circle in find_circles(layout)]
         rows = [_described(kit, exemplar.name, row) for row in _main_rows(layout)]
-        along_bays = [row for row in find_rows(layout, bays_of(layout), may_stretch=True) if is_visible(layout, row)]
+        along_bays = [
+            row
+            for row in find_rows(layout, bays_of(layout), may_stretch=True)
+            if is_visible(layout, row.copied, row.count)
+        ]
         bays = [_described_bay(kit, exemplar.name, layout, row) for row in along_bays]
         found += dict.fromkeys([*circles, *rows, *bays])
     return tuple(found)
@@ -61,7 +65,7 @@ def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
 
 def _main_rows(layout: Layout) -> list[Row]:
     """Return one visible row for each step, that with most places, longest first; without steps of several periods."""
-    visible = [row for row in find_rows(layout, may_stretch=True) if is_visible(layout, row)]
+    visible = [row for row in find_rows(layout, may_stretch=True) if is_visible(layout, row.copied, row.count)]
     order = sorted(visible, key=lambda row: (-row.count, -len(row.insertions), row.copied))
     main: list[Row] = []
     for row in order:

@@ -104,13 +104,10 @@ def find_rows(
     return [row for row in rows if not any(_splits_units(layout, row, whole) for whole in rows)]
 
 
-def is_visible(exemplar: Layout, row: Row) -> bool:
-    """Return whether the parts of a row have at least MIN_AREA_SHARE of the surface of an exemplar."""
-    return _is_visible(exemplar, row.copied, row.count)
-
-
-def _is_visible(exemplar: Layout, copied: Sequence[int], count: int) -> bool:
-    """Return whether `count` periods that copy parts of these types have that share of the surface of an exemplar."""
+def is_visible(exemplar: Layout, copied: Sequence[int], count: int) -> bool:
+    """Return whether `count` periods that copy parts of these types have at least MIN_AREA_SHARE of the surface of an
+    exemplar.
+    """
     period = sum(float(exemplar.areas[exemplar.types == kind].mean()) for kind in copied)
     return count * period >= MIN_AREA_SHARE * float(exemplar.areas.sum())
 
@@ -201,7 +198,7 @@ def _rows_along(
         # A cut leaves vertices, after which a part may no longer repeat itself elsewhere.
         cost = min(place.cost for place in places)
         best = [place for place in places if place.cost == cost]
-        if cost == STRETCHING and not _is_visible(layout, copied, count):
+        if cost == STRETCHING and not is_visible(layout, copied, count):
             continue
         if cost == STRETCHING:
             best = list(_tried(layout, normal, step, best))

@@ -24,7 +24,7 @@ MAX_SECTION_DIFFERENCE = 0.01
 """Largest relative difference of the lengths of two equal sections."""
 
 MAX_STRETCH = 1.6
-"""Largest factor by which a part is stretched, and one over the smallest."""
+"""Largest factor by which one change of a row stretches a part, and one over the smallest."""
 
 
 @dataclass(frozen=True)

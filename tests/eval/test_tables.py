@@ -34,20 +34,20 @@ def test_every_module_is_a_table_with_question_and_requirements() -> None:
 
 
 def test_unreadable_tables_are_reported_and_others_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "stray").mkdir()
-    (tmp_path / "stray" / "__init__.py").touch()
+    (tmp_path / "other_tables").mkdir()
+    (tmp_path / "other_tables" / "__init__.py").touch()
     faulty = {"unnamed": "import math\nmath.nothing\n", "unparsed": "import math\n\ndef (\n", "wrong": "TABLE = 3\n"}
     for name, text in faulty.items():
-        (tmp_path / "stray" / f"{name}.py").write_text(text, encoding="utf-8")
-    (tmp_path / "stray" / "sound.py").write_text("from eval.tables.physical import TABLE\n", encoding="utf-8")
+        (tmp_path / "other_tables" / f"{name}.py").write_text(text, encoding="utf-8")
+    (tmp_path / "other_tables" / "sound.py").write_text("from eval.tables.physical import TABLE\n", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
-    tables, faults = read_tables("stray")
+    tables, faults = read_tables("other_tables")
     assert list(tables) == ["sound"]
     assert list(faults) == list(faulty)
-    assert "stray/wrong.py must hold TABLE" in faults["wrong"]
-    assert "stray/unparsed.py:3: SyntaxError: " in faults["unparsed"]
-    assert "stray/unnamed.py:2: AttributeError: " in faults["unnamed"]
-    for name in ("stray", *(f"stray.{name}" for name in (*faulty, "sound"))):
+    assert "other_tables/wrong.py must hold TABLE" in faults["wrong"]
+    assert "other_tables/unparsed.py:3: SyntaxError: " in faults["unparsed"]
+    assert "other_tables/unnamed.py:2: AttributeError: " in faults["unnamed"]
+    for name in ("other_tables", *(f"other_tables.{name}" for name in (*faulty, "sound"))):
         sys.modules.pop(name, None)
 
 
