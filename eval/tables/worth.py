@@ -14,14 +14,14 @@ from eval.engine.evaluation import Evaluation, TableResult
 from eval.engine.requirements import FINISHED_DATASET
 from eval.engine.results_cache import TableSection, cached_sections
 from eval.engine.table import Table
-from eval.worth.augmentation import Augmentation
 from pipeline.config import StrictModel
 from pipeline.errors import ConfigError
 from stages.exemplars.settings import Segmentation
 from stages.package.reader import Dataset
+from stages.training.point_encoder.settings import Augmentation
 
 if TYPE_CHECKING:
-    from eval.worth.labelled_clouds import LabelledClouds
+    from stages.training.point_encoder.clouds import LabelledClouds
 
 SECONDS_PER_STEP = 0.12
 NETWORKS_OF_A_SEED = 5
@@ -101,8 +101,8 @@ def _folders(run: DatasetRun, options: WorthOptions) -> list[Path]:
 
 def _training_clouds(folder: Path, shapes: int, seed: int) -> LabelledClouds:
     from eval.worth.labelled_clouds import labelled_dataset_clouds
-    from eval.worth.real_sets import LEARNT_POINTS
     from pipeline.randomness import decision_rng
+    from stages.training.point_encoder.clouds import LEARNT_POINTS
 
     return labelled_dataset_clouds(folder, shapes, LEARNT_POINTS, decision_rng(seed, "worth", "dataset", folder.name))
 

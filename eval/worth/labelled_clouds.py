@@ -1,10 +1,11 @@
-"""Clouds of shapes with the part of each point: of finished datasets, and of real shapes."""
+"""Clouds with the part of each point: of finished datasets, and of real shapes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -22,38 +23,9 @@ from stages.shape.geometry.pose import transform_points
 from stages.shapeassembly.extraction.readers.child_process import read_grass_in_child
 from stages.shapeassembly.shape import shape_of_program_text
 from stages.shapeassembly.sources import program_texts
-from stages.training.recovery.clouds import frame_of, subsample
+from stages.training.point_encoder.clouds import LabelledClouds
 
 Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-
-
-@dataclass(frozen=True)
-class LabelledClouds:
-    """Clouds of n shapes, y up, each centred, with a bounding box of diagonal 1.
-
-    points: float32 (n, k, 3).
-    parts: the part of each point, int32 (n, k).
-    """
-
-    points: npt.NDArray[np.float32]
-    parts: npt.NDArray[np.int32]
-
-    def __len__(self) -> int:
-        return len(self.points)
-
-    def chosen(self, shapes: npt.NDArray[np.integer]) -> LabelledClouds:
-        """Return the clouds of these indices."""
-        return LabelledClouds(self.points[shapes], self.parts[shapes])
-
-    def divided(self, tested: int, points: int) -> tuple[LabelledClouds, LabelledClouds]:
-        """Return the first `tested` clouds, with their first `points` points, and the others."""
-        first = LabelledClouds(self.points[:tested, :points], self.parts[:tested, :points])
-        return first, LabelledClouds(self.points[tested:], self.parts[tested:])
-
-
-def join_clouds(sets: Sequence[LabelledClouds]) -> LabelledClouds:
-    """Join sets of clouds with equally many points."""
-    return LabelledClouds(np.concatenate([s.points for s in sets]), np.concatenate([s.parts for s in sets]))
 
 
 def labelled_dataset_clouds(folder: Path, shapes: int, points: int, rng: np.random.Generator) -> LabelledClouds:
@@ -66,7 +38,7 @@ def labelled_dataset_clouds(folder: Path, shapes: int, points: int, rng: np.rand
     chosen = set(rng.permutation(total)[:shapes].tolist())
     samples = (sample for index, sample in enumerate(dataset.samples("train")) if index in chosen)
     try:
-        return _stacked(((sample.points, sample.instances) for sample in samples), points, rng)
+        return LabelledClouds.of(((sample.points, sample.instances) for sample in samples), points, rng)
     except KeyError as error:
         raise ConfigError(f"{folder}: {error.args[0]}; leave out `points: false` in its config") from error
 
@@ -82,7 +54,7 @@ def program_clouds(
     names = _texts(archive, f"data_splits/{category}")[f"data_splits/{category}/{split}.txt"].split()
     chosen = [names[index] for index in rng.permutation(len(names))[:shapes].tolist()]
     clouds = (sample_shape(shape_of_program_text(texts[f"data/{category}/{name}.txt"]), points, rng) for name in chosen)
-    return _stacked(((cloud.points, cloud.instances) for cloud in clouds), points, rng)
+    return LabelledClouds.of(((cloud.points, cloud.instances) for cloud in clouds), points, rng)
 
 
 @cache
@@ -106,7 +78,7 @@ def grass_clouds(path: Path, shapes: int, points: int, rng: np.random.Generator)
             cloud = sample_shape(shape, points, rng)
             yield cloud.points, cloud.instances
 
-    return _stacked(clouds(), points, rng, shapes)
+    return LabelledClouds.of(islice(clouds(), shapes), points, rng)
 
 
 @dataclass(frozen=True)
@@ -149,26 +121,4 @@ def model_clouds(
                 continue
             yield cloud @ Z_UP_TO_Y_UP.T if model.up == "z" else cloud, part_of_face[hit]
 
-    return _stacked(clouds(), points, rng, shapes), SkippedModels(unreadable, without_parts)
-
-
-def _stacked(
-    clouds: Iterable[tuple[FloatArray, npt.NDArray[np.integer]]],
-    points: int,
-    rng: np.random.Generator,
-    shapes: int | None = None,
-) -> LabelledClouds:
-    """Return the first `shapes` clouds, or all, with `points` points each, centred and of diagonal 1."""
-    stacked_points, stacked_parts = [], []
-    for cloud, parts in clouds:
-        drawn = subsample(np.column_stack([cloud, parts]).astype(np.float64), points, rng)
-        frame = frame_of(drawn[:, :3])
-        normalized = frame.normalized(drawn[:, :3])
-        diagonal = float(np.linalg.norm(np.ptp(normalized, axis=0))) or 1.0
-        stacked_points.append((normalized / diagonal).astype(np.float32))
-        stacked_parts.append(drawn[:, 3].astype(np.int32))
-        if shapes is not None and len(stacked_points) == shapes:
-            break
-    if not stacked_points:
-        return LabelledClouds(np.empty((0, points, 3), np.float32), np.empty((0, points), np.int32))
-    return LabelledClouds(np.stack(stacked_points), np.stack(stacked_parts))
+    return LabelledClouds.of(islice(clouds(), shapes), points, rng), SkippedModels(unreadable, without_parts)

@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pipeline.errors import ConfigError
 from pipeline.randomness import decision_rng
 from stages.exemplars.settings import Segmentation
-
-if TYPE_CHECKING:
-    from eval.worth.labelled_clouds import LabelledClouds
+from stages.training.point_encoder.clouds import LEARNT_POINTS, LabelledClouds
 
 CATEGORIES = {"chair": "chairs", "table": "tables", "storage": "storage furniture"}
 """Of the published programs, and what their shapes are called."""
 PROGRAMS, GRASS = Path("shapeassembly/programs.tar.xz"), Path("partgraphs/grass_chairs.npz")
 """Below the folder of shared material."""
 MIN_MODELS = 2
-TESTED_POINTS, LEARNT_POINTS = 1024, 2048
-"""Points of a cloud; training draws from the latter at each step."""
+TESTED_POINTS = 1024
+"""Points of a tested cloud."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +55,11 @@ def real_sets(
 
 def real_training_clouds(archive: Path, without: str, shapes: int, seed: int) -> LabelledClouds:
     """Return clouds of `shapes` published training programs, equally many of each category but one."""
-    from eval.worth.labelled_clouds import join_clouds, program_clouds
+    from eval.worth.labelled_clouds import program_clouds
 
     others = [category for category in CATEGORIES if category != without]
     rng = decision_rng(seed, "worth", "real", without)
-    return join_clouds(
+    return LabelledClouds.joined(
         [program_clouds(archive, other, "train", shapes // len(others), LEARNT_POINTS, rng) for other in others]
     )
 

@@ -9,14 +9,15 @@ from functools import cache
 import numpy as np
 
 from eval.engine.table import Cell, Table
-from eval.worth.augmentation import Augmentation
-from eval.worth.labelled_clouds import LabelledClouds
-from eval.worth.learning import new_encoder, precision_of_distance, precision_of_encoder, trained_encoder
-from eval.worth.network import MAX_PAIR_DISTANCE, PointEncoder
+from eval.worth.learning import precision_of_distance, precision_of_encoder, trained_encoder
 from eval.worth.real_sets import RealSet
 from pipeline.randomness import decision_rng
 from stages.shape.arrays import FloatArray
 from stages.training.loop import set_deterministic
+from stages.training.point_encoder.clouds import LabelledClouds
+from stages.training.point_encoder.network import MAX_PAIR_DISTANCE, PointEncoder
+from stages.training.point_encoder.settings import Augmentation
+from stages.training.point_encoder.training import new_model
 
 NORMAL_95 = 1.96
 """Standard deviations of a normal distribution to each side that hold 95 %."""
@@ -65,7 +66,7 @@ def network_tables(
     clouds = None if read is None else read()
     results: dict[tuple[int, str], list[FloatArray]] = {}
     for repetition in range(training.repetitions):
-        encoder = new_encoder(int(decision_rng(training.seed, "worth", "weights", repetition).integers(2**31)))
+        encoder = new_model(int(decision_rng(training.seed, "worth", "weights", repetition).integers(2**31)))
         if clouds is not None:
             rng = decision_rng(training.seed, "worth", "training", name, repetition)
             encoder = trained_encoder(encoder, clouds, training.steps, rng, training.ways)

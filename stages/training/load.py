@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from stages.training.cuboid_rnn.trained import TrainedCuboidRnn
     from stages.training.edge_categories.trained import TrainedEdgeCategories
     from stages.training.part_graph_vae.trained import TrainedPartGraphVae
+    from stages.training.point_encoder.trained import TrainedPointEncoder
     from stages.training.program_lm.trained import TrainedProgramLm
     from stages.training.program_vae.trained import TrainedProgramVae
     from stages.training.recovery.trained import TrainedRecovery
@@ -23,11 +24,12 @@ if TYPE_CHECKING:
     ProgramSampler = TrainedProgramVae | TrainedProgramLm
     TrainedModel = (
         TrainedStringVae | TrainedEdgeCategories | ProgramSampler | TrainedCuboidRnn | TrainedPartGraphVae
-        | TrainedRecovery
+        | TrainedPointEncoder | TrainedRecovery
     )  # fmt: skip
 
 KINDS = (
-    "string_vae", "edge_categories", "program_vae", "program_lm", "cuboid_rnn", "part_graph_vae", "recovery"
+    "string_vae", "edge_categories", "program_vae", "program_lm", "cuboid_rnn", "part_graph_vae", "point_encoder",
+    "recovery"
 )  # fmt: skip
 
 

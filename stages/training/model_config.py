@@ -8,8 +8,8 @@ from pydantic import Field
 
 from pipeline.config import StrictModel
 
-Subject = Literal["kit", "program"]
-"""What a model learns from: the samples of a kit, or a program."""
+Subject = Literal["kit", "program", "collection"]
+"""What a model learns from: the samples of a kit, a program, or all samples of the dataset."""
 
 LearningSource = Literal["strings", "shapes", "programs"]
 """What a model of a kit learns from: the strings of stage `strings`, the shapes themselves, or the texts of
@@ -28,7 +28,7 @@ class ModelConfig(StrictModel):
         pattern=r"^[a-z][a-z0-9]*(_[a-z0-9]+)*$",
         max_length=32,
         description="name of the model; its folder is `OUT/<dataset>-models/<name>-<subject>-<seed>`, where the "
-        "subject is a kit or a program; lower-case letters, digits and single underscores",
+        "subject is a kit, a program or the dataset; lower-case letters, digits and single underscores",
     )
     seeds: int = Field(1, ge=1, le=100, description="trainings from different initial weights; unit: models")
     learning_rate: float = Field(1e-3, gt=0, le=1, description="initial rate of Adam; it falls linearly to a twentieth")

@@ -40,7 +40,7 @@ def model_name(config: ModelConfig, subject: str, seed: int) -> str:
 
 
 def subject_fields(params: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a shard's model learns from: `{"kit": name}` or `{"program": name}`."""
+    """Return what a shard's model learns from: `{"kit": name}`, `{"program": name}` or `{"collection": name}`."""
     return {key: params[key] for key in get_args(Subject) if key in params}
 
 

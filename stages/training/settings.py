@@ -10,6 +10,7 @@ from pipeline.config import StrictModel
 from stages.training.cuboid_rnn.settings import CuboidRnnConfig
 from stages.training.edge_categories.settings import EdgeCategoriesConfig
 from stages.training.part_graph_vae.settings import PartGraphVaeConfig
+from stages.training.point_encoder.settings import PointEncoderConfig
 from stages.training.program_lm.settings import ProgramLmConfig
 from stages.training.program_vae.settings import ProgramVaeConfig
 from stages.training.recovery.settings import RecoveryModelConfig
@@ -22,7 +23,8 @@ AnyModelConfig = Annotated[
     | ProgramVaeConfig
     | ProgramLmConfig
     | CuboidRnnConfig
-    | PartGraphVaeConfig,
+    | PartGraphVaeConfig
+    | PointEncoderConfig,
     Field(discriminator="kind"),
 ]
 """A model of any kind; the key `kind` selects the class."""

@@ -24,6 +24,7 @@ from stages.strings.settings import StringsConfig
 from stages.training.kind import find_kind, kind_module
 from stages.training.model_config import KitModelConfig
 from stages.training.model_folder import MODEL_FILES, publish_model
+from stages.training.point_encoder.settings import PointEncoderConfig
 from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.rounds import RoundChain, model_name, round_chain, run_round
 from stages.training.settings import AnyModelConfig, TrainingConfig
@@ -38,7 +39,9 @@ def plan(plan: Plan) -> list[Shard]:
     shards: dict[str, Shard] = {}
     for model, subject, seed in _models(plan):
         if isinstance(model, KitModelConfig):
-            data, pools = _kit_shard(plan, model, model.kind, subject), []
+            data, pools = _kit_shard(plan, model, model.kind, subject), list[Shard]()
+        elif isinstance(model, PointEncoderConfig):
+            data, pools = _collection_shard(plan, model, subject), []
         else:
             data, *pools = _program_shards(plan, model, subject)
         shards.setdefault(data.name, data)
@@ -102,6 +105,8 @@ def check(config: Config) -> None:
                     "proportions have no strings; set variations.samples_per_kit, or train another kind of model"
                 )
             continue
+        if isinstance(model, PointEncoderConfig):
+            continue
         programs = _programs(config, model)
         if not programs:
             raise ConfigError(f"{where}: it learns from programs, but the config has no program; set programs.program")
@@ -129,7 +134,7 @@ def uses_samples(config: Config, only: str) -> bool:
     """
     models = config.section(TrainingConfig).models
     selected = [model for model in models if f"{only}-".startswith(f"{model.name}-")]
-    return any(isinstance(model, KitModelConfig) for model in selected or models)
+    return any(model.subject != "program" for model in selected or models)
 
 
 def estimate_bytes(plan: Plan) -> int:
@@ -143,10 +148,12 @@ def trial(config: Config) -> TrainingConfig:
 
 
 def _models(plan: Plan) -> Iterator[tuple[AnyModelConfig, str, int]]:
-    """Yield each model of the config: its config, its kit or program, its seed."""
+    """Yield each model of the config: its config, its kit, program or dataset, its seed."""
     for model in plan.config.section(TrainingConfig).models:
         if isinstance(model, KitModelConfig):
             subjects: Sequence[str] = model.kits or _categories(plan.config, model) or plan.shards("exemplars")
+        elif isinstance(model, PointEncoderConfig):
+            subjects = (plan.config.name,)
         else:
             subjects = _programs(plan.config, model)
         for subject, seed in product(subjects, range(model.seeds)):
@@ -197,6 +204,24 @@ def _kit_shard(plan: Plan, model: KitModelConfig, kind: str, kit: str) -> Shard:
     return Shard(
         "-".join((kit, kind, *model.prepared.values())), {**params, "splits": splits}, inputs, (kind_module(kind),)
     )
+
+
+def _collection_shard(plan: Plan, model: PointEncoderConfig, name: str) -> Shard:
+    """Plan the prepared clouds of a dataset, for all encoders of at most as many shapes."""
+    shards = [shard for shard in collection_shards(plan) if shard.params["split"] in TRAINING_SPLITS]
+    params: dict[str, Any] = {
+        **(shards[0].params if shards else {}),
+        "job": "data",
+        "kind": model.kind,
+        "collection": name,
+        "max_shapes": model.max_shapes,
+        "splits": {shard.name: shard.params["split"] for shard in shards},
+        "samples_of": {shard.name: shard.params["samples"] for shard in shards},
+    }
+    for reserved in ("split", "samples"):
+        params.pop(reserved, None)
+    inputs = dict.fromkeys(name for shard in shards for name in shard.inputs)
+    return Shard(f"{name}-{model.kind}-{model.max_shapes}", params, tuple(inputs), (kind_module(model.kind),))
 
 
 def _program_shards(plan: Plan, model: RecoveryModelConfig, program: str) -> list[Shard]:

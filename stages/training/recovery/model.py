@@ -76,7 +76,7 @@ class Dgcnn(nn.Module):
         for convolution in others:
             features = convolution(features, neighbors)
             layers.append(features)
-        mixed = leaky_relu(_normed(self.norm, self.mixed(torch.cat(layers, dim=-1))), LEAKY_SLOPE)
+        mixed = leaky_relu(batch_normed(self.norm, self.mixed(torch.cat(layers, dim=-1))), LEAKY_SLOPE)
         return torch.cat([mixed.amax(dim=1), mixed.mean(dim=1)], dim=-1)
 
 
@@ -93,7 +93,7 @@ class EdgeConvolution(nn.Module):
         self.norm = nn.BatchNorm1d(after)
 
     def forward(self, features: Tensor, neighbors: Tensor) -> Tensor:
-        return leaky_relu(_normed(self.norm, edge_maximum(self.linear(features), neighbors)), LEAKY_SLOPE)
+        return leaky_relu(batch_normed(self.norm, edge_maximum(self.linear(features), neighbors)), LEAKY_SLOPE)
 
 
 class Vgg(nn.Module):
@@ -177,7 +177,7 @@ def _uniform(parameters: int, before: int, after: int, inputs: int) -> nn.Parame
     return nn.Parameter(torch.empty(parameters, before, after).uniform_(-bound, bound))
 
 
-def _normed(norm: nn.Module, features: Tensor) -> Tensor:
-    """Apply `norm` over clouds and points together."""
+def batch_normed(norm: nn.Module, features: Tensor) -> Tensor:
+    """Apply `norm` to features (clouds, n, width), over clouds and points together."""
     normed: Tensor = norm(features.flatten(0, 1)).view(features.shape)
     return normed

@@ -6,16 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from eval.worth.labelled_clouds import LabelledClouds
-from eval.worth.learning import (
-    average_precision,
-    new_encoder,
-    precision_of_distance,
-    precision_of_encoder,
-    trained_encoder,
-)
-from eval.worth.network import MAX_PAIR_DISTANCE, near_point_pairs
+from eval.worth.learning import average_precision, precision_of_distance, precision_of_encoder, trained_encoder
 from eval.worth.rows import mean_and_interval
+from stages.training.point_encoder.clouds import LabelledClouds
+from stages.training.point_encoder.network import MAX_PAIR_DISTANCE, near_point_pairs
+from stages.training.point_encoder.training import new_model
 
 
 def sheets(count: int, gap: float, rng: np.random.Generator) -> LabelledClouds:
@@ -47,13 +42,13 @@ def test_near_pairs_are_those_within_the_distance_and_come_once() -> None:
 def test_network_learns_what_distance_does_not_tell() -> None:
     rng = np.random.default_rng(1)
     train, test = sheets(8, 0.05, rng), sheets(4, 0.05, rng)
-    learnt = trained_encoder(new_encoder(0), train, 24, np.random.default_rng(2))
+    learnt = trained_encoder(new_model(0), train, 24, np.random.default_rng(2))
     assert precision_of_encoder(learnt, test).mean() > precision_of_distance(test).mean() + 10
 
 
 def test_equal_seeds_give_equal_weights_and_leave_the_first_encoder_as_it_was() -> None:
     clouds = sheets(3, 0.1, np.random.default_rng(3))
-    encoder = new_encoder(5)
+    encoder = new_model(5)
     before = {name: tensor.clone() for name, tensor in encoder.state_dict().items()}
     ways = ("turn", "stretch", "jitter", "partial", "noise")
     first, second = (trained_encoder(encoder, clouds, 2, np.random.default_rng(4), ways).state_dict() for _ in range(2))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eval.worth.augmentation import MIN_PARTIAL_SHARE, augmented_cloud
+from stages.training.point_encoder.augmentation import MIN_PARTIAL_SHARE, augmented_cloud
 
 WAYS = ("turn", "stretch", "jitter", "partial", "noise")
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from stages.shape.arrays import FloatArray
+from stages.training.point_encoder.settings import Augmentation
 
-Augmentation = Literal["stretch", "jitter", "noise", "partial", "turn"]
 PartIds = npt.NDArray[np.int32]
 
 STRETCH_LOG_STD = 0.25
