@@ -14,7 +14,7 @@ from pipeline.errors import ConfigError
 from stages.autoconfig import resolved_kit
 from stages.autoconfig.resolve import Resolution
 from stages.autoconfig.resolved_kit import ResolvedKit, read_and_resolve, use_sections_if_empty
-from stages.autoconfig.trial_search import TrialResult
+from stages.autoconfig.trial_search import MIN_MOVED_DISTANCE, TrialResult
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.segmentation import NOT_CUT
@@ -137,6 +137,28 @@ def test_under_looser_rules_a_yield_estimate_decides_about_sections(
     else:
         assert resolved.resolution.values == {"parts": "sections", **loose}
         assert resolved.resolution.reasons["grammar"] == "a reason"
+
+
+@pytest.mark.parametrize(("share_of_threshold", "stays_whole"), [(0.75, True), (1.5, False)])
+def test_model_stays_whole_where_sections_give_only_variants_that_look_like_it(
+    searched: list[KitConfig], monkeypatch: pytest.MonkeyPatch, share_of_threshold: float, stays_whole: bool
+) -> None:
+    first = read_first()
+    alike = resolution_of(90, False)
+    assert alike.trial is not None
+    trial = replace(alike.trial, distance=0.4, pair_distance=0.3, moved=share_of_threshold * MIN_MOVED_DISTANCE)
+    every_key = {key: STRICTEST[key] for key in first.config.auto_keys()} | {"up": "z"}
+    under_looser_rules = resolution_of(90, True, **every_key)
+
+    def resolve(config: KitConfig, *_: Any) -> Resolution:
+        searched.append(config)
+        return under_looser_rules if config.grammar == "auto" else replace(alike, trial=trial)
+
+    monkeypatch.setattr(resolved_kit, "resolve_settings", resolve)
+    monkeypatch.setattr(resolved_kit, "estimate_yield", lambda *_, **__: SimpleNamespace(is_poor=False))
+    resolved = cut(first)
+    assert (resolved is first) is stays_whole
+    assert [config.grammar for config in searched] == ["multiset", "auto"][: 1 if stays_whole else 2]
 
 
 def test_observation_is_cached_by_values() -> None:
