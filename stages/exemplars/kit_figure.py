@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
+from pipeline.errors import ShardFailed
 from stages.shape.arrays import ByteArray
 from stages.shape.kit import Assembly, Exemplar, Kit
 from stages.shape.shape import Shape, kit_shape
 from stages.shape.views.camera import Camera
 from stages.shape.views.part_colors import part_paint
-from stages.shape.views.portrait import portrait
+from stages.shape.views.portrait import PAPER, portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.shape.views.viewpoint import best_viewpoint
@@ -21,6 +23,8 @@ FIGURE_COLUMNS = 6
 EXEMPLAR_CAMERA = Camera(azimuth=-40.0, elevation=25.0, fov=24.0, margin=0.04)
 PART_MARGIN = 0.12
 PART_ELEVATION = 25.0
+PART_TURNS = (0.0, 50.0, 100.0, 150.0)
+"""Degrees by which the camera is turned about a part until it sees something of it."""
 
 
 def kit_figure(kit: Kit) -> bytes:
@@ -80,12 +84,18 @@ def _type_cell(kit: Kit, index: int, count: int, camera: Camera) -> Cell:
 
 
 def _type_picture(kit: Kit, index: int, camera: Camera) -> ByteArray:
-    """Draw a part in its first pose of an exemplar."""
+    """Draw a part in its first pose of an exemplar, from further round where a thin part is edge-on; a sliver that is
+    seen from nowhere is an empty picture.
+    """
     poses = [exemplar.assembly.poses[exemplar.assembly.types == index] for exemplar in kit.exemplars]
     pose = np.concatenate([*poses, np.eye(4)[None]])[:1]
     alone = Assembly(np.array([index], dtype=np.int16), pose, np.empty((0, 2), dtype=np.int32))
     shape = kit_shape(kit, alone)
-    return portrait(scene_of(shape), camera, (CELL_PIXELS, CELL_PIXELS), part_paint(shape))
+    scene, paint = scene_of(shape), part_paint(shape)
+    for turn in PART_TURNS:
+        with suppress(ShardFailed):
+            return portrait(scene, replace(camera, azimuth=camera.azimuth + turn), (CELL_PIXELS, CELL_PIXELS), paint)
+    return np.full((CELL_PIXELS, CELL_PIXELS, 3), PAPER, dtype=np.uint8)
 
 
 def _rows(cells: list[Cell], columns: int) -> list[list[Cell]]:
