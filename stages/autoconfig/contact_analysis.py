@@ -109,6 +109,7 @@ class ContactAnalysis:
         fit_tolerance: the same for parts of one meaning; None if types do not go by meaning.
         """
         self.types = identified.types
+        self._depths = identified.depths
         self.up = up
         self.pose_tolerance = pose_tolerance * identified.median_diagonal
         self._fit_tolerance = None if fit_tolerance is None else fit_tolerance * identified.median_diagonal
@@ -126,7 +127,7 @@ class ContactAnalysis:
 
     @cached_property
     def _nested(self) -> Mapping[tuple[int, int], float]:
-        return observe_nested(self.types, self._touching)
+        return observe_nested(self.types, self._touching, self._depths)
 
     @cached_property
     def kinds(self) -> tuple[ContactKind, ...]:
@@ -205,7 +206,7 @@ class ContactAnalysis:
         if self._fit_tolerance is None:
             return observed
         if setting.kinds not in self._dockings_by_meaning:
-            assemblies, deep = self.counted(setting), measure_depths(self.types, observed)
+            assemblies, deep = self.counted(setting), measure_depths(self.types, observed, self._depths)
             tolerances = (self._fit_tolerance, self.pose_tolerance)
             inferred = infer_dockings(self.types, assemblies, deep, self._contact, *tolerances)
             self._dockings_by_meaning[setting.kinds] = (*deep, *inferred)

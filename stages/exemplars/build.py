@@ -92,7 +92,7 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
     hub_names = [types[index].name for index in hubs]
     kept, warnings = _kept_parts(config, models, identified, contacts.counted, hubs)
     if all(len(keep) == len(assembly) for keep, assembly in zip(kept, touching, strict=True)):
-        grammar = observe_grammar(types, touching, contacts, settings.kinds)
+        grammar = observe_grammar(types, touching, contacts, settings.kinds, identified.depths)
         assemblies, kinds, hub_parts = contacts.counted, contacts.kinds, [EMPTY_ASSEMBLY] * len(touching)
     else:
         # Classes of dockings, their order and their poses are those of the parts that are kept.
@@ -108,7 +108,7 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
         ]
         contact = ContactTest(types, contact.tolerance)
         contacts = observe_contacts(types, everything, contact, pose_tolerance, settings.kinds)
-        grammar = observe_grammar(types, everything, contacts, settings.kinds)
+        grammar = observe_grammar(types, everything, contacts, settings.kinds, identified.depths)
         removed = np.flatnonzero(np.isin(used, restored)).tolist()
         edges = [assembly.edges for assembly in everything]
         assemblies, hub_parts, grammar, kinds = remove_hubs(removed, contacts.counted, grammar, contacts.kinds, edges)

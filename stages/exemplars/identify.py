@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from stages.exemplars.settings import KitConfig
 from stages.model_files.scene import Surface
 from stages.shape.appearance import NO_MATERIAL, Appearance
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.penetration import DepthMemory
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, PartType
 
@@ -53,6 +55,11 @@ class IdentifiedParts:
         return float(
             np.median([self.types[index].diagonal for assembly in self.assemblies for index in assembly.types])
         )
+
+    @cached_property
+    def depths(self) -> DepthMemory:
+        """What is known of the penetration depths of the parts."""
+        return DepthMemory(self.types)
 
 
 @dataclass

@@ -10,7 +10,7 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.contact import ContactTest, overlapping_boxes, world_boxes
 from stages.shape.geometry.docking import DockingTable, symmetric_images
-from stages.shape.geometry.penetration import PenetrationTest
+from stages.shape.geometry.penetration import DepthMemory
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, ContactKind, Docking, Grammar, Multiset, PartType, labels_of
 
@@ -99,23 +99,31 @@ def observe_grammar(
     assemblies: Sequence[Assembly],
     contacts: ObservedContacts,
     kinds: Sequence[ContactKind],
+    depths: DepthMemory | None = None,
 ) -> Grammar:
-    """Return the grammar of `assemblies`, whose `contacts` count if they are of the given `kinds`."""
-    dockings = measure_depths(types, [docking for docking in contacts.dockings if docking.kind in kinds])
+    """Return the grammar of `assemblies`, whose `contacts` count if they are of the given `kinds`.
+
+    depths: what is known of the depths of parts of these types
+    """
+    depths = depths or DepthMemory(types)
+    dockings = measure_depths(types, [docking for docking in contacts.dockings if docking.kind in kinds], depths)
     labels = labels_of(types)[1]
     labelled = [replace(assembly, types=labels[assembly.types]) for assembly in contacts.counted]
-    return Grammar(observe_neighbourhoods(labelled), dockings, observe_nested(types, assemblies))
+    return Grammar(observe_neighbourhoods(labelled), dockings, observe_nested(types, assemblies, depths))
 
 
-def measure_depths(types: Sequence[PartType], dockings: Sequence[Docking]) -> tuple[Docking, ...]:
-    """Return the dockings with the penetration depths of their parts."""
-    penetration = PenetrationTest(types)
-    return tuple(replace(docking, depth=round(_deepest(types, docking, penetration), 6)) for docking in dockings)
+def measure_depths(types: Sequence[PartType], dockings: Sequence[Docking], depths: DepthMemory) -> tuple[Docking, ...]:
+    """Return the dockings with the penetration depths of their parts. depths: what is known of them"""
+    return tuple(replace(docking, depth=round(_deepest(types, docking, depths), 6)) for docking in dockings)
 
 
-def observe_nested(types: Sequence[PartType], assemblies: Sequence[Assembly]) -> dict[tuple[int, int], float]:
-    """Return for pairs of types the largest penetration depth of parts whose surfaces do not touch."""
-    penetration = PenetrationTest(types)
+def observe_nested(
+    types: Sequence[PartType], assemblies: Sequence[Assembly], depths: DepthMemory
+) -> dict[tuple[int, int], float]:
+    """Return for pairs of types the largest penetration depth of parts whose surfaces do not touch.
+
+    depths: what is known of the depths of parts of these types
+    """
     nested: dict[tuple[int, int], float] = {}
     for assembly in assemblies:
         touching = set(map(tuple, assembly.edges.tolist()))
@@ -125,16 +133,17 @@ def observe_nested(types: Sequence[PartType], assemblies: Sequence[Assembly]) ->
                 if assembly.types[i] > assembly.types[j]:
                     i, j = j, i
                 a, b = int(assembly.types[i]), int(assembly.types[j])
-                depth = penetration.depth(a, b, invert(assembly.poses[i]) @ assembly.poses[j])
+                depth = depths.depth(types[a], types[b], invert(assembly.poses[i]) @ assembly.poses[j])
                 if depth > 0.0:
                     nested[a, b] = max(nested.get((a, b), 0.0), round(depth, 6))
     return dict(sorted(nested.items()))
 
 
-def _deepest(types: Sequence[PartType], docking: Docking, penetration: PenetrationTest) -> float:
+def _deepest(types: Sequence[PartType], docking: Docking, depths: DepthMemory) -> float:
     """Return the penetration depth of a docking: the largest over its symmetric images, whose probes differ."""
     images = symmetric_images(types[docking.a], types[docking.b], docking.pose)
     rounded = np.round(pose_vectors(images, types[docking.b].diagonal / 2) / (1e-3 * types[docking.b].diagonal))
     _, first = np.unique(rounded, axis=0, return_index=True)
     chosen = first[:: -(-len(first) // MAX_DEPTH_IMAGES)]
-    return max(penetration.depth(docking.a, docking.b, images[index]) for index in chosen.tolist())
+    a, b = types[docking.a], types[docking.b]
+    return max(depths.depth(a, b, images[index]) for index in chosen.tolist())

@@ -137,6 +137,24 @@ class PenetrationTest:
         return self._probes[index]
 
 
+class DepthMemory:
+    """Penetration depths of posed parts of given types, each measured once; observations of the same parts share it."""
+
+    def __init__(self, types: Sequence[PartMesh]) -> None:
+        self._test = PenetrationTest(types)
+        self._indices = {part: index for index, part in enumerate(self._test.types)}
+        self._depths: dict[tuple[int, int, bytes], float] = {}
+
+    def depth(self, first: PartMesh, second: PartMesh, pose: FloatArray) -> float:
+        """Return how far a part of the second type at `pose` (4, 4) in coordinates of one of the first type and that
+        part penetrate."""
+        a, b = self._indices[first], self._indices[second]
+        key = a, b, pose.tobytes()
+        if key not in self._depths:
+            self._depths[key] = self._test.depth(a, b, pose)
+        return self._depths[key]
+
+
 def _inside_box(columns: FloatArray, pose: FloatArray, box: FloatArray) -> FloatArray:
     """Return the points `columns` (3, p) that lie in a `box` (2, 3) once moved by `pose`, float64 (k, 3).
 
