@@ -89,6 +89,17 @@ class Layout:
             [transform_points(pose, mesh.centroid[None])[0] for mesh, pose in zip(self.meshes, self.poses, strict=True)]
         )
 
+    def heights(self, part: int, normal: FloatArray) -> FloatArray:
+        """Return the positions of a part's vertices along a direction, float64 (v,)."""
+        key = part, normal.tobytes()
+        if key not in self._heights:
+            self._heights[key] = self.points[part] @ normal
+        return self._heights[key]
+
+    @cached_property
+    def _heights(self) -> dict[tuple[int, bytes], FloatArray]:
+        return {}
+
     def vertex_mates(self, part: int, shift: FloatArray) -> np.ndarray:
         """Return the vertex of a part that lies at `shift` from each of its vertices, or -1, int64 (v,)."""
         from scipy.spatial import cKDTree
@@ -134,7 +145,7 @@ class Layout:
         axes = np.flatnonzero(normal)
         if len(axes) == 1 and normal[axes[0]] == 1.0:
             return self.boxes[:, 0, axes[0]], self.boxes[:, 1, axes[0]]
-        along = [points @ normal for points in self.points]
+        along = [self.heights(part, normal) for part in range(len(self))]
         return np.array([values.min() for values in along]), np.array([values.max() for values in along])
 
     def mates(self, shift: FloatArray) -> np.ndarray:

@@ -173,13 +173,13 @@ def _rows_along(
         planes = np.unique(np.round(low[bay_ends(layout, step.shift) & (previous >= 0)], ROUNDING_DECIMALS))
     else:
         planes = _planes(layout, low, high, recurs)
-        planes = planes[_may_end_slabs(layout, planes, float(normal @ step.shift), low, high, recurs)]
+        planes = planes[_may_end_slabs(layout, planes, float(normal @ step.shift), low, high, mates, previous)]
     dense = [parts_of_dense_row(layout, other, normal, step.shift) for other in others]
     for at in planes.tolist():
         slab = Slab(layout, normal, step.shift, at, mates, previous, low, high, step.is_bay)
         may_insert = slab.insertion_fault() is None
         may_remove = slab.removal_fault() is None and not (step.is_bay and count < MIN_BAYS_SHORTENED)
-        if not (may_insert or may_remove) or not (may_stretch or slab.is_regular or not len(slab.stretched)):
+        if not (may_insert or may_remove) or not (may_stretch or slab.is_regular or not slab.stretches):
             continue
         fits = may_insert, may_remove
         may_insert = may_insert and not any(slab.tears(other, 1) for other in others)
@@ -190,7 +190,7 @@ def _rows_along(
             refuse(TORN_ROW)
         if may_insert or may_remove:
             copied = tuple(sorted(layout.types[slab.recurs].tolist()))
-            cost = LENGTHENING if slab.is_regular else STRETCHING if len(slab.stretched) else CUTTING
+            cost = LENGTHENING if slab.is_regular else STRETCHING if slab.stretches else CUTTING
             if cost == STRETCHING and (count < MIN_STRETCHING_ROW or slab.leaves_some_uncopied):
                 continue
             found.setdefault(copied, []).append(_Place(at, may_insert, may_remove, cost))
@@ -224,23 +224,48 @@ def _tried(layout: Layout, normal: FloatArray, step: Step, places: Sequence[_Pla
 
 
 def _may_end_slabs(
-    layout: Layout, planes: FloatArray, length: float, low: FloatArray, high: FloatArray, recurs: BoolArray
+    layout: Layout,
+    planes: FloatArray,
+    length: float,
+    low: FloatArray,
+    high: FloatArray,
+    mates: np.ndarray,
+    previous: np.ndarray,
 ) -> BoolArray:
-    """Return where a slab that is no bay holds a part that recurs, and no contact leads past it, bool (p,).
+    """Return where a slab that is no bay may be inserted or removed as far as most of the rules of `Slab` tell, bool
+    (p,).
 
-    These are two of the rules of `Slab`. Few planes pass them, and only these are asked the others.
+    These rules are asked of all planes at once. Few planes pass them, and only these are asked the others.
     planes: ends of slabs, float64 (p,)
-    recurs: which parts have a part one step before or after, bool (n,)
+    mates, previous: as of `Slab`
     """
-    tolerance = layout.tolerance
-    starts, ends = (planes - length - tolerance)[:, None], (planes - tolerance)[:, None]
-    beyond = low >= ends
-    within = (low >= starts) & ~beyond
-    spanning = (low < starts) & (high > (planes + tolerance)[:, None])
+    tolerance, has_previous = layout.tolerance, previous >= 0
+    recurs = (mates >= 0) | has_previous
+    starts, ends = (planes - length)[:, None], planes[:, None]
+    beyond = low >= ends - tolerance
+    within = (low >= starts - tolerance) & ~beyond
+    crosses = high > ends + tolerance
+    spanning = (low < starts - tolerance) & crosses
     before = ~(within | beyond | spanning)
-    i, j = layout.edges.T
-    passed = (before[:, i] & beyond[:, j]) | (before[:, j] & beyond[:, i])
-    allowed: BoolArray = np.logical_and((within & recurs).any(axis=1), ~passed.any(axis=1))
+    recurring = within & recurs
+    i, j = np.concatenate([layout.edges, layout.edges[:, ::-1]]).T
+    holds_row = np.zeros(len(i), dtype=bool)
+    for beside in (mates[i], previous[i]):
+        holds_row |= (beside >= 0) & np.isin(beside * len(layout) + j, layout.contact_keys)
+    once = recurs[i] & ~holds_row
+    across = within[:, i] & beyond[:, j]
+    returns = has_previous[j] & within[:, previous[j]]
+    refused = ~recurring.any(axis=1) | (before[:, i] & beyond[:, j]).any(axis=1) | (across & ~returns).any(axis=1)
+    refused |= (within[:, i[once]] & spanning[:, j[once]]).any(axis=1)
+    holds_unique = within & ~recurs
+    never_inserted = (crosses & (holds_unique | (within & ~has_previous))).any(axis=1)
+    never_inserted |= (across & ~(recurs[i] & recurs[previous[j]])).any(axis=1)
+    led = mates >= 0
+    leads_in, leads_out = led & recurring[:, mates], led & beyond[:, mates]
+    never_removed = holds_unique.any(axis=1)
+    never_removed |= (before & (high > starts + tolerance) & ~leads_in).any(axis=1)
+    never_removed |= (within[:, i] & before[:, j] & ~leads_out[:, i]).any(axis=1)
+    allowed: BoolArray = ~(refused | (never_inserted & never_removed))
     return allowed
 
 

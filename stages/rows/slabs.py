@@ -132,7 +132,7 @@ class Slab:
         long = self._fills & (self.high - self.low >= MIN_OVERHANG_SHARE * (self.at - self.start))
         overhanging = np.zeros(len(self.low), dtype=bool)
         for part in np.flatnonzero(long).tolist():
-            heights = self.layout.points[part] @ self.normal
+            heights = self.layout.heights(part, self.normal)
             begin = max(self.start, float(self.low[part])) + self._reach
             overhanging[part] = not ((heights > begin) & (heights < self.at - 2.0 * self.layout.tolerance)).any()
         return overhanging
@@ -324,7 +324,14 @@ class Slab:
     @cached_property
     def is_regular(self) -> bool:
         """Whether no part that spans the slab has to be cut."""
-        return all(self.span(part).is_regular for part in self.spanning.tolist())
+        spans = [self.span(part) for part in self.spanning.tolist()]
+        return all(span.recurs for span in spans) and all(span.is_regular for span in spans)
+
+    @cached_property
+    def stretches(self) -> bool:
+        """Whether any spanning part has to be stretched; quick tests of all parts come before slow ones of any."""
+        spans = [self.span(part) for part in self.spanning.tolist()]
+        return not (all(span.recurs for span in spans) and all(span.can_change for span in spans))
 
     @cached_property
     def stretched(self) -> np.ndarray:
@@ -362,7 +369,7 @@ class Slab:
     def _new_span(self, part: int) -> Span:
         layout = self.layout
         points = layout.points[part]
-        heights = points @ self.normal
+        heights = layout.heights(part, self.normal)
         mates, previous = layout.vertex_mates(part, self.shift), layout.vertex_mates(part, -self.shift)
         start, end = self.start, self.at
         if self._overhangs[part]:  # it may end with the slab, and is a prism just before that

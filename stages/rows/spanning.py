@@ -82,7 +82,7 @@ class Span:
         return sides.min(axis=1), sides.max(axis=1)
 
     @cached_property
-    def _recurs(self) -> bool:
+    def recurs(self) -> bool:
         """Whether every vertex in the slab has one a step before, or every one has one a step after."""
         inside = self.sides == 1
         return bool((self.mates[inside] >= 0).all() or (self.previous[inside] >= 0).all())
@@ -93,6 +93,8 @@ class Span:
 
         Then periods are inserted without cutting faces. A prism, with no vertex in the slab, is the simplest case.
         """
+        if not self.recurs:
+            return False
         low, high = self.ranges
         faces = self.mesh.faces
         spanning = (low == 0) & (high == 2)
@@ -101,7 +103,7 @@ class Span:
         if not are_parallel(self.points[faces[spanning]], self.shift, self.points).all():
             return False
         start, end = (low == 0) & (high == 1), (low == 1) & (high == 2)
-        if int(start.sum()) != int(end.sum()) or not self._recurs:
+        if int(start.sum()) != int(end.sum()):
             return False
         if not start.any():
             return True
@@ -122,7 +124,7 @@ class Span:
             (np.abs(self.heights - self.low) <= self.tolerance) | (np.abs(self.heights - self.high) <= self.tolerance)
         ).any():
             return False
-        if not self._recurs:
+        if not self.recurs:
             return False
         start = _section(self.points, self.mesh.faces, self.heights, self.low) + self.shift
         end = _section(self.points, self.mesh.faces, self.heights, self.high)
