@@ -15,6 +15,7 @@ neighbour types as the other levels of strictness do.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import combinations, product
@@ -41,6 +42,10 @@ MAX_SLOTS = 32
 """Parts with more slots than this, which are hubs, are offered only observed neighbourhoods."""
 UNSEEN_WEIGHT = 0.5
 """Weight of an unobserved neighbourhood relative to one that was observed once."""
+
+KEY_BYTES = 16
+MAX_REMEMBERED = 200_000
+"""Neighbourhoods whose answers are remembered, about 100 bytes each."""
 
 State = tuple[int, ...]
 
@@ -102,6 +107,7 @@ class SlotGrammar:
         self._axis = {"y": 1, "z": 2}[kit.up]
         self._limit = 2.0 * kit.pose_tolerance
         self._orientations: dict[int, list[_Orientation]] = {}
+        self._admitted: dict[bytes, bool] = {}
         for pattern in observed_patterns(kit, dockings, upright):
             self._orientation(pattern).patterns.append(pattern)
         for orientations in self._orientations.values():
@@ -226,7 +232,20 @@ class SlotGrammar:
                     yield orientation, tuple(sorted(places))
 
     def admits(self, assembly: Assembly, part: int, neighbours: list[int]) -> bool:
-        """Return whether a part of an assembly may have these neighbours, by their places."""
+        """Return whether a part of an assembly may have these neighbours, by their places; remembered by exact poses.
+
+        Variants keep most parts of a shape where they were, so the same parts are asked for again and again.
+        """
+        members = [part, *neighbours]
+        asked = assembly.types[members].tobytes() + assembly.poses[members].tobytes()
+        key = hashlib.blake2b(asked, digest_size=KEY_BYTES).digest()
+        if key not in self._admitted:
+            if len(self._admitted) >= MAX_REMEMBERED:
+                self._admitted.clear()
+            self._admitted[key] = self._admits(assembly, part, neighbours)
+        return self._admitted[key]
+
+    def _admits(self, assembly: Assembly, part: int, neighbours: list[int]) -> bool:
         for orientation, places in self.around(assembly, part, neighbours):
             split = orientation.split(places)
             known = all(state in states for state, states in zip(split, orientation.states, strict=True))
@@ -237,6 +256,10 @@ class SlotGrammar:
     def misfits(self, assembly: Assembly) -> list[int]:
         """Return the parts of an assembly whose neighbours the grammar does not admit, ascending."""
         return [part for part, near in self._free(assembly) if not self.admits(assembly, part, near)]
+
+    def admits_all(self, assembly: Assembly) -> bool:
+        """Return whether the grammar admits the neighbours of all parts of an assembly."""
+        return all(self.admits(assembly, part, near) for part, near in self._free(assembly))
 
     def _free(self, assembly: Assembly) -> Iterator[tuple[int, list[int]]]:
         """Yield the parts of an assembly that are not hubs, with their neighbours that are not hubs."""

@@ -313,7 +313,7 @@ class VariantMaker:
         outcome = self._resolved_by(validate) if self._stretches is None else Outcome.OK
         if outcome != Outcome.OK:
             return REASONS[outcome]
-        if self._slots is not None and self._slots.misfits(assembly):
+        if self._slots is not None and not self._slots.admits_all(assembly):
             return REASONS[Outcome.GRAMMAR]
         return self._variant(assembly, origins, lineage)
 
