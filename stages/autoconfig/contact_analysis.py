@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -93,7 +93,10 @@ class Setting:
 
 
 class ContactAnalysis:
-    """The parts of some models with all their contacts at one tolerance."""
+    """The parts of some models with all their contacts at one tolerance.
+
+    trials: what setting searches of these parts have tried, by what they asked
+    """
 
     def __init__(
         self,
@@ -109,6 +112,7 @@ class ContactAnalysis:
         fit_tolerance: the same for parts of one meaning; None if types do not go by meaning.
         """
         self.types = identified.types
+        self.trials: dict[Any, Any] = {}
         self._depths = identified.depths
         self.up = up
         self.pose_tolerance = pose_tolerance * identified.median_diagonal

@@ -77,13 +77,15 @@ def resolve_settings(
     identified: IdentifiedParts,
     tries: int,
     require: Sequence[str] = REQUIREMENT_KEYS,
+    analyses: dict[Any, ContactAnalysis] | None = None,
 ) -> Resolution:
     """Resolve what `config` leaves at `auto` for a kit of `models`, whose parts are `identified`.
 
     Resolved in this order: the up axis; the contact tolerance; kinds of contact, grammar and hubs by a setting search;
     and those of REQUIREMENT_KEYS that are in `require`. A trial search has `tries`, or a multiple. Randomness depends
-    on the models and on the stated keys only, so every run and `make inspect` resolve alike. Raises ConfigError for
-    stated hubs that are no types.
+    on the models and on the stated keys only, so every run and `make inspect` resolve alike.
+    analyses: those of earlier calls for the same parts, which remember what they tried; the new one is added
+    Raises ConfigError for stated hubs that are no types.
     """
     auto_keys = config.auto_keys()
     values: dict[str, Any] = {key: STRICTEST[key] for key in auto_keys}
@@ -96,7 +98,11 @@ def resolve_settings(
     stated = config.resolve(values)
     fit_tolerance = config.fit_tolerance if config.types == "meaning" else None
     settings = stated.resolved()
-    analysis = ContactAnalysis(identified, settings.tolerance, config.pose_tolerance, settings.up, fit_tolerance)
+    analysed = settings.tolerance, config.pose_tolerance, settings.up, fit_tolerance
+    analyses = {} if analyses is None else analyses
+    if analysed not in analyses:
+        analyses[analysed] = ContactAnalysis(identified, *analysed)
+    analysis = analyses[analysed]
     one_surface = any(model.is_cut for model in models)
     space = replace(_search_space(stated, analysis, auto_keys, one_surface), keeps_types=KEEP_TYPES_KEY in require)
     candidates = search_settings(analysis, space, tries)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pipeline.errors import ConfigError
+from stages.autoconfig.contact_analysis import ContactAnalysis
 from stages.autoconfig.resolve import Resolution, resolve_settings
 from stages.autoconfig.yield_estimate import YieldEstimate, estimate_yield
 from stages.exemplars.build import Observation, observe_parts
@@ -19,6 +20,7 @@ from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.model_files.limits import ReadLimits
 from stages.rows.kit_rows import rows_of_kit
 from stages.shape.geometry.contact_oracle import ContactOracle
+from stages.shape.kit import Kit
 from stages.shape.resolved_settings import KEEP_TYPES_KEY, MAX_COPIED_SHARE_KEY
 from stages.variations.requirements.hub_restoration import auto_min_hubs
 
@@ -40,6 +42,7 @@ class ResolvedKit:
     identified: IdentifiedParts
     resolution: Resolution
     _observed: dict[str, Observation] = field(default_factory=dict, compare=False, repr=False)
+    _estimates: dict[Any, tuple[Kit, YieldEstimate]] = field(default_factory=dict, compare=False, repr=False)
 
     def observe(self, values: Mapping[str, Any]) -> Observation:
         """Return what a run builds of the models with these `values` of the `auto` keys; cached by config."""
@@ -50,13 +53,19 @@ class ResolvedKit:
         return self._observed[key]
 
     def estimate(self, stated: KitConfig, oracle: ContactOracle, tries: int) -> YieldEstimate:
-        """Estimate the layouts of the kit of `oracle`, which is built as `stated` with the resolved settings."""
+        """Estimate the layouts of the kit of `oracle`, which is built as `stated` with the resolved settings; once."""
         kit = oracle.kit
         known_graphs = self.resolution.trial.graphs if self.resolution.trial is not None else 0
         values = self.resolution.values
-        max_copied_share, keep_types = values.get(MAX_COPIED_SHARE_KEY, 1.0), values.get(KEEP_TYPES_KEY, ())
-        min_hubs = auto_min_hubs(stated, kit)
-        return estimate_yield(kit, oracle, tries, known_graphs, min_hubs, max_copied_share, keep_types)
+        required = {
+            "min_hubs": auto_min_hubs(stated, kit),
+            "max_copied_share": values.get(MAX_COPIED_SHARE_KEY, 1.0),
+            "keep_types": tuple(values.get(KEEP_TYPES_KEY, ())),
+        }
+        key = id(kit), tries, known_graphs, *required.values()
+        if key not in self._estimates:
+            self._estimates[key] = kit, estimate_yield(kit, oracle, tries, known_graphs, **required)
+        return self._estimates[key][1]
 
 
 def read_and_resolve(config: KitConfig, limits: ReadLimits, tries: int, require: Sequence[str]) -> ResolvedKit:
@@ -106,19 +115,22 @@ def use_sections_if_empty(first: ResolvedKit, limits: ReadLimits, tries: int, re
         return first
     searched = ("contact.kinds", "grammar", "hubs.types")
     strictest = {key: STRICTEST[key] for key in config.auto_keys() if key in searched}
-    resolution = resolve_settings(config.resolve(strictest), models, identified, tries, require)
+    analyses: dict[Any, ContactAnalysis] = {}
+    resolution = resolve_settings(config.resolve(strictest), models, identified, tries, require, analyses)
     values = {**strictest, **resolution.values}
     reasons = {**dict.fromkeys(strictest, "the strictest, and it finds enough"), **resolution.reasons}
     if resolution.trial is not None and resolution.trial.looks_like_exemplar:
         return first  # slabs that are inserted and removed are too thin to be seen
+    resolved = ResolvedKit(config, models, identified, resolution)
     if not resolution.is_sufficient:
-        resolution = resolve_settings(config, models, identified, tries, require)
+        resolution = resolve_settings(config, models, identified, tries, require, analyses)
         values, reasons = dict(resolution.values), dict(resolution.reasons)
-        if not _is_dataset(ResolvedKit(config, models, identified, resolution), tries):
+        resolved = replace(resolved, resolution=resolution)
+        if not _is_dataset(resolved, tries):
             return first
     reason = f"cut across: nothing comes of {len(first.models[0].parts)} {first.models[0].segmentation}"
     values, reasons = {PARTS_KEY: config.parts, **values}, {PARTS_KEY: reason, **reasons}
-    return ResolvedKit(config, models, identified, replace(resolution, values=values, reasons=reasons))
+    return replace(resolved, resolution=replace(resolution, values=values, reasons=reasons))
 
 
 def _has_rows(resolved: ResolvedKit) -> bool:
@@ -136,8 +148,4 @@ def _is_dataset(resolved: ResolvedKit, tries: int) -> bool:
     built = resolved.observe(resolution.values)
     if built.refusals:
         return False
-    required = {
-        "max_copied_share": resolution.values.get(MAX_COPIED_SHARE_KEY, 1.0),
-        "keep_types": resolution.values.get(KEEP_TYPES_KEY, ()),
-    }
-    return not estimate_yield(built.kit, ContactOracle(built.kit), tries, resolution.trial.graphs, **required).is_poor
+    return not resolved.estimate(resolved.config, ContactOracle(built.kit), tries).is_poor

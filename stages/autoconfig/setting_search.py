@@ -14,7 +14,7 @@ from stages.autoconfig.settings import RANDOM_STREAM
 from stages.autoconfig.trial_search import MAX_GROWTH_DEGREE, TrialResult, TrialSearch, has_low_diversity
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
-from stages.shape.kit import Assembly, ContactKind, Strictness
+from stages.shape.kit import Assembly, ContactKind, Kit, Strictness
 from stages.shape.resolved_settings import RESOLVED_HUB_SHARE
 from stages.variations.novelty.copied_pieces import CopyDetector
 from stages.variations.requirements.identity import common_labels
@@ -159,14 +159,23 @@ class _SettingSearch:
         if min(map(len, kept)) < 2 or drops_too_much:
             return None
         kit = self._analysis.kit(setting)
+        min_hubs = 1 if self._space.hubs else RESOLVED_HUB_SHARE
+        kept_labels = common_labels(kit) if self._space.keeps_types else ()
+        asked = setting, self._tries, min_hubs if setting.hubs else 0, kept_labels
+        if asked not in self._analysis.trials:
+            self._analysis.trials[asked] = self._try(kit, setting, share, min_hubs, kept_labels)
+        candidate: CandidateSetting = self._analysis.trials[asked]
+        return candidate
+
+    def _try(
+        self, kit: Kit, setting: Setting, share: float, min_hubs: float, kept_labels: tuple[str, ...]
+    ) -> CandidateSetting:
         if setting.kinds not in self._oracles:
             self._oracles[setting.kinds] = ContactOracle(kit)
         oracle = self._oracles[setting.kinds].under(kit)
         any_grammar = replace(setting, grammar=CANDIDATE_GRAMMARS[0])
         if any_grammar not in self._copies:
             self._copies[any_grammar] = CopyDetector(kit, oracle.dockings)
-        min_hubs = 1 if self._space.hubs else RESOLVED_HUB_SHARE
-        kept_labels = common_labels(kit) if self._space.keeps_types else ()
         return _try_setting(oracle, setting, self._tries, share, min_hubs, self._copies[any_grammar], kept_labels)
 
 

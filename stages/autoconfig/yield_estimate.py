@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -49,6 +50,7 @@ class YieldEstimate:
     variants: the hits.
     lost_support: the labels whose parts lose what is close above or below them.
     row_variants: exemplars with longer or shorter rows, with which a run begins its search; no hits of the trial.
+    seconds: CPU seconds that it took.
     """
 
     trial: TrialResult
@@ -59,6 +61,7 @@ class YieldEstimate:
     variants: Sequence[Variant]
     lost_support: tuple[str, ...] = ()
     row_variants: Sequence[Variant] = ()
+    seconds: float = 0.0
 
     @property
     def is_poor(self) -> bool:
@@ -100,6 +103,7 @@ def estimate_yield(
     known_graphs: graphs that an earlier trial search found; if there are any, a first search in vain is continued.
     min_hubs, max_copied_share, keep_types: as for TrialSearch, since rejected variants do not count.
     """
+    begun = time.process_time()
     rng = decision_rng(0, RANDOM_STREAM, "forecast")
     search = TrialSearch(oracle, rng, min_hubs, max_copied_share, keep_types=keep_types)
     trial = search.run(tries, MAX_ESTIMATE_GRAPHS, evenly=True)
@@ -114,7 +118,10 @@ def estimate_yield(
     sentence = _sentence(kit, trial, layouts, part_range, unsupported, float(np.mean(whole)) if whole else 0.0)
     wanted = round(RowsConfig().pool_share * min(len(search.variants), MAX_ESTIMATE_GRAPHS))
     row_variants = search.other_rows(decision_rng(0, RANDOM_STREAM, "rows"), wanted) if wanted else []
-    return YieldEstimate(trial, layouts, part_range, once, sentence, search.variants, unsupported, row_variants)
+    seconds = time.process_time() - begun
+    return YieldEstimate(
+        trial, layouts, part_range, once, sentence, search.variants, unsupported, row_variants, seconds
+    )
 
 
 def _layouts(trial: TrialResult) -> int | None:

@@ -163,9 +163,8 @@ def inspect_models(
     typical: list[ShownShape] = []
     if not built.refusals:
         oracle = ContactOracle(built.kit)
-        begun = time.process_time()
         layouts = resolved.estimate(config, oracle, tries)
-        rate = layouts.trial.graphs / max(time.process_time() - begun, 1e-6)
+        rate = layouts.trial.graphs / max(layouts.seconds, 1e-6)
         stable = resolution.values[STABLE_KEY]
         likely = layouts.likely_variants(built.kit)
         at_random = decision_rng(0, RANDOM_STREAM, "typical").permutation(len(likely)).tolist()
