@@ -172,7 +172,7 @@ class _SettingSearch:
     ) -> CandidateSetting:
         if setting.kinds not in self._oracles:
             self._oracles[setting.kinds] = ContactOracle(kit)
-        oracle = self._oracles[setting.kinds].under(kit)
+        oracle = self._oracles[setting.kinds] = self._oracles[setting.kinds].under(kit)
         any_grammar = replace(setting, grammar=CANDIDATE_GRAMMARS[0])
         if any_grammar not in self._copies:
             self._copies[any_grammar] = CopyDetector(kit, oracle.dockings)

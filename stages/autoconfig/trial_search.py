@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from stages.autoconfig.moved_surface import moved_distance
+from stages.autoconfig.moved_surface import MovedSurface
 from stages.rows.settings import RowsConfig
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.contact_oracle import ContactOracle
@@ -72,7 +72,7 @@ class TrialResult:
     by_meaning: whether exchanging one part for another of its meaning counts as a hit.
     most_different: indices into the variants, most different first.
     rejects: rejected tries by reason.
-    moved: median over the most different hits of `moved_distance`.
+    moved: median over the most different hits of the distance that `MovedSurface` measures.
     """
 
     tries: int
@@ -141,6 +141,7 @@ class TrialSearch:
         """
         self.kit = oracle.kit
         self.variants: list[Variant] = []
+        self._moved = MovedSurface(self.kit)
         self._rng = rng
         self._known_keys: set[int] = set()
         self._max_copied_share, self._min_hubs = max_copied_share, min_hubs
@@ -291,7 +292,7 @@ class TrialSearch:
             by_meaning=self.kit.by_meaning,
             most_different=tuple(most_different.tolist()),
             rejects=rejects,
-            moved=moved_distance(self.kit, [self.variants[index].assembly for index in most_different.tolist()]),
+            moved=self._moved.distance([self.variants[index].assembly for index in most_different.tolist()]),
         )
 
     def _seen_fillings_share(self, indices: Sequence[int]) -> float:

@@ -16,6 +16,7 @@ neighbour types as the other levels of strictness do.
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import combinations, product
@@ -44,6 +45,8 @@ UNSEEN_WEIGHT = 0.5
 """Weight of an unobserved neighbourhood relative to one that was observed once."""
 
 KEY_BYTES = 16
+FAR_LIMITS_SQUARED = 1.01
+"""Squared distance, in squared limits, from which a place is plainly another one; nearer ones are measured exactly."""
 MAX_REMEMBERED = 200_000
 """Neighbourhoods whose answers are remembered, about 100 bytes each."""
 
@@ -58,6 +61,7 @@ class _Orientation:
     turns: symmetries that keep it, float64 (k, 3, 3)
     types: type of each place
     poses: pose of each place, float64 (4, 4)
+    positions: position of each place
     slot_of: slot of each place, int64 (p,)
     cells: places by type and cell of their position
     closed: whether all symmetric images are known
@@ -76,6 +80,7 @@ class _Orientation:
     turns: FloatArray
     types: list[int] = field(default_factory=list)
     poses: list[FloatArray] = field(default_factory=list)
+    positions: list[tuple[float, float, float]] = field(default_factory=list)
     slot_of: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     cells: dict[tuple[int, ...], list[int]] = field(default_factory=dict)
     slots: int = 0
@@ -182,10 +187,16 @@ class SlotGrammar:
     def _place(self, orientation: _Orientation, kind: int, pose: FloatArray, add: bool = False) -> int:
         """Return the index of a place, a new one if it may be added, else -1."""
         part_type, at = self.kit.types[kind], pose[:3, 3]
-        low, high = (np.floor((at + gap) / (4 * self._limit)).astype(int) for gap in (-self._limit, self._limit))
-        for cell in product(*(range(first, last + 1) for first, last in zip(low.tolist(), high.tolist(), strict=True))):
-            for number in orientation.cells.get((kind, *cell), ()):
+        x, y, z = at.tolist()
+        limit = self._limit
+        beyond, cells = FAR_LIMITS_SQUARED * limit**2, orientation.cells
+        spans = (_cells_near(value, limit) for value in (x, y, z))
+        for cell in product(*spans):
+            for number in cells.get((kind, *cell), ()):
                 known = orientation.poses[number]
+                there = orientation.positions[number]
+                if (there[0] - x) ** 2 + (there[1] - y) ** 2 + (there[2] - z) ** 2 > beyond:
+                    continue
                 if np.linalg.norm(known[:3, 3] - at) <= self._limit:
                     gaps = part_type.symmetries[:, :3, :3] - known[:3, :3].T @ pose[:3, :3]
                     if np.linalg.norm(gaps.reshape(-1, 9), axis=1).min() * part_type.diagonal / 2 <= self._limit:
@@ -194,6 +205,7 @@ class SlotGrammar:
             return -1
         orientation.types.append(kind)
         orientation.poses.append(pose)
+        orientation.positions.append((x, y, z))
         own = np.floor(at / (4 * self._limit)).astype(int).tolist()
         orientation.cells.setdefault((kind, *own), []).append(len(orientation.types) - 1)
         return len(orientation.types) - 1
@@ -227,8 +239,12 @@ class SlotGrammar:
         relative = [(int(assembly.types[other]), inverse @ assembly.poses[other]) for other in neighbours]
         for orientation in self._orientations.get(int(assembly.types[part]), []):
             for turn in self._turns_to(orientation, up)[: 1 if orientation.closed else None]:
-                places = [self._place(orientation, kind, _turned(turn, pose)) for kind, pose in relative]
-                if min(places, default=0) >= 0:
+                places: list[int] = []
+                for kind, pose in relative:
+                    places.append(self._place(orientation, kind, _turned(turn, pose)))
+                    if places[-1] < 0:
+                        break
+                else:
                     yield orientation, tuple(sorted(places))
 
     def admits(self, assembly: Assembly, part: int, neighbours: list[int]) -> bool:
@@ -372,6 +388,11 @@ class SlotGrammar:
         return all(
             ((i, slot, split[i], own) if i < slot else (slot, i, own, split[i])) in orientation.pairs for i in others
         )
+
+
+def _cells_near(value: float, limit: float) -> range:
+    """Return the cells along one axis, 4 limits wide, that are at most a limit away from a position."""
+    return range(math.floor((value - limit) / (4 * limit)), math.floor((value + limit) / (4 * limit)) + 1)
 
 
 def _canonical(orientation: _Orientation, places: State) -> State:

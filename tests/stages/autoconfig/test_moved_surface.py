@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.autoconfig.moved_surface import moved_distance
+from stages.autoconfig.moved_surface import MovedSurface
 from stages.autoconfig.trial_search import MIN_MOVED_DISTANCE, TrialResult, has_low_diversity
 from stages.shape.kit import Assembly, Kit
 from tests.toy_kits.chains_and_rings import CHAIN, box, chain, kit_of, pose
@@ -28,20 +28,20 @@ def test_exemplar_moves_nothing_wherever_it_stands() -> None:
     moved = only(kit).poses.copy()
     moved[:, :3, 3] += [3.0, -2.0, 7.0]
     elsewhere = Assembly(only(kit).types, moved, only(kit).edges)
-    assert moved_distance(kit, [only(kit), elsewhere]) == pytest.approx(0.0, abs=1e-9)
-    assert moved_distance(kit, []) == 0.0
+    assert MovedSurface(kit).distance([only(kit), elsewhere]) == pytest.approx(0.0, abs=1e-9)
+    assert MovedSurface(kit).distance([]) == 0.0
 
 
 def test_more_bolts_move_less_than_one_sees_and_a_longer_chain_moves_more() -> None:
     kits = [kit_of(BOLTED, [bolted(count)]) for count in (6, 9)]
-    assert 0.0 < moved_distance(kits[0], [only(kits[1])]) < MIN_MOVED_DISTANCE
+    assert 0.0 < MovedSurface(kits[0]).distance([only(kits[1])]) < MIN_MOVED_DISTANCE
     chains = [kit_of(CHAIN, [chain(count)]) for count in (4, 6)]
-    assert moved_distance(chains[0], [only(chains[1])]) > 2 * MIN_MOVED_DISTANCE
+    assert MovedSurface(chains[0]).distance([only(chains[1])]) > 2 * MIN_MOVED_DISTANCE
 
 
 def test_the_nearest_exemplar_counts() -> None:
     kit = kit_of(CHAIN, [chain(4), chain(8)])
-    assert moved_distance(kit, [kit.exemplars[1].assembly]) == pytest.approx(0.0, abs=1e-9)
+    assert MovedSurface(kit).distance([kit.exemplars[1].assembly]) == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(("moved", "is_low"), [(0.015, True), (0.03, False)])
