@@ -50,6 +50,7 @@ class ContactOracle:
         self._penetration = PenetrationTest(kit.types)
         self._of_geometry: dict[bytes, int] = {}
         self._quantum = kit.contact_tolerance * POSE_QUANTUM
+        self._is_plain = [np.array_equal(part.symmetries, np.eye(4)[None]) for part in kit.types]
         self._every_kind = set(kit.contact_kinds) == set(get_args(ContactKind))
 
     def under(self, kit: Kit) -> ContactOracle:
@@ -112,8 +113,15 @@ class ContactOracle:
         return value
 
     def _answer(self, a: int, b: int, quanta: np.ndarray) -> int:
-        pose = self._pose(b, quanta)
-        images = symmetric_images(self.kit.types[a], self.kit.types[b], pose)
+        chosen = quanta if self._is_plain[a] and self._is_plain[b] else self._first_image(a, b, quanta)
+        key = a.to_bytes(2, "little") + b.to_bytes(2, "little") + chosen.tobytes()
+        if key not in self._of_geometry:
+            self._of_geometry[key] = self._ask_geometry(a, b, self._pose(b, chosen))
+        return self._of_geometry[key]
+
+    def _first_image(self, a: int, b: int, quanta: np.ndarray) -> np.ndarray:
+        """Return the image of a rounded pose with the smallest numbers, under the symmetries of both parts."""
+        images = symmetric_images(self.kit.types[a], self.kit.types[b], self._pose(b, quanta))
         # The first numbers alone rule out most of the thousands of images of round parts.
         first = np.floor(images[:, 0, 3] / self._quantum + 0.5)
         images = images[first == first.min()]
@@ -121,11 +129,8 @@ class ContactOracle:
         rounded[:, :3] = np.floor(images[:, :3, 3] / self._quantum + 0.5)
         reach = self.kit.types[b].diagonal / 2
         rounded[:, 3:] = np.floor(images[:, :3, :3].reshape(-1, 9) * (reach / self._quantum) + 0.5)
-        chosen = np.lexsort(rounded.T[::-1])[0]
-        key = a.to_bytes(2, "little") + b.to_bytes(2, "little") + rounded[chosen].tobytes()
-        if key not in self._of_geometry:
-            self._of_geometry[key] = self._ask_geometry(a, b, self._pose(b, rounded[chosen]))
-        return self._of_geometry[key]
+        smallest: np.ndarray = rounded[np.lexsort(rounded.T[::-1])[0]]
+        return smallest
 
     def _ask_geometry(self, a: int, b: int, pose: FloatArray) -> int:
         self.geometry_queries += 1
