@@ -34,7 +34,7 @@ def describe_members(config: Config, names: Sequence[str], languages: Sequence[L
     """
     declared = {item.name: item for stage in members().values() for item in stage.of(config)}
     declared |= {item.name: item for item in OWN_MEMBERS}
-    if any(not language.graphs for language in languages):
+    if any(not language.graphs for language in languages) or (TEXT in names and TEXT not in declared):
         strings = [declared[TEXT].sentence] if TEXT in declared else ["A line that says that strings are turned off."]
         texts = [text for language in languages for text in (strings if language.graphs else [language.text])]
         declared[TEXT] = Member(TEXT, " Or: ".join(dict.fromkeys(texts)))

@@ -343,3 +343,11 @@ def test_stated_task_categories_stay_and_a_dataset_without_any_has_none(tmp_path
     stated_ones = {**CHAIR, "package": {"task_categories": ["other"]}}
     assert "task_categories:\n- other\n" in card_of(tmp_path, stated_ones)[1]
     assert "task_categories" not in card_of(tmp_path, {**CHAIR, "points": False, "sketches": False})[1]
+
+
+def test_the_text_of_a_mixture_of_kits_alone_is_described_where_strings_are_turned_off(tmp_path: Path) -> None:
+    path = tmp_path / "toy.yaml"
+    path.write_text(yaml.safe_dump({"name": "toy", "mixture": True, "strings": False, **KITS}), encoding="utf-8")
+    config = load_config(path, {name: stage.config for name, stage in find_stages().items()})
+    described = describe_members(config, ["txt", "json"], [language_of("variations")])
+    assert described[0]["sentence"] == "A line that says that strings are turned off."
