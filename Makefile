@@ -210,7 +210,7 @@ kernels: setup  ## Record the kernels that stages use, which a first run compile
 	$(PYTHON) -m pipeline.make_kernel_list .venv/kernels configs/default.yaml
 config-docs: setup  ## Write the tables of config keys in configs/sections from the code
 	$(SHAPEMILL) config-docs
-results: setup  ## Write eval/RESULTS.md from eval/papers
+results: setup  ## Write eval/RESULTS.md and RESULTS.html from eval/papers
 	$(SHAPEMILL) results
 release: setup  ## Join the fragments of changes/ into the changelog, set VERSION and tag it
 	$(PYTHON) changes/release.py "$$VERSION"

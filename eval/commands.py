@@ -92,8 +92,9 @@ def report_paper(
 
 @COMMANDS.command("results", rich_help_panel=SYSTEM)
 def write_results() -> None:
-    """Write eval/RESULTS.md, the page of all papers, from eval/papers."""
-    from eval.papers.results_page import RESULTS_PAGE, results_page
+    """Write eval/RESULTS.md and eval/RESULTS.html, the page of all papers, from eval/papers."""
+    from eval.papers.results_page import HTML_PAGE, RESULTS_PAGE, results_html, results_page
     from pipeline.paths import write_file
 
     print(write_file(RESULTS_PAGE, results_page().encode()))
+    print(write_file(HTML_PAGE, results_html().encode()))

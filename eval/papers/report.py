@@ -14,7 +14,7 @@ from eval.engine.results_cache import join_results
 from eval.engine.table import Table
 from eval.papers.experiments import PaperStep
 from eval.papers.paper import Paper, PaperResult, ResultSource, Scale
-from eval.papers.results_page import COLUMNS, result_cells
+from eval.papers.results_page import COLUMNS, result_cells, without_marks
 from pipeline.paths import write_file
 
 NOTICES: Mapping[Scale, str] = {
@@ -137,22 +137,17 @@ def write_report(report: PaperReport, folder: Path, started: datetime) -> tuple[
 
 
 def _html(report: PaperReport, folder: Path, started: datetime) -> str:
-    sections = [FinishedTable("overview", _plain(report.paper.citation), TableResult([report.overview()]), 0)]
+    sections = [FinishedTable("overview", without_marks(report.paper.citation), TableResult([report.overview()]), 0)]
     for number, results in report.numbers():
         own = report.result(results)
         kept = _kept(report, results)
-        plain_rows = tuple(tuple(_plain(str(cell)) for cell in row) for row in kept.rows)
+        plain_rows = tuple(tuple(without_marks(str(cell)) for cell in row) for row in kept.rows)
         tables = [replace(kept, rows=plain_rows), *own.tables]
         shown = TableResult(tables, own.charts, own.image_rows, own.figures, own.printed)
         sections.append(FinishedTable(number.replace(" ", "_"), results[0].subject, shown, report.seconds(results)))
     sections.append(FinishedTable("commands", "What was run", TableResult([report.commands()]), 0))
     configs = [(path.name, path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.yaml"))]
     return page_html(report.paper.title, report.notice, sections, {}, machine_facts(started), configs)
-
-
-def _plain(text: str) -> str:
-    """Return a text without Markdown's marks of code and emphasis."""
-    return text.replace("`", "").replace("*", "")
 
 
 def _markdown(report: PaperReport, started: datetime) -> str:

@@ -1,4 +1,4 @@
-"""Writes `eval/RESULTS.md`: every table and figure of the five papers, published figures next to ours."""
+"""Every table and figure of the five papers, published figures next to ours: `eval/RESULTS.md`, and as HTML."""
 
 from __future__ import annotations
 
@@ -6,10 +6,14 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
+from eval.engine.evaluation import TableResult
+from eval.engine.report import FinishedTable, page_html
 from eval.engine.table import Cell, Table
 from eval.papers.paper import PAPERS, VERDICTS, Paper, PaperResult, load_paper
 
 RESULTS_PAGE = Path(__file__).parents[1] / "RESULTS.md"
+HTML_PAGE = RESULTS_PAGE.with_suffix(".html")
+"""The same for a browser; it is not kept in the repository."""
 
 INTRODUCTION = """\
 # Results: the five papers, table by table
@@ -29,7 +33,8 @@ def results_page() -> str:
     """Return the page."""
     papers = {name: load_paper(name) for name in PAPERS}
     verdicts: list[tuple[Cell, ...]] = [(f"**{verdict}**", meaning) for verdict, meaning in VERDICTS.items()]
-    lines = [INTRODUCTION, _rows(("verdict", "meaning"), verdicts), "", _counts(papers), "", METHOD]
+    counts = _rows(("paper", *VERDICTS), _counts(papers), is_text=False)
+    lines = [INTRODUCTION, _rows(("verdict", "meaning"), verdicts), "", counts, "", METHOD]
     for name, paper in papers.items():
         lines += [f"## {paper.title}", "", f"{paper.citation} {paper.introduction}", ""]
         lines += [_rows(COLUMNS, [result_cells(result, with_code=True) for result in paper.results]), ""]
@@ -50,11 +55,33 @@ def result_cells(result: PaperResult, *, with_code: bool = False) -> tuple[str, 
     return result.number, result.subject, result.published, ours, verdict, command
 
 
-def _counts(papers: Mapping[str, Paper]) -> str:
+def results_html() -> str:
+    """Return the page as HTML."""
+    papers = {name: load_paper(name) for name in PAPERS}
+    verdicts = Table("Verdicts", ("verdict", "meaning"), tuple(VERDICTS.items()), is_text=True)
+    counts = Table("Numbers", ("paper", *VERDICTS), tuple(_counts(papers)))
+    sections = [FinishedTable("overview", "What was published, and what we get", TableResult([counts, verdicts]), 0)]
+    for name, paper in papers.items():
+        rows = tuple(tuple(without_marks(cell) for cell in result_cells(result)) for result in paper.results)
+        notes = [without_marks(text) for text in (paper.introduction, paper.notes) if text]
+        table = Table("Tables and figures", COLUMNS, rows, notes, is_text=True)
+        sections.append(FinishedTable(name, without_marks(paper.citation), TableResult([table]), 0))
+    facts = [("Figures", without_marks(METHOD).replace("\n", " "))]
+    return page_html(
+        "Results: the five papers", "Table by table, published figures next to ours", sections, {}, facts, ()
+    )
+
+
+def without_marks(text: str) -> str:
+    """Return a text without Markdown's marks of code and emphasis."""
+    return text.replace("`", "").replace("*", "")
+
+
+def _counts(papers: Mapping[str, Paper]) -> list[tuple[Cell, ...]]:
     counts = {name: Counter(result.verdict for result in paper.results) for name, paper in papers.items()}
     rows: list[tuple[Cell, ...]] = [(name, *(count[verdict] for verdict in VERDICTS)) for name, count in counts.items()]
     rows.append(("all", *(sum(count[verdict] for count in counts.values()) for verdict in VERDICTS)))
-    return _rows(("paper", *VERDICTS), rows, is_text=False)
+    return rows
 
 
 def _rows(columns: tuple[str, ...], rows: list[tuple[Cell, ...]] | list[tuple[str, ...]], is_text: bool = True) -> str:

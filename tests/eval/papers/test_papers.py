@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from html import unescape
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import typer
 from eval.engine.evaluate import find_table, table_options
 from eval.papers.experiments import planned_steps, write_scaled_config
 from eval.papers.paper import PAPERS, SCALES, Paper, ScaledExperiment, load_paper
-from eval.papers.results_page import RESULTS_PAGE, results_page
+from eval.papers.results_page import RESULTS_PAGE, result_cells, results_html, results_page, without_marks
 from pipeline.cli import command_line
 from pipeline.config import load_config
 from pipeline.registry import find_stages
@@ -75,6 +76,14 @@ def test_a_row_without_a_result_says_why(paper: Paper) -> None:
 
 def test_page_is_written_from_the_files() -> None:
     assert RESULTS_PAGE.read_text(encoding="utf-8") == results_page(), "run `make results`"
+
+
+def test_html_page_has_every_row_without_marks() -> None:
+    page = unescape(results_html())
+    for name in PAPERS:
+        for row in load_paper(name).results:
+            assert all(f"<td>{without_marks(cell)}</td>" in page for cell in result_cells(row)), row.number
+    assert "`" not in page.partition("<body>")[2]
 
 
 def test_kept_commands_exist(paper: Paper) -> None:
