@@ -29,10 +29,10 @@ from stages.training.recovery.drawings import draw_fitted
 from stages.training.recovery.estimate import base_estimate
 from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.shapes import TEST_INTERVAL, TRAIN_INTERVAL, VALIDATION_INTERVAL, random_training_shapes
-from stages.training.recovery.ship import slim_bytes
 from stages.training.recovery.surface import shape_points
 from stages.training.recovery.trained import PRETRAINED_FOLDER, find_models, load_recovery
 from stages.training.recovery.training import new_network, parameter_descriptions
+from stages.training.ship import slim_bytes
 from tests.command import shapemill
 from tests.stages.training.recovery.toy import PROGRAM, SMALL, config, train
 
@@ -240,14 +240,14 @@ def test_large_weights_are_shipped_as_bytes(tmp_path: Path, monkeypatch: pytest.
     path, slim = tmp_path / "whole.safetensors", tmp_path / "slim.safetensors"
     path.write_bytes(checkpoint_bytes(tensors, header))
     halves = len(slim_bytes(path))
-    monkeypatch.setattr("stages.training.recovery.ship.MAX_SHIPPED_BYTES", halves - 1000)
+    monkeypatch.setattr("stages.training.ship.MAX_SHIPPED_BYTES", halves - 1000)
     slim.write_bytes(slim_bytes(path))
     assert slim.stat().st_size <= halves - 1000
     clouds = torch.rand(8, 64, 3, generator=torch.Generator().manual_seed(0))
     whole, slimmed = (load_recovery(file).module(clouds) for file in (path, slim))
     finite = torch.isfinite(whole)
     assert float((whole - slimmed)[finite].detach().abs().max()) < 0.02 * float(whole[finite].detach().abs().max())
-    monkeypatch.setattr("stages.training.recovery.ship.MAX_SHIPPED_BYTES", 1000)
+    monkeypatch.setattr("stages.training.ship.MAX_SHIPPED_BYTES", 1000)
     with pytest.raises(CheckpointError, match="train a smaller model"):
         slim_bytes(path)
 

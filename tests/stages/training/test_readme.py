@@ -36,7 +36,7 @@ def write_model(folder: str, module: Any, header: dict[str, Any]) -> None:
     path.write_bytes(checkpoint_bytes(module.state_dict(), header))
 
 
-SAMPLING, PROGRAMS, VOTING = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+SAMPLING, PROGRAMS, VOTING, FINE_TUNING = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
 def run(example: str, **names: Any) -> dict[str, Any]:
@@ -78,6 +78,15 @@ def test_example_samples_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     defined = run(few, load_model=load_model, Path=Path, np=np)
     assert len(defined["programs"]) == 2
     assert defined["attempts"] >= 1
+
+
+def test_example_takes_a_step_from_the_shipped_encoder() -> None:
+    rng = torch.Generator().manual_seed(0)
+    clouds, labels = torch.rand((2, 64, 3), generator=rng) - 0.5, torch.randint(0, 6, (2, 64), generator=rng)
+    defined = run(FINE_TUNING, load_model=load_model, Path=Path, clouds=clouds, labels=labels)
+    before = load_model(Path("datasets/exemplars/models/encoder-pretraining")).module
+    changed = defined["network"][0].embedding.weight - before.embedding.weight
+    assert 0 < changed.abs().max() <= 1.1e-3, "a step of Adam"
 
 
 def test_table_of_kinds_is_complete() -> None:

@@ -12,6 +12,7 @@ from safetensors.numpy import load_file
 
 from stages.training.load import load_model
 from stages.training.point_encoder.trained import TrainedPointEncoder
+from stages.training.ship import slim_bytes
 from tests.command import shapemill
 
 ENTRY = {"name": "tiny", "kind": "point_encoder", "points": 64, "batch_size": 2, "steps": 3, "max_rounds": 2}
@@ -42,10 +43,15 @@ def test_encoder_learns_from_all_samples_of_a_mixture(tmp_path: Path) -> None:
 
     model = load_model(tmp_path / "toy-models" / "tiny-toy-0", {"collection": "toy"})
     assert isinstance(model, TrainedPointEncoder)
-    rng = np.random.default_rng(0)
-    embedded = model.embed(40.0 * rng.random((50, 3)))
+    cloud = 40.0 * np.random.default_rng(0).random((50, 3))
+    embedded = model.embed(cloud)
     assert embedded.shape == (50, 32)
     np.testing.assert_allclose(np.linalg.norm(embedded, axis=1), 1.0, atol=1e-5)
     card = (tmp_path / "toy-models" / "tiny-toy-0" / "README.md").read_text(encoding="utf-8")
     assert "A `point_encoder` of collection `toy`" in card
     assert json.dumps(model.header["counts"]["train"]) == '{"shapes": 6}'
+
+    shipped = tmp_path / "weights.safetensors"
+    shipped.write_bytes(slim_bytes(tmp_path / "toy-models" / "tiny-toy-0" / "weights.safetensors"))
+    assert shipped.stat().st_size < 300_000, "half precision"
+    np.testing.assert_allclose(load_model(shipped).embed(cloud), embedded, atol=0.02)

@@ -1,6 +1,6 @@
-"""Make trained models come with Shapemill: `python -m stages.training.recovery.ship OUT/chairs-models/clouds-chair-0`.
+"""Make trained models come with Shapemill: `python -m stages.training.ship OUT/chairs-models/clouds-chair-0`.
 
-For maintainers: models below `datasets/exemplars/models/` are committed, so that `make recover` works in a fresh clone.
+For maintainers: models below `datasets/exemplars/models/` are committed, so that they work in a fresh clone.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ import typer
 
 from pipeline.paths import write_file
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes, load_checkpoint
-from stages.training.recovery.trained import PRETRAINED_FOLDER, RECOVERY_KIND, load_recovery, quantized_to_bytes
+from stages.training.load import load_model
+from stages.training.recovery.trained import PRETRAINED_FOLDER, RECOVERY_KIND, quantized_to_bytes
 
 MAX_SHIPPED_BYTES = 4_000_000
 MAX_BYTE_TENSORS = 2
-"""Bytes are coarser than half precision."""
+"""Bytes are coarser than half precision; only a recovery model is read back from them."""
 
 
 def slim_bytes(path: Path) -> bytes:
@@ -24,11 +25,12 @@ def slim_bytes(path: Path) -> bytes:
 
     The model answers nearly the same. Raises CheckpointError for unusable weights and for those still too large.
     """
-    load_recovery(path)
-    tensors, header = load_checkpoint(path, {"kind": RECOVERY_KIND})
+    load_model(path)
+    tensors, header = load_checkpoint(path, {})
     slim = {name: tensor.half() if tensor.is_floating_point() else tensor for name, tensor in tensors.items()}
     content = checkpoint_bytes(slim, header)
-    for name in sorted(slim, key=lambda name: -slim[name].numel())[:MAX_BYTE_TENSORS]:
+    largest = sorted(slim, key=lambda name: -slim[name].numel())[:MAX_BYTE_TENSORS]
+    for name in largest if header["kind"] == RECOVERY_KIND else ():
         if len(content) > MAX_SHIPPED_BYTES:
             slim |= quantized_to_bytes(name, tensors[name])
             content = checkpoint_bytes(slim, header)
