@@ -209,8 +209,9 @@ def _kit_shard(plan: Plan, model: KitModelConfig, kind: str, kit: str) -> Shard:
 def _collection_shard(plan: Plan, model: PointEncoderConfig, name: str) -> Shard:
     """Plan the prepared clouds of a dataset, for all encoders of at most as many shapes."""
     shards = [shard for shard in collection_shards(plan) if shard.params["split"] in TRAINING_SPLITS]
+    common = shards[0].params if shards else {}
     params: dict[str, Any] = {
-        **(shards[0].params if shards else {}),
+        **{key: common[key] for key in ("producer", "joined") if key in common},
         "job": "data",
         "kind": model.kind,
         "collection": name,
@@ -218,9 +219,7 @@ def _collection_shard(plan: Plan, model: PointEncoderConfig, name: str) -> Shard
         "splits": {shard.name: shard.params["split"] for shard in shards},
         "samples_of": {shard.name: shard.params["samples"] for shard in shards},
     }
-    for reserved in ("split", "samples"):
-        params.pop(reserved, None)
-    inputs = dict.fromkeys(name for shard in shards for name in shard.inputs)
+    inputs = dict.fromkeys(read for shard in shards for read in shard.inputs)
     return Shard(f"{name}-{model.kind}-{model.max_shapes}", params, tuple(inputs), (kind_module(model.kind),))
 
 

@@ -64,10 +64,9 @@ class PointEncoder(nn.Module):
 
 
 class OffsetConvolution(nn.Module):
-    """The maximum over the neighbours j of `W1 (x_j - x_i)`, followed by `W2 x_i`, each normed for itself.
+    """The maximum over the neighbours j of `W1 (x_j - x_i)`, followed by `W2 x_i`; each is normed separately.
 
-    Offsets are some thirty times shorter than positions. In one sum, normed together, they nearly vanish: a network
-    with `EdgeConvolution` first learns a third as fast.
+    Offsets are some thirty times shorter than positions. In one sum, normed together, they nearly vanish.
     """
 
     def __init__(self, width: int) -> None:

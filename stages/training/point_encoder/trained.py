@@ -30,9 +30,12 @@ class TrainedPointEncoder:
         """Embed a cloud float (n, 3) of any place and size, y up: unit vectors float32 (n, 32).
 
         Points of one part lie close together. It was trained on clouds of some 1,000 points.
+        Raises ValueError for an array of another shape, without points, or with numbers that are not finite.
         """
-        cloud = torch.from_numpy(scaled_to_diagonal(np.asarray(points, np.float64)))
-        embedded: npt.NDArray[np.float32] = self.module(cloud[None])[0].numpy()
+        cloud = np.asarray(points, np.float64)
+        if cloud.ndim != 2 or cloud.shape[1] != 3 or not len(cloud) or not np.isfinite(cloud).all():
+            raise ValueError(f"a cloud is finite points (n, 3), at least one; this one has the shape {cloud.shape}")
+        embedded: npt.NDArray[np.float32] = self.module(torch.from_numpy(scaled_to_diagonal(cloud))[None])[0].numpy()
         return embedded
 
 

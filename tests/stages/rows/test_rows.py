@@ -50,6 +50,10 @@ def changes(rows: list[Row], times: int) -> Iterator[RowChange]:
             yield row.insertion(index, times) if times > 0 else row.removal(index)
 
 
+def facts(row: Row) -> list[object]:
+    return [value.tolist() if isinstance(value, np.ndarray) else value for value in vars(row).values()]
+
+
 def check(kit: Kit, layout: Layout) -> None:
     """Parts touch where the layout has contacts and nowhere else, by the contact test on their meshes."""
     shape = layout.shape(kit)
@@ -66,6 +70,18 @@ def test_every_change_keeps_contacts_and_adds_none(name: str, times: int) -> Non
     assert tried, f"the {name} has rows"
     for change in tried[:: 1 + len(tried) // 12]:
         check(kit, repeat(layout, change))
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("may_stretch", [False, True])
+def test_rules_asked_of_all_planes_at_once_leave_out_no_row(
+    name: str, may_stretch: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same rows are found where every plane is asked by its slab alone."""
+    _, layout = MODELS[name]()
+    found = find_rows(layout, may_stretch=may_stretch)
+    monkeypatch.setattr("stages.rows.rows._may_end_slabs", lambda _, planes, *__: np.ones(len(planes), dtype=bool))
+    assert [facts(row) for row in found] == [facts(row) for row in find_rows(layout, may_stretch=may_stretch)]
 
 
 @pytest.mark.parametrize("name", MODELS)

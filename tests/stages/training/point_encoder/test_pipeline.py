@@ -47,6 +47,9 @@ def test_encoder_learns_from_all_samples_of_a_mixture(tmp_path: Path) -> None:
     embedded = model.embed(cloud)
     assert embedded.shape == (50, 32)
     np.testing.assert_allclose(np.linalg.norm(embedded, axis=1), 1.0, atol=1e-5)
+    for wrong in (cloud[:0], cloud[:, :2], np.full((4, 3), np.nan)):
+        with pytest.raises(ValueError, match="a cloud is finite points"):
+            model.embed(wrong)
     card = (tmp_path / "toy-models" / "tiny-toy-0" / "README.md").read_text(encoding="utf-8")
     assert "A `point_encoder` of collection `toy`" in card
     assert json.dumps(model.header["counts"]["train"]) == '{"shapes": 6}'
