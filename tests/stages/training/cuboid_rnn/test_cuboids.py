@@ -76,8 +76,8 @@ def test_network_learns_and_samples_two_shapes() -> None:
     optimizer = torch.optim.Adam(learner.module.parameters(), lr=4e-3)
     noise = torch.Generator().manual_seed(0)
     stream = learner.batches(np.random.default_rng(0))
-    for step in range(400):
-        optimizer.param_groups[0]["lr"] = 8e-3 * (1 - step / 400)
+    for step in range(600):
+        optimizer.param_groups[0]["lr"] = 8e-3 * (1 - step / 600)
         optimizer.zero_grad()
         torch.autograd.backward(learner.losses(next(stream), step, noise)["loss"])
         torch.nn.utils.clip_grad_norm_(learner.module.parameters(), 1.0)
