@@ -155,6 +155,8 @@ _saved: list[str] = []
 
 
 def _compile(kernel: dispatcher.Dispatcher, signature: Any) -> Any:
+    # A wrapper for callers in C takes a tenth of the time of compilation, and kernels have no such callers.
+    kernel.targetoptions["no_cfunc_wrapper"] = True
     with global_compiler_lock:
         _compilations.append([])
         collects = gc.isenabled()
