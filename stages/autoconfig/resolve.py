@@ -26,6 +26,7 @@ from stages.exemplars.hubs import hub_types
 from stages.exemplars.identify import IdentifiedParts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import STRICTEST, KitConfig
+from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
 from stages.shape.kit import Assembly, Kit
 from stages.shape.physics.judge import unmet_requirement
 from stages.shape.physics.settings import Requirements
@@ -239,9 +240,9 @@ def _reason(key: str, chosen: CandidateSetting, candidates: Sequence[CandidateSe
     stricter: list[Setting] = []
     if key == "contact.kinds":
         stricter = [replace(setting, kinds=kinds) for kinds in CANDIDATE_KINDS if len(kinds) > len(setting.kinds)]
-    elif key == "grammar" and setting.grammar in CANDIDATE_GRAMMARS:
-        grammars = CANDIDATE_GRAMMARS[: CANDIDATE_GRAMMARS.index(setting.grammar)]
-        stricter = [replace(setting, grammar=grammar) for grammar in grammars]
+    elif key == "grammar":
+        levels = (*STRICTNESS, *SLOT_LEVELS)
+        stricter = [replace(setting, grammar=level) for level in levels[: levels.index(setting.grammar)]]
     elif key == "hubs.types" and setting.hubs:
         stricter = [replace(setting, hubs=())]
     for other in reversed(stricter):

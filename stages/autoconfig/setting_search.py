@@ -35,6 +35,12 @@ MAX_PART_TRIES = 8_000_000
 MAX_HUB_TYPES = 4
 """Most hub types that are left out."""
 CANDIDATE_GRAMMARS: tuple[Strictness, ...] = ("multiset", "count_and_pairs", *SLOT_LEVELS)
+STRICTER_LEVELS: dict[Strictness, Strictness] = {"count_and_pairs": "count_and_set"}
+"""Levels that are tried only once a looser one suffices. As candidates of their own they would use up MAX_PART_TRIES.
+
+Under `count_and_pairs` a floor of equal tiles may have holes, since each of the tiles around one has a seen number of
+neighbours and no new pair. Under `count_and_set` it may not.
+"""
 CANDIDATE_KINDS: tuple[tuple[ContactKind, ...], ...] = (("point", "line", "face"), ("line", "face"), ("face",))
 
 
@@ -106,7 +112,8 @@ def parts_without_hubs(analysis: ContactAnalysis, hubs: tuple[int, ...]) -> int:
 def search_settings(analysis: ContactAnalysis, space: SearchSpace, tries: int) -> list[CandidateSetting]:
     """Return the candidates that were tried, the chosen one last.
 
-    The first sufficient candidate is chosen, else the one of the best score, of equals the stricter one.
+    The first sufficient candidate is chosen, or its level of STRICTER_LEVELS if that suffices too; else the one of the
+    best score, of equals the stricter one.
     Each has `tries` by each method, and more if it looks promising; after MAX_PART_TRIES only slots are tried. The
     loosest level of slots admits whatever the other levels admit: if it finds next to nothing, they are skipped.
     """
@@ -132,10 +139,20 @@ class _SettingSearch:
                 continue
             self._tried.append(candidate)
             if candidate.is_sufficient:
-                return self._tried
+                return self._with_stricter(candidate)
         if self._tried:
             best = max(range(len(self._tried)), key=lambda index: (self._tried[index].score, -index))
             self._tried.append(self._tried.pop(best))
+        return self._tried
+
+    def _with_stricter(self, chosen: CandidateSetting) -> list[CandidateSetting]:
+        """Return what was tried and the stricter level of a sufficient candidate, the chosen one of both last."""
+        grammar = STRICTER_LEVELS.get(chosen.setting.grammar)
+        if grammar is None or len(self._space.grammars) == 1:
+            return self._tried
+        stricter = self._candidate(replace(chosen.setting, grammar=grammar))
+        if stricter is not None:
+            self._tried.insert(len(self._tried) - (not stricter.is_sufficient), stricter)
         return self._tried
 
     def _is_skipped(self, setting: Setting) -> bool:

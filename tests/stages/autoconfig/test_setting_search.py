@@ -36,3 +36,26 @@ def test_stricter_slots_are_tried_only_if_the_loosest_find_something(
     assert sorted(tried) == sorted(expected)  # once each
     assert {candidate.setting.grammar for candidate in candidates} == set(expected)
     assert candidates[-1].setting.grammar == "slots"
+
+
+@pytest.mark.parametrize(
+    ("sufficient", "expected"),
+    [
+        ({"count_and_pairs"}, ["multiset", "count_and_set", "count_and_pairs"]),
+        ({"count_and_set", "count_and_pairs"}, ["multiset", "count_and_pairs", "count_and_set"]),
+        ({"multiset", "count_and_set", "count_and_pairs"}, ["multiset"]),
+    ],
+)
+def test_grammar_between_two_candidates_is_taken_where_it_suffices_too(
+    sufficient: set[str], expected: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def try_setting(_: Any, setting: Setting, *__: Any) -> CandidateSetting:
+        count = 100 if setting.grammar in sufficient else 0
+        return CandidateSetting(setting, TrialResult(100, count, count, 0.1, 0.1, copied_share=0.5), 1.0)
+
+    monkeypatch.setattr(setting_search, "_try_setting", try_setting)
+    shape = chain(3)
+    analysis = ContactAnalysis(identify_parts(models_of(CHAIN, [shape]), config_of([shape])), 1e-3, 1e-2, "y")
+    candidates = search_settings(analysis, SearchSpace(kinds=(("face",),), hubs=()), 100)
+    assert [candidate.setting.grammar for candidate in candidates] == expected, "the chosen one last"
+    assert candidates[-1].is_sufficient
