@@ -112,8 +112,8 @@ def parts_without_hubs(analysis: ContactAnalysis, hubs: tuple[int, ...]) -> int:
 def search_settings(analysis: ContactAnalysis, space: SearchSpace, tries: int) -> list[CandidateSetting]:
     """Return the candidates that were tried, the chosen one last.
 
-    The first sufficient candidate is chosen, or its level of STRICTER_LEVELS if that suffices too; else the one of the
-    best score, of equals the stricter one.
+    The first sufficient candidate is chosen, or its level of STRICTER_LEVELS if that suffices too and loses no other
+    labels; else the one of the best score, of equals the stricter one.
     Each has `tries` by each method, and more if it looks promising; after MAX_PART_TRIES only slots are tried. The
     loosest level of slots admits whatever the other levels admit: if it finds next to nothing, they are skipped.
     """
@@ -152,7 +152,9 @@ class _SettingSearch:
             return self._tried
         stricter = self._candidate(replace(chosen.setting, grammar=grammar))
         if stricter is not None:
-            self._tried.insert(len(self._tried) - (not stricter.is_sufficient), stricter)
+            keeps_as_much = set(stricter.trial.lost_labels) <= set(chosen.trial.lost_labels)
+            is_chosen = stricter.is_sufficient and keeps_as_much
+            self._tried.insert(len(self._tried) - (not is_chosen), stricter)
         return self._tried
 
     def _is_skipped(self, setting: Setting) -> bool:

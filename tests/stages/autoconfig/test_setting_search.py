@@ -39,19 +39,24 @@ def test_stricter_slots_are_tried_only_if_the_loosest_find_something(
 
 
 @pytest.mark.parametrize(
-    ("sufficient", "expected"),
+    ("sufficient", "lost", "expected"),
     [
-        ({"count_and_pairs"}, ["multiset", "count_and_set", "count_and_pairs"]),
-        ({"count_and_set", "count_and_pairs"}, ["multiset", "count_and_pairs", "count_and_set"]),
-        ({"multiset", "count_and_set", "count_and_pairs"}, ["multiset"]),
+        ({"count_and_pairs"}, (), ["multiset", "count_and_set", "count_and_pairs"]),
+        ({"count_and_set", "count_and_pairs"}, (), ["multiset", "count_and_pairs", "count_and_set"]),
+        ({"count_and_set", "count_and_pairs"}, ("door",), ["multiset", "count_and_set", "count_and_pairs"]),
+        ({"multiset", "count_and_set", "count_and_pairs"}, (), ["multiset"]),
     ],
 )
 def test_grammar_between_two_candidates_is_taken_where_it_suffices_too(
-    sufficient: set[str], expected: list[str], monkeypatch: pytest.MonkeyPatch
+    sufficient: set[str], lost: tuple[str, ...], expected: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """But not where variants lose part types that the looser grammar keeps."""
+
     def try_setting(_: Any, setting: Setting, *__: Any) -> CandidateSetting:
         count = 100 if setting.grammar in sufficient else 0
-        return CandidateSetting(setting, TrialResult(100, count, count, 0.1, 0.1, copied_share=0.5), 1.0)
+        labels = lost if setting.grammar == "count_and_set" else ()
+        found = TrialResult(100, count, count, 0.1, 0.1, copied_share=0.5, lost_labels=labels)
+        return CandidateSetting(setting, found, 1.0)
 
     monkeypatch.setattr(setting_search, "_try_setting", try_setting)
     shape = chain(3)
