@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.proportions.distinct_warps import DistinctWarps
 from stages.proportions.settings import ProportionsConfig
-from stages.proportions.text import Proportions, ProportionShapes, Unwarped
+from stages.proportions.text import AXES, Proportions, ProportionShapes, Unwarped
 from stages.proportions.warp import FACTOR_DECIMALS, Lattice, Warp
 from stages.proportions.warp_check import warp_fault
 from stages.rows.changes import Change
@@ -70,10 +70,10 @@ def drawn_layouts(
     own = DrawnLayout((), shapes.unwarped(exemplar, ()), _distinct(shapes.unwarped(exemplar, ()), config))
     if rows is None:
         return [own]
-    draws = LayoutDraws(shapes.layout(exemplar), rows, is_alone=True)
+    draws = LayoutDraws(shapes.layout(exemplar), rows, is_alone=True, up=AXES.index(shapes.kit.up))
     found: list[DrawnLayout] = []
     known = {draws.exemplar.key}
-    has_rows = bool(draws.rows or draws.circles)
+    has_rows = bool(draws.rows or draws.circles or draws.mirrored_bays)
     for reason, count in sorted(draws.refused.items()):
         reject(f"row: {reason}", count)
     if not has_rows:

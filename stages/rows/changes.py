@@ -1,4 +1,6 @@
-"""Changes of a layout: periods of a row along a line, or another number of sectors about an axis; and their JSON."""
+"""Changes of a layout: periods of a row along a line, bays between mirrored ends, or another number of sectors about an
+axis; and their JSON.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from stages.rows.layout import Layout
+from stages.rows.mirrored_bays import with_mirrored_bays
 from stages.rows.slabs import RowChange, repeat
 from stages.rows.turns import Turn, turned
 
@@ -20,7 +23,9 @@ MAX_TIMES = 1000
 
 def changed(layout: Layout, change: Change) -> Layout:
     """Return a changed layout. Raises SlabError for a change that is not valid."""
-    return turned(layout, change) if isinstance(change, Turn) else repeat(layout, change)
+    if isinstance(change, Turn):
+        return turned(layout, change)
+    return with_mirrored_bays(layout, change) if change.is_mirrored else repeat(layout, change)
 
 
 def change_json(change: Change) -> dict[str, Any]:
@@ -34,6 +39,7 @@ def change_json(change: Change) -> dict[str, Any]:
         "at": change.at,
         "times": change.times,
         **({"is_bay": True} if change.is_bay else {}),
+        **({"is_mirrored": True} if change.is_mirrored else {}),
     }
 
 
@@ -62,4 +68,5 @@ def read_change(stated: Mapping[str, Any]) -> Change:
         raise ValueError(
             f"a row changes by -1 or by 1 to {MAX_TIMES} periods, and its step follows its normal, unlike {stated}"
         )
-    return RowChange(normal, shift, at, times, bool(stated.get("is_bay", False)))
+    is_bay, is_mirrored = (bool(stated.get(key, False)) for key in ("is_bay", "is_mirrored"))
+    return RowChange(normal, shift, at, times, is_bay, is_mirrored)

@@ -9,11 +9,12 @@ import numpy as np
 
 from stages.rows.changes import Change
 from stages.rows.layout import Layout
+from stages.rows.mirrored_bays import MIRRORED_ENDS, MirroredBay, find_mirrored_bays, with_mirrored_bays
 from stages.rows.rows import TOO_SMALL, Row, find_rows, is_visible
 from stages.rows.settings import RowsConfig
 from stages.rows.slabs import RowChange, SlabError, repeat
 from stages.rows.steps import bays_of, longest_row, steps_of
-from stages.rows.turns import MIN_SECTORS, find_circles, turned
+from stages.rows.turns import MIN_SECTORS, Turn, find_circles, turned
 
 MAX_PARTS_FACTOR = 4.0
 """Maximum number of parts of a layout, as a multiple of that of its exemplar."""
@@ -26,11 +27,12 @@ TRIES_PER_CHANGE = 6
 class LayoutDraws:
     """Draws layouts of one exemplar. What it remembers saves time and never changes a result."""
 
-    def __init__(self, layout: Layout, config: RowsConfig, is_alone: bool = False) -> None:
+    def __init__(self, layout: Layout, config: RowsConfig, is_alone: bool = False, up: int | None = None) -> None:
         """Find the rows of a layout.
 
         is_alone: whether nothing but rows makes layouts: then bays are inserted and removed too, and rows that are too
             small to be seen stay as they are
+        up: index of the axis that points up; with it, bays between mirrored ends are inserted too
         """
         self.exemplar, self.config, self._is_alone = layout, config, is_alone
         self.steps = [*steps_of(layout), *(bays_of(layout) if is_alone else ())]
@@ -38,6 +40,7 @@ class LayoutDraws:
         self._rows: dict[bytes, list[Row]] = {}
         self._limits = [self._limits_of(step.count) for step in self.steps]
         self.circles = find_circles(layout)
+        self.mirrored_bays: list[MirroredBay] = [] if up is None else find_mirrored_bays(layout, up)
 
     @property
     def rows(self) -> Sequence[Row]:
@@ -47,15 +50,15 @@ class LayoutDraws:
     def draw(self, rng: np.random.Generator) -> tuple[tuple[Change, ...], Layout] | None:
         """Return changes and the layout that they make, or None where no change was possible."""
         layout, changes = self.exemplar, list[Change]()
-        if self.circles and rng.integers(len(self.circles) + len(self.rows)) < len(self.circles):
-            circle = self.circles[int(rng.integers(len(self.circles)))]
-            least, most = self._limits_of(circle.sectors)
-            count = int(rng.integers(max(least, MIN_SECTORS), most + 1))
-            if count != circle.sectors:
-                changes.append(circle.turn(count))
-                layout = turned(layout, circle.turn(count))
-            if not self.rows:
-                return (tuple(changes), layout) if changes else None
+        first = self._drawn_bays(rng) or self._drawn_circle(rng)
+        if first is not None:
+            changes.append(first)
+            made = self._changed(first)
+            if made is None:
+                return None
+            layout = made
+        if not self.rows and (self.circles or self.mirrored_bays):
+            return (tuple(changes), layout) if changes else None
         for _ in range(int(rng.integers(1, self.config.max_changes + 1))):
             for _ in range(TRIES_PER_CHANGE):
                 changed = self._change(layout, rng)
@@ -64,6 +67,39 @@ class LayoutDraws:
                     changes += changed[0]
                     break
         return (tuple(changes), layout) if changes and layout.key != self.exemplar.key else None
+
+    def _drawn_bays(self, rng: np.random.Generator) -> RowChange | None:
+        """Return bays between mirrored ends that are inserted, or None where rows or circles are changed alone."""
+        count = len(self.mirrored_bays)
+        most = self._limits_of(MIRRORED_ENDS)[1] - MIRRORED_ENDS
+        if not count or most < 1 or rng.integers(count + len(self.circles) + len(self.rows)) >= count:
+            return None
+        return self.mirrored_bays[int(rng.integers(count))].insertion(int(rng.integers(1, most + 1)))
+
+    def _drawn_circle(self, rng: np.random.Generator) -> Turn | None:
+        """Return another number of sectors of a circle, or None where it stays or rows are changed alone."""
+        if not self.circles or rng.integers(len(self.circles) + len(self.rows)) >= len(self.circles):
+            return None
+        circle = self.circles[int(rng.integers(len(self.circles)))]
+        least, most = self._limits_of(circle.sectors)
+        count = int(rng.integers(max(least, MIN_SECTORS), most + 1))
+        return circle.turn(count) if count != circle.sectors else None
+
+    def _changed(self, change: RowChange | Turn) -> Layout | None:
+        """Return the exemplar with more bays between its ends, within the limits, or None; or with other sectors."""
+        if isinstance(change, Turn):
+            return turned(self.exemplar, change)
+        try:
+            made = with_mirrored_bays(self.exemplar, change)
+        except SlabError:
+            return None
+        return made if self._is_within_limits(made) else None
+
+    def _is_within_limits(self, layout: Layout) -> bool:
+        """Return whether a layout is neither too large nor of too many parts."""
+        if len(layout) > MAX_PARTS_FACTOR * len(self.exemplar):
+            return False
+        return bool((layout.extent <= MAX_SIDE_FACTOR * self.exemplar.extent).all())
 
     def _change(self, layout: Layout, rng: np.random.Generator) -> tuple[list[RowChange], Layout] | None:
         """Return one row of a layout made longer or shorter, or None where the draw is not valid."""
@@ -103,9 +139,7 @@ class LayoutDraws:
             changed = repeat(layout, change)
         except SlabError:
             return None
-        if len(changed) > MAX_PARTS_FACTOR * len(self.exemplar):
-            return None
-        if (changed.extent > MAX_SIDE_FACTOR * self.exemplar.extent).any():
+        if not self._is_within_limits(changed):
             return None
         for step, (least, most) in zip(self.steps, self._limits, strict=True):
             if step.is_bay and not change.is_bay:

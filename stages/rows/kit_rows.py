@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.rows.layout import Layout, layout_of
+from stages.rows.mirrored_bays import MIRRORED_ENDS, MirroredBay, find_mirrored_bays
 from stages.rows.rows import Row, find_rows, is_visible
 from stages.rows.steps import bay_ends, bays_of
 from stages.rows.turns import Circle, find_circles
@@ -33,6 +34,7 @@ class KitRow:
     count: int
     direction: str
     is_bay: bool = False
+    is_mirrored: bool = False
 
     @property
     def sentence(self) -> str:
@@ -41,13 +43,14 @@ class KitRow:
         more = " and more" if len(self.labels) > MAX_LABELS_SHOWN else ""
         if self.is_bay:
             ends = ", ".join(label for label, _ in self.labels[:MAX_LABELS_SHOWN])
-            return f"bays between {ends}{more}, {self.direction}"
+            return f"bays between {'mirrored ' if self.is_mirrored else ''}{ends}{more}, {self.direction}"
         return f"{self.count} times {', '.join(names)}{more}, {self.direction}"
 
 
 def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
     """Return the rows of all exemplars of a kit that can be seen: circles, then the longest along each direction, then
-    bays."""
+    bays, those between mirrored ends last.
+    """
     found: list[KitRow] = []
     for exemplar in kit.exemplars:
         layout = layout_of(kit, exemplar)
@@ -59,7 +62,11 @@ def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
             if is_visible(layout, row.copied, row.count)
         ]
         bays = [_described_bay(kit, exemplar.name, layout, row) for row in along_bays]
-        found += dict.fromkeys([*circles, *rows, *bays])
+        mirrored = [
+            _described_mirrored(kit, exemplar.name, layout, bay)
+            for bay in find_mirrored_bays(layout, "xyz".index(kit.up))
+        ]
+        found += dict.fromkeys([*circles, *rows, *bays, *mirrored])
     return tuple(found)
 
 
@@ -94,6 +101,12 @@ def _described_bay(kit: Kit, exemplar: str, layout: Layout, row: Row) -> KitRow:
     ends = bay_ends(layout, row.shift) & (layout.mates(row.shift) >= 0)
     counts = Counter(kit.types[kind].label for kind in layout.types[ends].tolist())
     return KitRow(exemplar, tuple(counts.most_common()), row.count, _direction(row), is_bay=True)
+
+
+def _described_mirrored(kit: Kit, exemplar: str, layout: Layout, bay: MirroredBay) -> KitRow:
+    counts = Counter(kit.types[kind].label for kind in layout.types[bay.ends].tolist())
+    ends, direction = tuple(counts.most_common()), f"along {'xyz'[bay.axis]}"
+    return KitRow(exemplar, ends, MIRRORED_ENDS, direction, is_bay=True, is_mirrored=True)
 
 
 def _direction(row: Row) -> str:

@@ -32,7 +32,11 @@ class RowsConfig(StrictModel):
         description="Minimum length of a row, as a multiple of its length in the exemplar, rounded down to at least 1.",
     )
     max_count: float = Field(
-        2.0, ge=1, le=20, description="Maximum length of a row, as a multiple of its length in the exemplar."
+        2.0,
+        ge=1,
+        le=20,
+        description="Maximum length of a row, as a multiple of its length in the exemplar. The ends of a shape between "
+        "which bays are inserted count as a row of two.",
     )
     max_changes: int = Field(3, ge=1, le=20, description="Maximum number of rows that one shape changes.")
     size: Literal["keep", "grow"] = Field(

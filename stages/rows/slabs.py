@@ -18,7 +18,7 @@ import numpy as np
 
 from stages.rows.layout import Layout, sorted_edges, with_classes
 from stages.rows.spanning import Span
-from stages.shape.arrays import BoolArray, FloatArray
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import relative_poses
 from stages.shape.kit import PartMesh
 from stages.shape.stretch import STRETCHED_DEPTH
@@ -53,6 +53,7 @@ class RowChange:
     at: where the slab ends along the normal
     times: number of periods inserted, or -1 for one that is removed
     is_bay: whether a period holds everything in the slab, also what occurs once
+    is_mirrored: whether the ends of the bay are mirror images, or turned by 180 degrees, instead of translates
     """
 
     normal: FloatArray
@@ -60,6 +61,7 @@ class RowChange:
     at: float
     times: int
     is_bay: bool = False
+    is_mirrored: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +112,7 @@ class Slab:
         return has_one
 
     @cached_property
-    def _reach(self) -> float:
+    def reach(self) -> float:
         """How far parts of a bay may stand out of it: the thickness of the parts at its ends."""
         thickness = float((self.high - self.low)[self._begins & self._has_mate].max(initial=0.0))
         return min(thickness, MAX_REACH_SHARE * (self.at - self.start)) + self.layout.tolerance
@@ -121,7 +123,7 @@ class Slab:
         if not self.is_bay:
             return np.zeros(len(self.low), dtype=bool)
         tolerance = self.layout.tolerance
-        begins = (self.low >= self.start - self._reach) & (self.low < self.at - tolerance)
+        begins = (self.low >= self.start - self.reach) & (self.low < self.at - tolerance)
         is_full = (self.low <= self.start + tolerance) & (self.high >= self.at - tolerance)
         filling: BoolArray = begins & ~self._has_mate & (is_full | (self.high > self.at + tolerance))
         return filling
@@ -133,14 +135,14 @@ class Slab:
         overhanging = np.zeros(len(self.low), dtype=bool)
         for part in np.flatnonzero(long).tolist():
             heights = self.layout.heights(part, self.normal)
-            begin = max(self.start, float(self.low[part])) + self._reach
+            begin = max(self.start, float(self.low[part])) + self.reach
             overhanging[part] = not ((heights > begin) & (heights < self.at - 2.0 * self.layout.tolerance)).any()
         return overhanging
 
     @cached_property
     def _stands_out(self) -> BoolArray:
         """Which parts fill a bay and are copied with it, such as the door in front of a cabinet, bool (n,)."""
-        standing_out: BoolArray = self._fills & ~self._overhangs & (self.high <= self.at + self._reach)
+        standing_out: BoolArray = self._fills & ~self._overhangs & (self.high <= self.at + self.reach)
         return standing_out
 
     @cached_property
@@ -181,7 +183,7 @@ class Slab:
             return "a part that occurs once crosses the end of the slab"
         if (crosses & recurs & (self.previous < 0)).any():
             return "no part crosses the start of the slab as one crosses its end"
-        i, j = self._both_ways
+        i, j = self.both_ways
         if (before[i] & beyond[j]).any():
             return "parts before and after the slab touch"
         if not self.is_bay and self._is_held_once:
@@ -225,7 +227,7 @@ class Slab:
         crosses = before & (self.high > self.start + self.layout.tolerance)
         if not self._leads_into(np.flatnonzero(crosses), recurs):
             return "no part crosses the end of the slab as one crosses its start"
-        i, j = self._both_ways
+        i, j = self.both_ways
         if (before[i] & beyond[j]).any():
             return "parts before and after the slab touch"
         if not self.is_bay and self._is_held_once:
@@ -252,7 +254,7 @@ class Slab:
 
         It holds no row: a long drawer front has one handle, and a longer one has no two.
         """
-        i, j = self._both_ways
+        i, j = self.both_ways
         held = self.recurs[i] & self._is_spanning[j]
         parts, holders, count = i[held], j[held].astype(np.int64), len(self.layout)
         holds_row = np.zeros(len(parts), dtype=bool)
@@ -347,7 +349,8 @@ class Slab:
         return None if can_stretch else CANNOT_STRETCH
 
     @property
-    def _both_ways(self) -> tuple[np.ndarray, np.ndarray]:
+    def both_ways(self) -> tuple[np.ndarray, np.ndarray]:
+        """Both parts of each contact, seen from each of them, int (2 m,) each."""
         edges = self.layout.edges
         return np.concatenate([edges[:, 0], edges[:, 1]]), np.concatenate([edges[:, 1], edges[:, 0]])
 
@@ -414,12 +417,12 @@ def repeat(layout: Layout, change: RowChange) -> Layout:
         raise SlabError(fault)
     made = inserted(slab, change.times) if change.times > 0 else removed(slab)
     kept = np.flatnonzero(~slab.within) if change.times < 0 else np.arange(len(layout))
-    if not _touch_all(made, np.searchsorted(kept, slab.stretched)):
+    if not touch_all(made, np.searchsorted(kept, slab.stretched)):
         raise SlabError(APART)
     return made
 
 
-def _touch_all(layout: Layout, parts: np.ndarray) -> bool:
+def touch_all(layout: Layout, parts: np.ndarray) -> bool:
     """Return whether parts int64 (k,) touch all that they have a contact with, up to STRETCHED_DEPTH."""
     if not len(parts):
         return True
@@ -467,6 +470,15 @@ def inserted(slab: Slab, times: int) -> Layout:
             edges.append((i, j))
             if slab.recurs[i] and slab.recurs[j]:
                 edges += [(copy(i, number), copy(j, number)) for number in range(1, times + 1)]
+    return with_copies(slab, copied, times, sorted_edges(edges))
+
+
+def with_copies(slab: Slab, copied: np.ndarray, times: int, edges: IntArray) -> Layout:
+    """Return the layout with `times` copies of some parts of a slab, after its own parts, and with these contacts.
+
+    copied: int64 (k,), ascending
+    """
+    layout = slab.layout
     meshes, poses = _moved(slab, times)
     copies = []
     for number in range(1, times + 1):
@@ -480,7 +492,7 @@ def inserted(slab: Slab, times: int) -> Layout:
         poses=np.concatenate([poses, *copies]),
         types=layout.types[kept],
         origins=layout.origins[kept],
-        edges=sorted_edges(edges),
+        edges=edges,
     )
     keys = _class_keys(slab, times)
     return with_classes(grown, [keys[part] for part in kept.tolist()])

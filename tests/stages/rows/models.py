@@ -271,3 +271,48 @@ def fronts(tall: float = 0.7) -> tuple[Kit, Layout]:
     handles = [("handle", pose(0.0, top, 0.12)) for top in tops]
     meshes |= {"handle": box(0.3, 0.04, 0.04)}
     return layout(meshes, [("back", pose(0.0, 1.0, 0.0)), *closed, *handles])
+
+
+def slanted(width: float, height: float, depth: float, slant: float) -> trimesh.Trimesh:
+    """A prism along z whose underside is moved by `slant` along x; no turn about y leaves it as it is."""
+    x, y, z = width / 2, height / 2, depth / 2
+    ends = [(-x + slant, -y), (x + slant, -y), (x, y), (-x, y)]
+    return trimesh.Trimesh([(a, b, c) for c in (-z, z) for a, b in ends]).convex_hull
+
+
+def mirrored(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """The mirror image of a mesh along x."""
+    other = mesh.copy()
+    other.vertices[:, 0] *= -1
+    other.invert()
+    return other
+
+
+@cache
+def table_on_frames(length: float = 2.0, step: float = 0.0) -> tuple[Kit, Layout]:
+    """A top and a bar between two frames that lean outwards: one is the other turned by 180 degrees.
+
+    step: how far the middle of the top is raised; such a top is no prism
+    """
+    solid = np.ones((3, 2), dtype=bool)
+    solid[[0, 2], 1] = False
+    top = box(length, 0.05, 0.9)
+    if step:
+        top = plate([-length / 2, -0.2, 0.2, length / 2], [-0.025, 0.025, 0.025 + step], 0.9, solid)
+    place = length / 2 - 0.4
+    meshes = {"top": top, "frame": slanted(0.1, 1.0, 0.8, -0.2), "bar": box(2 * place - 0.1, 0.05, 0.1)}
+    frames = [("frame", pose(-place, 0.5, 0.0)), ("frame", pose(place, 0.5, 0.0, quarter_turns=2))]
+    return layout(meshes, [*frames, ("top", pose(0.0, 1.025, 0.0)), ("bar", pose(0.0, 0.975, 0.0))])
+
+
+@cache
+def casement() -> tuple[Kit, Layout]:
+    """Two leaves with hinges at their outer sides, which are mirror images, between a sill and a lintel."""
+    hinge = trimesh.Trimesh(
+        [[0, 0, 0], [0.2, 0, 0], [0, 0.3, 0], [0, 0, 0.1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], process=False
+    )
+    meshes = {"rail": box(2.4, 0.1, 0.2), "leaf": box(0.9, 1.0, 0.1), "hinge": hinge, "other hinge": mirrored(hinge)}
+    rails = [("rail", pose(0.0, y, 0.0)) for y in (-0.05, 1.05)]
+    leaves = [("leaf", pose(x, 0.5, 0.0)) for x in (-0.45, 0.45)]
+    hinges = [("hinge", pose(-0.9, 0.4, 0.05)), ("other hinge", pose(0.9, 0.4, 0.05))]
+    return layout(meshes, [*rails, *leaves, *hinges])
