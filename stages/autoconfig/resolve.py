@@ -248,7 +248,9 @@ def _reason(key: str, chosen: CandidateSetting, candidates: Sequence[CandidateSe
     for other in reversed(stricter):
         candidate = next((candidate for candidate in candidates if candidate.setting == other), None)
         if candidate is not None:
-            return f"{trial_text(chosen.trial)}; the next stricter: {trial_text(candidate.trial)}"
+            lost = [label for label in candidate.trial.lost_labels if label not in chosen.trial.lost_labels]
+            losses = f", which seldom keep {listed_names(lost)}" if lost else ""
+            return f"{trial_text(chosen.trial)}; the next stricter: {trial_text(candidate.trial)}{losses}"
     if chosen.is_sufficient:
         return "the strictest, and it finds enough"
     if not chosen.trial.graphs:
