@@ -8,14 +8,15 @@ those that lay a part on a part of its type, so a shared piece is found wherever
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 import numpy.typing as npt
+from numba import int64, uint64
+from numba.extending import intrinsic
 
 from stages.shape.arrays import Float32Array, FloatArray, IntArray
-from stages.shape.geometry.sorting import sort_order
 from stages.shape.geometry.triangles import triangle_areas
 from stages.shape.kit import Assembly, Kit
 
@@ -37,6 +38,15 @@ BITS_PER_PART = 8
 CELL_TOLERANCES = 8.0
 """Width of the cells whose occupation is noted, in tolerances: a part occupies two of them on average."""
 
+SIGNATURE_WORDS = 4
+"""Words of 64 bits that note around each part where the others are."""
+SIGNATURE_CELL_TOLERANCES = 16.0
+"""Width of the cells of these places, in tolerances."""
+MAX_PARTS_NOTED = 160
+"""Mean number of parts up to which they are noted: the bits around a part of a larger shape are nearly all set."""
+MAX_ROUNDING = 1e-9
+"""Largest difference of two sums of the same areas, as a share."""
+
 Indices = npt.NDArray[np.int64]
 
 
@@ -57,6 +67,7 @@ class _Tables(NamedTuple):
     tolerance: float  # largest gap of coinciding centroids, in kit units
     cell: float  # width of a cell, in kit units
     occupied: npt.NDArray[np.uint64]  # uint64 (shapes, words): a bit for each cell and type where a part may be met
+    signatures: npt.NDArray[np.uint64]  # uint64 (n, SIGNATURE_WORDS): bits of the parts around each; or empty
 
 
 class PackedShapes:
@@ -94,13 +105,16 @@ class PackedShapes:
         first = np.array(firsts, dtype=np.int64).reshape(-1, len(area) + 1)
         self._counts = np.diff(first, axis=1)
         packed = np.concatenate([np.empty((0, 3), np.float32), *centres])
+        turn_numbers = np.concatenate([np.empty(0, np.int32), *turns])
+        del centres, turns  # before more is allocated
+        are_noted = len(packed) <= MAX_PARTS_NOTED * len(first)
         tolerance = CENTROID_TOLERANCES * kit.pose_tolerance
         self._tables = _Tables(
             area=area,
             symmetries=np.concatenate([part_type.symmetries[:, :3, :3] for part_type in kit.types]),
             symmetries_from=np.cumsum([0, *(len(part_type.symmetries) for part_type in kit.types)]),
             centres=packed,
-            turns=np.concatenate([np.empty(0, np.int32), *turns]),
+            turns=turn_numbers,
             rotations=np.array(kept).reshape(-1, 3, 3),
             firsts=first,
             seeds=np.array(seeds, dtype=np.int64).reshape(-1, SEEDS_PER_SHAPE),
@@ -110,6 +124,7 @@ class PackedShapes:
             tolerance=tolerance,
             cell=CELL_TOLERANCES * tolerance,
             occupied=_occupied_cells(packed, first, CELL_TOLERANCES * tolerance, tolerance),
+            signatures=_signatures(packed, first if are_noted else first[:0], tolerance),
         )
 
     def __len__(self) -> int:
@@ -122,7 +137,7 @@ class PackedShapes:
         It is 0 where it is less than `least`, and may be too small where it is more than `enough`.
         """
         shared: FloatArray = np.zeros(len(others))
-        possible = np.flatnonzero(self._bounds(shape, others) >= least)
+        possible = self._possible(shape, others, least)
         shared[possible] = _shares(self._tables, shape, others[possible], least, enough)
         return shared
 
@@ -141,6 +156,11 @@ class PackedShapes:
                 break
         return most
 
+    def _possible(self, shape: int, others: Indices, least: float) -> Indices:
+        """Return which of `others` may share at least `least` by the types of their parts, as `_bounds`, int64 (k,)."""
+        possible, is_tied = _possible_by_type(self._counts, self._tables.area, self._tables.areas, shape, others, least)
+        return np.flatnonzero(self._bounds(shape, others) >= least) if is_tied else possible
+
     def _bounds(self, shape: int, others: Indices) -> FloatArray:
         """Return upper bounds of what a shape shares with others, by the types of their parts, float64 (k,)."""
         common = np.minimum(self._counts[shape], self._counts[others]) @ self._tables.area
@@ -157,20 +177,36 @@ def _seeds(areas: FloatArray) -> Indices:
 
 
 @numba.njit(cache=True)
+def _possible_by_type(counts, area, areas, shape, others, least):
+    """Return which of `others` may share at least `least`, int64 (k,), and whether rounding decides for any of them."""
+    possible, found, is_tied = np.empty(len(others), dtype=np.int64), 0, False
+    for place in range(len(others)):
+        other = others[place]
+        common = 0.0
+        for kind in range(len(area)):
+            common += min(counts[shape, kind], counts[other, kind]) * area[kind]
+        larger = max(areas[shape], areas[other])
+        if larger == 0.0:
+            continue
+        bound = common / larger
+        is_tied |= abs(bound - least) <= MAX_ROUNDING
+        possible[found] = place
+        found += bound >= least
+    return possible[:found], is_tied
+
+
+@numba.njit(cache=True)
 def _shares(tables, shape, others, least, enough):
     # Arrays of their own: a call with all tables costs more than what most calls do.
     kinds, seeds, firsts, centres, turns = tables.kinds, tables.seeds, tables.firsts, tables.centres, tables.turns
-    areas, symmetries_from, symmetries, occupied = (
-        tables.areas,
-        tables.symmetries_from,
-        tables.symmetries,
-        tables.occupied,
-    )
+    areas, symmetries_from, symmetries = tables.areas, tables.symmetries_from, tables.symmetries
+    occupied, signatures = tables.occupied, tables.signatures
     rotations, up, per_unit = tables.rotations, tables.up, 1.0 / tables.cell
+    part_areas, tolerance = tables.area, tables.tolerance
     bits = occupied.shape[1] * 64
     shares = np.zeros(len(others))
     alignment = np.empty((3, 4))
-    work = np.empty(SEEDS_PER_SHAPE, dtype=np.int64)
+    ranked = np.arange(SEEDS_PER_SHAPE)
     area = areas[shape]
     most_symmetries = 1
     for kind in range(len(symmetries_from) - 1):
@@ -178,21 +214,19 @@ def _shares(tables, shape, others, least, enough):
     # Rotations that lay a seed on parts of its type in each rotation, by its symmetries: 0 until known, 2 if tilted.
     kept = len(rotations) * most_symmetries <= MAX_ROTATIONS_KEPT
     known = np.zeros((SEEDS_PER_SHAPE, len(rotations) if kept else 1, most_symmetries), dtype=np.int8)
+    noted = kept and len(signatures) > 0
     laid = np.empty((SEEDS_PER_SHAPE, len(rotations) if kept else 1, most_symmetries, 3, 3))
+    masks = np.zeros((*known.shape, SIGNATURE_WORDS), dtype=np.uint64)
     for place in range(len(others)):
         other = others[place]
         larger = max(area, areas[other])
         # Of `misses` + 1 seeds, however chosen, one must hit: the cheapest are tried.
         misses = min(int(SEEDS_PER_SHAPE * (1.0 - least * larger / area) + 1e-9) + SPARE_MISSES, SEEDS_PER_SHAPE - 1)
-        for seed in range(SEEDS_PER_SHAPE):
-            kind = kinds[shape, seed]
-            targets = firsts[other, kind + 1] - firsts[other, kind]
-            work[seed] = targets * (symmetries_from[kind + 1] - symmetries_from[kind])
-        order = sort_order(work)
+        _rank_seeds(kinds[shape], firsts[other], symmetries_from, ranked)
         best = floor = np.nextafter(least * larger, 0.0)
         stop = max(min(enough * larger, 0.999 * area), least * larger)
         for first in range(misses + 1):
-            seed = order[first]
+            seed = ranked[first] % SEEDS_PER_SHAPE
             part, kind = seeds[shape, seed], kinds[shape, seed]
             for target in range(firsts[other, kind], firsts[other, kind + 1]):
                 turn = turns[target] if kept else 0
@@ -201,32 +235,62 @@ def _shares(tables, shape, others, least, enough):
                         symmetry = symmetries[symmetries_from[kind] + number]
                         level = _lay_upon(rotations, turns[part], turns[target], symmetry, up, laid[seed, turn, number])
                         known[seed, turn, number] = 1 if level else 2
+                        if level and noted:
+                            _note_seeds(tables, shape, seed, laid[seed, turn, number], masks[seed, turn, number])
                     if known[seed, turn, number] == 2:
                         continue
+                    # Most alignments are wrong. The surroundings of the target tell it of nearly all of them.
+                    if noted:
+                        missing = 0
+                        for word in range(SIGNATURE_WORDS):
+                            missing += count_bits(masks[seed, turn, number, word] & ~signatures[target, word])
+                        if missing > misses:
+                            continue
                     turned = laid[seed, turn, number]
-                    # Most alignments are wrong, and the cells alone tell it of nearly all of them.
+                    # The cells that the other shape occupies tell it of most that are left.
                     missed = first
                     for later in range(first + 1, SEEDS_PER_SHAPE):
-                        moved = seeds[shape, order[later]]
+                        moved = seeds[shape, ranked[later] % SEEDS_PER_SHAPE]
                         a = np.float64(centres[moved, 0]) - centres[part, 0]
                         b = np.float64(centres[moved, 1]) - centres[part, 1]
                         c = np.float64(centres[moved, 2]) - centres[part, 2]
                         x = turned[0, 0] * a + turned[0, 1] * b + turned[0, 2] * c + centres[target, 0]
                         y = turned[1, 0] * a + turned[1, 1] * b + turned[1, 2] * c + centres[target, 1]
                         z = turned[2, 0] * a + turned[2, 1] * b + turned[2, 2] * c + centres[target, 2]
-                        bit = _bit(
-                            kinds[shape, order[later]], _cell(x, per_unit), _cell(y, per_unit), _cell(z, per_unit), bits
-                        )
+                        own_kind = kinds[shape, ranked[later] % SEEDS_PER_SHAPE]
+                        bit = _bit(own_kind, _cell(x, per_unit), _cell(y, per_unit), _cell(z, per_unit), bits)
                         if not (occupied[other, bit >> 6] >> np.uint64(bit & 63)) & np.uint64(1):
                             missed += 1
                             if missed > misses:
                                 break
-                    if missed <= misses:
-                        _shift_to(centres, part, target, turned, alignment)
-                        if _missed_seeds(tables, shape, other, order, first, misses, alignment) <= misses:
-                            best = max(best, _met(tables, shape, other, best, alignment))
-                            if best >= stop:
+                    if missed > misses:
+                        continue
+                    _shift_to(centres, part, target, turned, alignment)
+                    missed = first
+                    for later in range(first + 1, SEEDS_PER_SHAPE):
+                        moved = seeds[shape, ranked[later] % SEEDS_PER_SHAPE]
+                        own_kind = kinds[shape, ranked[later] % SEEDS_PER_SHAPE]
+                        low, end = firsts[other, own_kind], firsts[other, own_kind + 1]
+                        if not _meets(centres, alignment, moved, low, end, tolerance):
+                            missed += 1
+                            if missed > misses:
                                 break
+                    if missed > misses:
+                        continue
+                    # The area that coincides, unless it cannot exceed the best.
+                    left = area
+                    for own_kind in range(len(part_areas)):
+                        low, end = firsts[other, own_kind], firsts[other, own_kind + 1]
+                        for moved in range(firsts[shape, own_kind], firsts[shape, own_kind + 1]):
+                            if not _meets(centres, alignment, moved, low, end, tolerance):
+                                left -= part_areas[own_kind]
+                                if left <= best:
+                                    break
+                        if left <= best:
+                            break
+                    best = max(best, left)
+                    if best >= stop:
+                        break
                 if best >= stop:
                     break
             if best >= stop:
@@ -237,35 +301,78 @@ def _shares(tables, shape, others, least, enough):
 
 
 @numba.njit(cache=True)
-def _missed_seeds(tables, shape, other, order, first, misses, alignment):
-    """Return how many seeds miss under an alignment of the `first` seed in this order, or more than `misses`.
+def _rank_seeds(kinds, firsts, symmetries_from, ranked):
+    """Sort the seeds of a shape by the number of alignments with another that they propose; of equals the first.
 
-    Seeds are tested in the same order: those with few counterparts reject a wrong alignment fastest. Seeds before
-    `first` have missed with every good alignment, so they count as misses.
+    ranked: int64 (SEEDS_PER_SHAPE,), a seed in any order each, plus a multiple of SEEDS_PER_SHAPE; rewritten
     """
-    missed = first
-    for place in range(first + 1, SEEDS_PER_SHAPE):
-        seed = order[place]
-        if not _meets(tables, alignment, tables.seeds[shape, seed], other, tables.kinds[shape, seed]):
-            missed += 1
-            if missed > misses:
-                break
-    return missed
+    for place in range(len(ranked)):
+        seed = ranked[place] % SEEDS_PER_SHAPE
+        kind = kinds[seed]
+        work = (firsts[kind + 1] - firsts[kind]) * (symmetries_from[kind + 1] - symmetries_from[kind])
+        key = work * SEEDS_PER_SHAPE + seed
+        before = place
+        while before > 0 and ranked[before - 1] > key:
+            ranked[before] = ranked[before - 1]
+            before -= 1
+        ranked[before] = key
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def count_bits(typing_context: Any, word: Any) -> Any:
+    """Return the number of bits that are set in a word of 64 bits."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.ctpop(arguments[0])
+
+    return int64(uint64), generate
 
 
 @numba.njit(cache=True)
-def _met(tables, shape, other, best, alignment):
-    """Return the area of a shape that coincides with the other's under an alignment; 0 as soon as it cannot exceed
-    `best`.
+def _signatures(centres, firsts, tolerance):
+    """Return the bits of the types and places, relative to each part, at which a part of its shape may be met.
+
+    A part has at least the bits of `_note_seeds` of each seed that an alignment, which lays a seed on it, takes to a
+    part. Returns uint64 (n, SIGNATURE_WORDS), empty without shapes.
     """
-    left = tables.areas[shape]
-    for kind in range(len(tables.area)):
-        for part in range(tables.firsts[shape, kind], tables.firsts[shape, kind + 1]):
-            if not _meets(tables, alignment, part, other, kind):
-                left -= tables.area[kind]
-                if left <= best:
-                    return 0.0
-    return left
+    signatures = np.zeros((len(centres) if len(firsts) else 0, SIGNATURE_WORDS), dtype=np.uint64)
+    per_unit = 1.0 / (SIGNATURE_CELL_TOLERANCES * tolerance)
+    gap = 1.01 * tolerance  # rounding must not take a place out of its cells
+    for shape in range(len(firsts)):
+        for part in range(firsts[shape, 0], firsts[shape, -1]):
+            own = signatures[part]
+            x, y, z = np.float64(centres[part, 0]), np.float64(centres[part, 1]), np.float64(centres[part, 2])
+            for kind in range(firsts.shape[1] - 1):
+                for other in range(firsts[shape, kind], firsts[shape, kind + 1]):
+                    a, b, c = centres[other, 0] - x, centres[other, 1] - y, centres[other, 2] - z
+                    for i in range(_cell(a - gap, per_unit), _cell(a + gap, per_unit) + 1):
+                        for j in range(_cell(b - gap, per_unit), _cell(b + gap, per_unit) + 1):
+                            for k in range(_cell(c - gap, per_unit), _cell(c + gap, per_unit) + 1):
+                                bit = _bit(kind, i, j, k, SIGNATURE_WORDS * 64)
+                                own[bit >> 6] |= np.uint64(1) << np.uint64(bit & 63)
+    return signatures
+
+
+@numba.njit(cache=True)
+def _note_seeds(tables, shape, seed, turned, mask):
+    """Set the bits of the types and places of all seeds relative to one of them, turned by a rotation (3, 3).
+
+    mask: uint64 (SIGNATURE_WORDS,), written
+    """
+    per_unit = 1.0 / (SIGNATURE_CELL_TOLERANCES * tables.tolerance)
+    part = tables.seeds[shape, seed]
+    for other in range(SEEDS_PER_SHAPE):
+        moved = tables.seeds[shape, other]
+        a = np.float64(tables.centres[moved, 0]) - tables.centres[part, 0]
+        b = np.float64(tables.centres[moved, 1]) - tables.centres[part, 1]
+        c = np.float64(tables.centres[moved, 2]) - tables.centres[part, 2]
+        x = turned[0, 0] * a + turned[0, 1] * b + turned[0, 2] * c
+        y = turned[1, 0] * a + turned[1, 1] * b + turned[1, 2] * c
+        z = turned[2, 0] * a + turned[2, 1] * b + turned[2, 2] * c
+        bit = _bit(
+            tables.kinds[shape, other], _cell(x, per_unit), _cell(y, per_unit), _cell(z, per_unit), SIGNATURE_WORDS * 64
+        )
+        mask[bit >> 6] |= np.uint64(1) << np.uint64(bit & 63)
 
 
 @numba.njit(cache=True)
@@ -336,23 +443,21 @@ def _cell(place, per_unit):
 
 
 @numba.njit(cache=True)
-def _meets(tables, alignment, part, other, kind):
-    """Return whether a part, moved, has the centroid of a part of its type in the other shape."""
-    a, b, c = tables.centres[part, 0], tables.centres[part, 1], tables.centres[part, 2]
+def _meets(centres, alignment, part, low, end, tolerance):
+    """Return whether a part, moved, has the centroid of one of the parts from `low` to `end`, which are sorted by x."""
+    a, b, c = centres[part, 0], centres[part, 1], centres[part, 2]
     x = alignment[0, 0] * a + alignment[0, 1] * b + alignment[0, 2] * c + alignment[0, 3]
     y = alignment[1, 0] * a + alignment[1, 1] * b + alignment[1, 2] * c + alignment[1, 3]
     z = alignment[2, 0] * a + alignment[2, 1] * b + alignment[2, 2] * c + alignment[2, 3]
-    low, end = tables.firsts[other, kind], tables.firsts[other, kind + 1]
     high = end
     while low < high:
         middle = (low + high) // 2
-        if tables.centres[middle, 0] < x - tables.tolerance:
+        if centres[middle, 0] < x - tolerance:
             low = middle + 1
         else:
             high = middle
-    while low < end and tables.centres[low, 0] <= x + tables.tolerance:
-        centre = tables.centres[low]
-        if abs(centre[1] - y) <= tables.tolerance and abs(centre[2] - z) <= tables.tolerance:
+    while low < end and centres[low, 0] <= x + tolerance:
+        if abs(centres[low, 1] - y) <= tolerance and abs(centres[low, 2] - z) <= tolerance:
             return True
         low += 1
     return False

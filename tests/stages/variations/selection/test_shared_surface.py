@@ -102,3 +102,44 @@ def test_shared_surface_equals_brute_force() -> None:
     for place in range(len(assemblies)):
         others = np.delete(np.arange(len(assemblies)), place)
         assert shapes.most_shared(place, others) == pytest.approx(shapes.shares(place, others, 0.0).max())
+
+
+def test_near_relatives_are_those_of_brute_force_over_a_whole_pool() -> None:
+    kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
+    _, found = search(kit, tries=1500, max_size=3.0)
+    assemblies = [variant.assembly for variant in found[:40]]
+    shapes = PackedShapes(kit, assemblies, upright=True)
+    everything = np.arange(len(assemblies))
+    near_count = 0
+    for place, assembly in enumerate(assemblies):
+        exact = np.array([by_every_motion(kit, assembly, other) for other in assemblies])
+        for least in (0.6, 0.8, 0.9):
+            decided = np.abs(exact - least) > 1e-6
+            near = shapes.shares(place, everything, least, least) > 0.0
+            assert near[decided].tolist() == (exact >= least)[decided].tolist()
+            near_count += int(near.sum()) - 1
+    assert near_count > 50
+
+
+def test_signature_of_a_part_has_every_place_that_an_alignment_meets() -> None:
+    """A part near the edge of a cell may be met from the next one, so shapes drift by up to a tolerance."""
+    kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
+    one, rng = kit.exemplars[1].assembly, np.random.default_rng(1)
+    shapes = [one]
+    for _ in range(60):
+        copy = moved(one, pose(*rng.uniform(-50, 50, 3).tolist(), int(rng.integers(4))))
+        copy.poses[:, :3, 3] += rng.uniform(-0.49, 0.49, (len(copy), 3)) * CENTROID_TOLERANCES * kit.pose_tolerance
+        shapes.append(copy)
+    packed = PackedShapes(kit, shapes, upright=True)
+    assert (packed.shares(0, np.arange(len(shapes)), 0.999) > 0.999).all()
+    assert all(packed.shares(place, np.array([0]), 0.999)[0] > 0.999 for place in range(len(shapes)))
+
+
+def test_bound_by_types_is_decided_as_without_compilation_where_it_equals_the_share() -> None:
+    kit = kit_of(CHAIN, [chain(count) for count in range(3, 12)])
+    shapes = PackedShapes(kit, [exemplar.assembly for exemplar in kit.exemplars], upright=True)
+    everything = np.arange(len(shapes))
+    for place in range(len(shapes)):
+        bounds = shapes._bounds(place, everything)
+        for least in [*bounds.tolist(), *np.nextafter(bounds, 2.0).tolist(), 0.5]:
+            assert shapes._possible(place, everything, least).tolist() == np.flatnonzero(bounds >= least).tolist()
