@@ -15,6 +15,7 @@ from stages.rows.settings import RowsConfig
 from stages.rows.slabs import RowChange, SlabError, repeat
 from stages.rows.steps import bays_of, longest_row, steps_of
 from stages.rows.turns import MIN_SECTORS, Turn, find_circles, turned
+from stages.shape.arrays import FloatArray
 
 MAX_PARTS_FACTOR = 4.0
 """Maximum number of parts of a layout, as a multiple of that of its exemplar."""
@@ -59,9 +60,11 @@ class LayoutDraws:
             layout = made
         if not self.rows and (self.circles or self.mirrored_bays):
             return (tuple(changes), layout) if changes else None
+        # Along inserted bays a row would change in one bay alone, and leave a blank stretch of wall in another.
+        barred = first.normal if isinstance(first, RowChange) else None
         for _ in range(int(rng.integers(1, self.config.max_changes + 1))):
             for _ in range(TRIES_PER_CHANGE):
-                changed = self._change(layout, rng)
+                changed = self._change(layout, rng, barred)
                 if changed is not None:
                     layout = changed[1]
                     changes += changed[0]
@@ -101,9 +104,14 @@ class LayoutDraws:
             return False
         return bool((layout.extent <= MAX_SIDE_FACTOR * self.exemplar.extent).all())
 
-    def _change(self, layout: Layout, rng: np.random.Generator) -> tuple[list[RowChange], Layout] | None:
-        """Return one row of a layout made longer or shorter, or None where the draw is not valid."""
-        rows = self._rows_of(layout)
+    def _change(
+        self, layout: Layout, rng: np.random.Generator, barred: FloatArray | None
+    ) -> tuple[list[RowChange], Layout] | None:
+        """Return one row of a layout made longer or shorter, or None where the draw is not valid.
+
+        barred: direction along which rows stay as they are, float64 (3,), or None
+        """
+        rows = [row for row in self._rows_of(layout) if barred is None or not row.shift @ barred]
         if not rows:
             return None
         row = rows[int(rng.integers(len(rows)))]

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from stages.api import read_kit
 from stages.proportions.text import ProportionError, Proportions, ProportionShapes, proportion_text, read_proportions
 from stages.proportions.warp_check import warp_fault
 from stages.rows.changes import change_json, changed, read_change
@@ -17,12 +19,13 @@ from stages.rows.kit_rows import rows_of_kit
 from stages.rows.layout import Layout, layout_of
 from stages.rows.mirrored_bays import find_mirrored_bays, with_mirrored_bays
 from stages.rows.settings import RowsConfig
-from stages.rows.slabs import SlabError
+from stages.rows.slabs import RowChange, SlabError
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Kit
 from tests.stages.rows import models
 from tests.toy_kits.chains_and_rings import ROAD, box, kit_of, pose, ring
 
+ROOT = Path(__file__).resolve().parents[3]
 UP_AXIS = 1
 MODELS: dict[str, Callable[[], tuple[Kit, Layout]]] = {"table": models.table_on_frames, "casement": models.casement}
 
@@ -117,6 +120,18 @@ def test_draws_are_deterministic_and_within_the_settings_and_json_keeps_them() -
         read = changed(read, read_change(change_json(change)))
     assert read.key == longer.key
     assert not LayoutDraws(layout, RowsConfig()).mirrored_bays
+
+
+def test_rows_along_inserted_bays_stay_as_they_are() -> None:
+    """A row of windows that became longer in one house of a terrace left a blank wall in another."""
+    kit = read_kit(ROOT / "datasets/exemplars/rows/dresser.glb", grammar="multiset")
+    draws = LayoutDraws(layout_of(kit, kit.exemplars[0]), RowsConfig(), is_alone=True, up=UP_AXIS)
+    assert len(draws.mirrored_bays) == 1
+    drawn = [draws.draw(np.random.default_rng(seed)) for seed in range(40)]
+    made = [[change for change in result[0] if isinstance(change, RowChange)] for result in drawn if result]
+    longer = [changes for changes in made if changes[0].is_mirrored]
+    assert any(len(changes) > 1 for changes in longer), "rows across the bays change"
+    assert all(not change.shift @ changes[0].normal for changes in longer for change in changes[1:])
 
 
 def test_a_text_says_the_bays_and_a_wrong_one_is_refused() -> None:
