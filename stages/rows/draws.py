@@ -42,6 +42,7 @@ class LayoutDraws:
         self._limits = [self._limits_of(step.count) for step in self.steps]
         self.circles = find_circles(layout)
         self.mirrored_bays: list[MirroredBay] = [] if up is None else find_mirrored_bays(layout, up)
+        self._with_bays: dict[tuple[int, int], tuple[RowChange, Layout | None]] = {}
 
     @property
     def rows(self) -> Sequence[Row]:
@@ -53,15 +54,14 @@ class LayoutDraws:
         layout, changes = self.exemplar, list[Change]()
         first = self._drawn_bays(rng) or self._drawn_circle(rng)
         if first is not None:
-            changes.append(first)
-            made = self._changed(first)
-            if made is None:
+            if first[1] is None:
                 return None
-            layout = made
+            changes.append(first[0])
+            layout = first[1]
         if not self.rows and (self.circles or self.mirrored_bays):
             return (tuple(changes), layout) if changes else None
         # Along inserted bays a row would change in one bay alone, and leave a blank stretch of wall in another.
-        barred = first.normal if isinstance(first, RowChange) else None
+        barred = changes[0].normal if changes and isinstance(changes[0], RowChange) else None
         for _ in range(int(rng.integers(1, self.config.max_changes + 1))):
             for _ in range(TRIES_PER_CHANGE):
                 changed = self._change(layout, rng, barred)
@@ -71,32 +71,39 @@ class LayoutDraws:
                     break
         return (tuple(changes), layout) if changes and layout.key != self.exemplar.key else None
 
-    def _drawn_bays(self, rng: np.random.Generator) -> RowChange | None:
-        """Return bays between mirrored ends that are inserted, or None where rows or circles are changed alone."""
+    def _drawn_bays(self, rng: np.random.Generator) -> tuple[RowChange, Layout | None] | None:
+        """Return bays that are inserted between mirrored ends, or None where rows or circles are changed alone.
+
+        The layout with these bays comes with them, or None where it is not valid or exceeds the limits.
+        """
         count = len(self.mirrored_bays)
         most = self._limits_of(MIRRORED_ENDS)[1] - MIRRORED_ENDS
         if not count or most < 1 or rng.integers(count + len(self.circles) + len(self.rows)) >= count:
             return None
-        return self.mirrored_bays[int(rng.integers(count))].insertion(int(rng.integers(1, most + 1)))
+        bay, times = int(rng.integers(count)), int(rng.integers(1, most + 1))
+        if (bay, times) not in self._with_bays:
+            change = self.mirrored_bays[bay].insertion(times)
+            self._with_bays[bay, times] = change, self._inserted(change)
+        return self._with_bays[bay, times]
 
-    def _drawn_circle(self, rng: np.random.Generator) -> Turn | None:
-        """Return another number of sectors of a circle, or None where it stays or rows are changed alone."""
-        if not self.circles or rng.integers(len(self.circles) + len(self.rows)) >= len(self.circles):
-            return None
-        circle = self.circles[int(rng.integers(len(self.circles)))]
-        least, most = self._limits_of(circle.sectors)
-        count = int(rng.integers(max(least, MIN_SECTORS), most + 1))
-        return circle.turn(count) if count != circle.sectors else None
-
-    def _changed(self, change: RowChange | Turn) -> Layout | None:
-        """Return the exemplar with more bays between its ends, within the limits, or None; or with other sectors."""
-        if isinstance(change, Turn):
-            return turned(self.exemplar, change)
+    def _inserted(self, change: RowChange) -> Layout | None:
+        """Return the exemplar with more bays between its ends, or None where that is not valid or exceeds limits."""
         try:
             made = with_mirrored_bays(self.exemplar, change)
         except SlabError:
             return None
         return made if self._is_within_limits(made) else None
+
+    def _drawn_circle(self, rng: np.random.Generator) -> tuple[Turn, Layout] | None:
+        """Return another number of sectors of a circle and the layout with it, or None where the circle stays."""
+        if not self.circles or rng.integers(len(self.circles) + len(self.rows)) >= len(self.circles):
+            return None
+        circle = self.circles[int(rng.integers(len(self.circles)))]
+        least, most = self._limits_of(circle.sectors)
+        count = int(rng.integers(max(least, MIN_SECTORS), most + 1))
+        if count == circle.sectors:
+            return None
+        return circle.turn(count), turned(self.exemplar, circle.turn(count))
 
     def _is_within_limits(self, layout: Layout) -> bool:
         """Return whether a layout is neither too large nor of too many parts."""
