@@ -54,10 +54,10 @@ class LayoutDraws:
         layout, changes = self.exemplar, list[Change]()
         first = self._drawn_bays(rng) or self._drawn_circle(rng)
         if first is not None:
-            if first[1] is None:
+            change, made = first
+            if made is None:
                 return None
-            changes.append(first[0])
-            layout = first[1]
+            changes, layout = [change], made
         if not self.rows and (self.circles or self.mirrored_bays):
             return (tuple(changes), layout) if changes else None
         # Along inserted bays a row would change in one bay alone, and leave a blank stretch of wall in another.

@@ -30,6 +30,7 @@ MIN_MIRRORED_SHARE = 0.97
 MAX_AREA_DIFFERENCE = 0.02
 """Largest relative difference of the areas of twins."""
 MAX_BAYS_PER_AXIS = 2
+"""Bays that are kept along one axis, the outermost first."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class MirroredBay:
     """A bay that can be inserted.
 
     axis: index of the axis along which the shape becomes longer
-    start, end: where the bay begins and ends along it
+    start, end: where the bay begins and ends along it, in the kit's units
     ends: parts at the lower end of the shape that have a twin at its upper end, int64 (k,)
     """
 
