@@ -5,6 +5,7 @@ Everything is imported when it is first used, so `from stages import api` costs 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,9 +39,9 @@ def read_kit(models: str | Path | Sequence[str | Path], name: str = "kit", **set
     from stages.autoconfig.settings import AutoconfigConfig
     from stages.exemplars.settings import ExemplarsConfig, KitConfig
 
-    stated = {"name": name, "shapes": tuple(_paths(models)), **settings}
+    stated = {"name": name, "shapes": list(map(str, _paths(models))), **settings}
     try:
-        config = KitConfig.model_validate(stated)
+        config = KitConfig.model_validate_json(json.dumps(stated, default=str))  # it takes lists, as configs do
     except ValidationError as error:
         raise ConfigError("\n".join(mistakes_in_words(KitConfig, error, stated, "exemplars"))) from None
     reading = read_and_resolve(config, ExemplarsConfig().limits, AutoconfigConfig().max_tries, ())
