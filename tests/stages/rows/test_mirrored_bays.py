@@ -134,6 +134,29 @@ def test_rows_along_inserted_bays_stay_as_they_are() -> None:
     assert all(not change.shift @ changes[0].normal for changes in longer for change in changes[1:])
 
 
+def test_every_storey_above_the_first_keeps_all_its_windows() -> None:
+    """Three storeys without one show no more that a window belongs over the door, which a fourth would then lack."""
+    contact = {"tolerance": 0.001, "kinds": ["point", "line", "face"]}
+    kit = read_kit(
+        ROOT / "datasets/exemplars/rows/house.glb",
+        up="y",
+        contact=contact,
+        grammar="multiset",
+        hubs={"types": "none"},
+        disconnected="error",
+    )
+    draws = LayoutDraws(layout_of(kit, kit.exemplars[0]), RowsConfig(), is_alone=True, up=UP_AXIS)
+    drawn = [draws.draw(np.random.default_rng(seed)) for seed in range(30)]
+    made = [layout for _, layout in filter(None, drawn)]
+    assert len({layout.key for layout in made}) > 15
+    for layout in made:
+        windows = np.array([kit.types[kind].label == "window" for kind in layout.types.tolist()])
+        storeys = Counter(layout.boxes[windows, 0, 1].round(1).tolist())
+        first, *others = (storeys[height] for height in sorted(storeys))
+        assert len(set(others)) <= 1
+        assert all(count > first for count in others)
+
+
 def test_a_text_says_the_bays_and_a_wrong_one_is_refused() -> None:
     kit, layout = models.table_on_frames()
     (bay,) = find_mirrored_bays(layout, UP_AXIS)
