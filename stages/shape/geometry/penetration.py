@@ -29,6 +29,9 @@ MAJORITY_RAYS = len(RAYS) // 2 + 1
 BOX_ROUNDING_SHARE = 1e-9
 """Points this near to a box, as a share of its size, are tested again with exact coordinates."""
 
+MAX_SCENES = 200
+"""Scenes that a test keeps. Open3D 0.20 crashes where a process has more than about a thousand."""
+
 
 def depth_bound(first: FloatArray, second: FloatArray) -> float:
     """Return an upper bound of the penetration depth of parts in two boxes (2, 3).
@@ -106,6 +109,8 @@ class PenetrationTest:
         import open3d as o3d
 
         if index not in self._scenes:
+            if len(self._scenes) == MAX_SCENES:
+                del self._scenes[next(iter(self._scenes))]  # the oldest
             scene = o3d.t.geometry.RaycastingScene(nthreads=1)
             part = self.types[index]
             scene.add_triangles(

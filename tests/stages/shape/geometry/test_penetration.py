@@ -43,6 +43,13 @@ def test_what_hovers_over_an_open_cup_has_no_depth() -> None:
     assert depth(box(1, 1, 1, sides=5), box(0.2, 0.2, 0.2), placed(0, 0, 0.9)) == 0.0
 
 
+def test_a_thousand_types_are_tested_in_one_process() -> None:
+    """Open3D crashed where each kept its scene."""
+    test = PenetrationTest([part(box(1.0, 1.0, 1.0)) for _ in range(1200)])
+    pushed = placed(0.9, 0.0, 0.0)
+    assert all(test.depth(0, kind, pushed) == pytest.approx(0.1, abs=1e-6) for kind in range(1, 1200))
+
+
 def test_the_bound_by_boxes_is_the_least_overlap() -> None:
     first = np.array([[0, 0, 0], [4, 4, 4.0]])
     second = np.array([[3, 2, -1], [9, 9, 1.0]])
