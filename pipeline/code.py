@@ -32,20 +32,24 @@ _TASK_RANDOMNESS = "pipeline.randomness"
 """Code of `Task.rng`, which changes bytes although no stage imports it."""
 
 
-def entry_points(module: str, also: Iterable[str] = ()) -> tuple[str, ...]:
-    """Return the modules at which a shard's code begins: its stage's, those declared in its folder, and `also`."""
-    folder, tree = module.rpartition(".")[0], SourceTree([module])
+def entry_points(module: str, also: Iterable[str] = (), tree: SourceTree | None = None) -> tuple[str, ...]:
+    """Return the modules at which a shard's code begins: its stage's, those declared in its folder, and `also`.
+
+    tree: finds the files of modules; one of its own if None
+    """
+    folder, tree = module.rpartition(".")[0], SourceTree([module]) if tree is None else tree
     declared = [f"{folder}.{name}" for name in _DECLARATIONS] if folder else []
     return (module, _TASK_RANDOMNESS, *(name for name in declared if tree.file(name) is not None), *also)
 
 
-def transitive_imports(starts: Iterable[str]) -> dict[str, str]:
+def transitive_imports(starts: Iterable[str], tree: SourceTree | None = None) -> dict[str, str]:
     """Return the digest of each module of the project that `starts` import, directly or not, and of themselves.
 
+    tree: finds the files of modules; one of its own if None
     Raises ValueError for a start without a Python file.
     """
     waiting = list(starts)
-    tree = SourceTree(waiting)
+    tree = SourceTree(waiting) if tree is None else tree
     for start in waiting:
         if tree.file(start) is None:
             raise ValueError(f"no Python file of module {start} is found")
@@ -56,13 +60,10 @@ def transitive_imports(starts: Iterable[str]) -> dict[str, str]:
         if module in seen or module in _CONTRACT:
             continue
         seen.add(module)
-        file = tree.file(module)
-        if file is None:
-            continue
-        state = file.stat()
-        digests[module], imported = _read(str(file), state.st_mtime_ns, state.st_size)
-        package = module if file.name == "__init__.py" else module.rpartition(".")[0]
-        waiting += [module.rpartition(".")[0], *(absolute_name(name, package) for name in imported)]
+        found = tree.read(module)
+        if found is not None:
+            digests[module], imported = found
+            waiting += imported
     return dict(sorted(digests.items()))
 
 
@@ -80,6 +81,7 @@ class SourceTree:
     def __init__(self, starts: Iterable[str]) -> None:
         self._folders: dict[str, list[Path]] = {}
         self._listings: dict[Path, frozenset[str]] = {}
+        self._known: dict[str, tuple[str, tuple[str, ...]] | None] = {}
         self._owned = {start.partition(".")[0] for start in starts}
 
     def file(self, module: str) -> Path | None:
@@ -92,6 +94,20 @@ class SourceTree:
             if f"{name}.py" in listing:
                 return folder / f"{name}.py"
         return None
+
+    def read(self, module: str) -> tuple[str, tuple[str, ...]] | None:
+        """Return the digest of a module of the project as it first was, and the modules that it may import; None for
+        any other module.
+        """
+        if module not in self._known:
+            file, self._known[module] = self.file(module), None
+            if file is not None:
+                state = file.stat()
+                digest, imported = _read(str(file), state.st_mtime_ns, state.st_size)
+                package = module if file.name == "__init__.py" else module.rpartition(".")[0]
+                names = (module.rpartition(".")[0], *(absolute_name(name, package) for name in imported))
+                self._known[module] = digest, names
+        return self._known[module]
 
     def _listing(self, folder: Path) -> frozenset[str]:
         """Return the names in a folder; none if it is no folder."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pipeline.code import code_digest, entry_points, transitive_imports
+from pipeline.code import SourceTree, code_digest, entry_points, transitive_imports
 from pipeline.config import Config
 from pipeline.paths import DatasetPaths, StagePaths, read_json
 from pipeline.records import ShardRecord, fingerprint, read_record, recipe
@@ -64,6 +64,7 @@ class Inventory:
         self._states: dict[str, StageInventory] = {}
         self._code_digests: dict[tuple[str, ...], dict[str, str]] = {}
         self._modules: dict[str, str] = {}
+        self._trees: dict[tuple[str, ...], SourceTree] = {}
 
     def stage(self, name: str) -> StageInventory:
         """Return the inventory of stage `name`."""
@@ -147,7 +148,9 @@ class Inventory:
     def _code_of(self, *modules: str) -> dict[str, str]:
         """Return the digests of a stage's code, each as it first was: a run, and its workers, have one state of it."""
         if modules not in self._code_digests:
-            now = transitive_imports(entry_points(modules[0], modules[1:]))
+            packages = tuple(sorted({module.partition(".")[0] for module in (__name__, *modules)}))
+            tree = self._trees.setdefault(packages, SourceTree(packages))
+            now = transitive_imports(entry_points(modules[0], modules[1:], tree), tree)
             self._code_digests[modules] = {name: self._modules.setdefault(name, digest) for name, digest in now.items()}
         return self._code_digests[modules]
 

@@ -17,7 +17,7 @@ from eval.programs.nearest import nearest_clouds
 from eval.programs.nearest_programs import nearest_programs
 from eval.programs.quality import boxes_of_programs, clouds_of, shape_of_boxes
 from stages.shape.arrays import ByteArray, FloatArray
-from stages.shape.views.portrait import PAPER
+from stages.shape.views.palette import PAPER
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.shapeassembly.analysis.structure import signature
 from stages.shapeassembly.editing.edits import edit_program

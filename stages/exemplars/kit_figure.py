@@ -12,8 +12,9 @@ from stages.shape.arrays import ByteArray
 from stages.shape.kit import Assembly, Exemplar, Kit
 from stages.shape.shape import Shape, kit_shape
 from stages.shape.views.camera import Camera
+from stages.shape.views.palette import PAPER
 from stages.shape.views.part_colors import part_paint
-from stages.shape.views.portrait import PAPER, portrait
+from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.shape.views.viewpoint import best_viewpoint

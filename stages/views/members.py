@@ -12,8 +12,7 @@ from stages.shape.arrays import ByteArray
 from stages.shape.collection.members import Member, Members, PreviewRow, RecordField
 from stages.shape.views.camera import Camera
 from stages.shape.views.camera_record import CAMERA_FIELDS
-from stages.shape.views.palette import label_colors
-from stages.shape.views.portrait import PAPER
+from stages.shape.views.palette import PAPER, label_colors
 from stages.views.settings import ImageKind, ViewsConfig, view_count
 
 COLOR_SUFFIX = {"png": "png", "jpeg": "jpg", "webp": "webp"}

@@ -1,4 +1,4 @@
-"""Colours for part types, labels and samples that have none."""
+"""Colours for part types, labels and samples that have none, and of the paper that they are drawn on."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray
 
+PAPER = (250, 248, 244)
+"""Background of pictures, sRGB: a warm near-white."""
 GOLDEN_TURN = 0.3819660112501051
 LIGHTNESS = (0.76, 0.84, 0.66)
 CHROMA = (0.088, 0.072, 0.100)

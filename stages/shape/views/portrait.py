@@ -12,11 +12,9 @@ from stages.shape.arrays import BoolArray, ByteArray, Float32Array, FloatArray, 
 from stages.shape.views.buffers import RendererName, Visible, visible_triangles
 from stages.shape.views.camera import Camera, View
 from stages.shape.views.light import KeyLight, eye_positions, ground_seen, key_light, openness, to_world
-from stages.shape.views.palette import label_colors, linear_to_srgb, srgb_to_linear
+from stages.shape.views.palette import PAPER, label_colors, linear_to_srgb, srgb_to_linear
 from stages.shape.views.scene import Scene, without_faces
 
-PAPER = (250, 248, 244)
-"""Background, sRGB: a warm near-white."""
 INK = (38, 32, 36)
 SUBPIXELS_PER_PIXEL = 2
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stages.shape.arrays import ByteArray
-from stages.shape.views.portrait import PAPER
+from stages.shape.views.palette import PAPER
 
 TITLE_INK = (32, 30, 34)
 CAPTION_INK = (122, 116, 112)

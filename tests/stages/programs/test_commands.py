@@ -13,7 +13,7 @@ from PIL import Image
 from stages.programs.program import build_shape
 from stages.programs.sheets import CELL_SIDE_PIXELS, values_showing
 from stages.recovery.result import RecoveryResult
-from stages.shape.views.portrait import PAPER
+from stages.shape.views.palette import PAPER
 from tests.command import shapemill
 from tests.stages.programs.stool import PROGRAM
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from stages.shape.views.camera import Camera
-from stages.shape.views.palette import label_colors, linear_to_srgb, srgb_to_linear
-from stages.shape.views.portrait import PAPER, points_portrait, portrait
+from stages.shape.views.palette import PAPER, label_colors, linear_to_srgb, srgb_to_linear
+from stages.shape.views.portrait import points_portrait, portrait
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from tests.stages.shape.views.solids import boxes_scene
 
