@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from stages.exemplars.congruence import comparable_mesh, congruences
+from stages.exemplars.congruence import are_alike_in_size, comparable_mesh, congruences
 from stages.exemplars.model import STATED_IN_CONFIG, Model
 from stages.exemplars.settings import MAX_CONTACT_TOLERANCE
 from stages.shape.arrays import IntArray
@@ -112,12 +111,14 @@ def kit_warnings(kit: Kit) -> Iterator[str]:
 def mirror_twins(types: Sequence[PartType], tolerance: float) -> list[tuple[int, int]]:
     """Return pairs i < j of types that are mirror images of each other; `tolerance` is a share of the diagonal."""
     meshes = [comparable_mesh(part_type.vertices, part_type.faces) for part_type in types]
+    sizes = np.array([mesh.size for mesh in meshes])
     twins: list[tuple[int, int]] = []
-    for i, j in itertools.combinations(range(len(types)), 2):
-        transforms = congruences(meshes[i], meshes[j], tolerance, reflections=True)
-        # Types that a rotation maps onto each other differ by their labels and are no twins.
-        if len(transforms) and (np.linalg.det(transforms[:, :3, :3]) < 0).all():
-            twins.append((i, j))
+    for i, mesh in enumerate(meshes):
+        for j in (i + 1 + np.flatnonzero(are_alike_in_size(sizes[i + 1 :], mesh, tolerance))).tolist():
+            transforms = congruences(meshes[j], mesh, tolerance, reflections=True)
+            # Types that a rotation maps onto each other differ by their labels and are no twins.
+            if len(transforms) and (np.linalg.det(transforms[:, :3, :3]) < 0).all():
+                twins.append((i, j))
     return twins
 
 
