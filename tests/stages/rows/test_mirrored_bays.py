@@ -30,6 +30,18 @@ UP_AXIS = 1
 MODELS: dict[str, Callable[[], tuple[Kit, Layout]]] = {"table": models.table_on_frames, "casement": models.casement}
 
 
+def shipped_kit(name: str) -> Kit:
+    """Return a kit of configs/rows.yaml; nothing is left to choose."""
+    return read_kit(
+        ROOT / f"datasets/exemplars/rows/{name}.glb",
+        up="y",
+        contact={"tolerance": 0.001, "kinds": ["point", "line", "face"]},
+        grammar="multiset",
+        hubs={"types": "none"},
+        disconnected="error",
+    )
+
+
 def counts(kit: Kit, layout: Layout) -> Counter[str]:
     return Counter(kit.types[kind].label for kind in layout.types.tolist())
 
@@ -124,7 +136,7 @@ def test_draws_are_deterministic_and_within_the_settings_and_json_keeps_them() -
 
 def test_rows_along_inserted_bays_stay_as_they_are() -> None:
     """A row of windows that became longer in one house of a terrace left a blank wall in another."""
-    kit = read_kit(ROOT / "datasets/exemplars/rows/dresser.glb", grammar="multiset")
+    kit = shipped_kit("dresser")
     draws = LayoutDraws(layout_of(kit, kit.exemplars[0]), RowsConfig(), is_alone=True, up=UP_AXIS)
     assert len(draws.mirrored_bays) == 1
     drawn = [draws.draw(np.random.default_rng(seed)) for seed in range(40)]
@@ -136,15 +148,7 @@ def test_rows_along_inserted_bays_stay_as_they_are() -> None:
 
 def test_every_storey_above_the_first_keeps_all_its_windows() -> None:
     """Three storeys without one show no more that a window belongs over the door, which a fourth would then lack."""
-    contact = {"tolerance": 0.001, "kinds": ["point", "line", "face"]}
-    kit = read_kit(
-        ROOT / "datasets/exemplars/rows/house.glb",
-        up="y",
-        contact=contact,
-        grammar="multiset",
-        hubs={"types": "none"},
-        disconnected="error",
-    )
+    kit = shipped_kit("house")
     draws = LayoutDraws(layout_of(kit, kit.exemplars[0]), RowsConfig(), is_alone=True, up=UP_AXIS)
     drawn = [draws.draw(np.random.default_rng(seed)) for seed in range(30)]
     made = [layout for _, layout in filter(None, drawn)]
