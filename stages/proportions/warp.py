@@ -2,7 +2,8 @@
 
 One map moves all vertices (substructures §5.2), so parts that touch keep touching, and separate parts stay separate.
 Lengths along an axis that were equal stay equal, and so do thin ones along all axes. So legs stay alike, boards equally
-thick, gaps even, and symmetric shapes symmetric.
+thick, gaps even, and symmetric shapes symmetric. What is round stays round: along both of its axes all lengths have one
+factor.
 """
 
 from __future__ import annotations
@@ -29,6 +30,10 @@ MIN_SCALED_LENGTH_SHARE = 0.15
 MAX_FREE_INTERVALS = 12
 """Along an axis with more intervals all follow the size of the whole. With more lengths, own factors vary less."""
 FACTOR_DECIMALS = 3
+SILHOUETTE_DIRECTIONS = 16
+MIN_ROUND_SHARE = 0.91
+"""Shortest reach of a round silhouette from its middle, as a share of its longest: that of an octagon is .92, of a
+square .71."""
 
 SLOPE_STEP_SHARE = 1e-3
 """How far from a corner to the middle of its face the map is looked at, since a corner may lie on a knot."""
@@ -58,23 +63,27 @@ class Lattice:
     knots: for each axis where parts begin or end, ascending, in the coordinates of the exemplar, float64 (k + 1,)
     lengths: for each axis the number of each interval's length, int64 (k,); equal lengths share a number along all axes
     up: axis that points up
+    round_axes: the two axes across which an exemplar is round, such as x and z of a barrel; empty for any other
     """
 
     knots: tuple[FloatArray, FloatArray, FloatArray]
     lengths: tuple[np.ndarray, np.ndarray, np.ndarray]
     up: int
+    round_axes: tuple[int, ...] = ()
 
     def draw(self, rng: np.random.Generator, log_std: float, max_factor: float) -> Warp:
-        """Return random rounded factors, at most `max_factor` and at least its inverse."""
+        """Return random rounded factors, at most `max_factor` and at least its inverse; one for both round axes."""
         count = 1 + max((int(numbers.max()) for numbers in self.lengths if len(numbers)), default=-1)
         sizes = rng.normal(0.0, log_std, 3)
         own = rng.normal(0.0, log_std * min(1.0, np.sqrt(MAX_FREE_INTERVALS / max(count, 1))), count)
         warp = []
         large = MIN_SCALED_LENGTH_SHARE * max(float(axis_knots[-1] - axis_knots[0]) for axis_knots in self.knots)
-        for knots, lengths, size in zip(self.knots, self.lengths, sizes, strict=True):
+        for axis, (knots, lengths, size) in enumerate(zip(self.knots, self.lengths, sizes, strict=True)):
             gaps = np.diff(knots)
             follows = (gaps > large) | (len(gaps) > MAX_FREE_INTERVALS)
             factors = np.exp(own[lengths] + np.where(follows, size, 0.0))
+            if axis in self.round_axes:
+                factors = np.full(len(gaps), np.exp(sizes[self.round_axes[0]]))
             warp.append(np.round(np.clip(factors, 1 / max_factor, max_factor), FACTOR_DECIMALS))
         x, y, z = warp
         return x, y, z
@@ -128,7 +137,29 @@ def lattice_of(shape: Shape, contact_tolerance: float) -> Lattice:
             numbers.append(number)
         knots.append(knot_positions)
         lengths.append(np.array(numbers, dtype=np.int64))
-    return Lattice((knots[0], knots[1], knots[2]), (lengths[0], lengths[1], lengths[2]), {"y": 1, "z": 2}[shape.up])
+    up = {"y": 1, "z": 2}[shape.up]
+    lattice = Lattice((knots[0], knots[1], knots[2]), (lengths[0], lengths[1], lengths[2]), up)
+    return replace(lattice, round_axes=_round_axes(shape, up))
+
+
+def _round_axes(shape: Shape, up: int) -> tuple[int, ...]:
+    """Return the two axes along which the silhouette of a shape is round, seen from above if it is round there."""
+    assembly = shape.assembly
+    points = np.concatenate(
+        [
+            transform_points(pose, shape.meshes[kind].vertices)
+            for kind, pose in zip(assembly.types.tolist(), assembly.poses, strict=True)
+        ]
+    )
+    points -= (points.min(axis=0) + points.max(axis=0)) / 2
+    angles = 2.0 * np.pi * np.arange(SILHOUETTE_DIRECTIONS) / SILHOUETTE_DIRECTIONS
+    directions = np.stack([np.cos(angles), np.sin(angles)])
+    for axis in sorted(range(3), key=lambda axis: axis != up):
+        across = tuple(other for other in range(3) if other != axis)
+        reach = (points[:, across] @ directions).max(axis=0)
+        if reach.min() >= MIN_ROUND_SHARE * reach.max():
+            return across
+    return ()
 
 
 def warped(shape: Shape, lattice: Lattice, warp: Sequence[FloatArray]) -> Shape:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stages.proportions.warp import warped
+from stages.proportions.warp import lattice_of, warped
 from stages.proportions.warp_check import warp_fault
 from stages.shape.geometry.contact import ContactTest, world_boxes
+from stages.shape.kit import Assembly
 from stages.shape.shape import Shape, kit_shape
 from tests.stages.proportions.stools import kit, lattice, whole
+from tests.stages.shape.geometry.bodies import box, part, prism
 
 
 def boxes(shape: Shape) -> np.ndarray:
@@ -97,3 +100,38 @@ def test_shape_with_lost_contacts_is_rejected() -> None:
     top = int(np.flatnonzero(whole().types == kit().labels.index("top"))[0])
     shape.assembly.poses[top, 1, 3] += 0.2
     assert warp_fault(kit(), whole(), shape) == "contact lost"
+
+
+def drum(sides: int, up: str = "y") -> Shape:
+    """A drum on a polygon of `sides`, about y, with a board inside."""
+    drum, board = part(prism(sides)), part(box(1.2, 0.1, 3.0))
+    upright = np.eye(4)
+    upright[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    assembly = Assembly(
+        np.array([0, 1], dtype=np.int16), np.stack([upright, upright]), np.array([[0, 1]], dtype=np.int32)
+    )
+    return Shape((drum, board), assembly, up, ("drum", "board"))
+
+
+@pytest.mark.parametrize(("up", "sides"), [("y", 8), ("y", 48), ("z", 48)])
+def test_what_is_round_stays_round(up: str, sides: int) -> None:
+    shape = drum(sides, up)
+    knots = lattice_of(shape, 1e-3)
+    assert knots.round_axes == (0, 2)
+    heights = []
+    for seed in range(5):
+        made = warped(shape, knots, knots.draw(np.random.default_rng(seed), 0.3, 2.0))
+        around = made.meshes[0].vertices[: 2 * sides] * [1.0, 0.0, 1.0]
+        radii = np.linalg.norm(around, axis=1)
+        np.testing.assert_allclose(radii, radii[0], rtol=1e-6)
+        heights.append(np.ptp(made.meshes[0].vertices[:, 1]) / radii[0])
+    assert len(set(np.round(heights, 3))) == 5
+
+
+def test_a_square_is_not_round_and_a_ball_may_become_flat() -> None:
+    assert lattice().round_axes == ()
+    assert lattice_of(drum(4), 1e-3).round_axes == ()
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    body = part((np.asarray(ball.vertices, dtype=np.float64), np.asarray(ball.faces, dtype=np.int32)))
+    assembly = Assembly(np.zeros(1, dtype=np.int16), np.eye(4)[None], np.empty((0, 2), dtype=np.int32))
+    assert lattice_of(Shape((body,), assembly, "y", ("ball",)), 1e-3).round_axes == (0, 2)
