@@ -1,4 +1,4 @@
-"""The figure of a kit: its exemplars, and every part type with its number of parts."""
+"""The figure of a kit: its exemplars, and its commonest part types with their numbers of parts."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ from stages.shape.views.viewpoint import best_viewpoint
 
 CELL_PIXELS = 200
 FIGURE_COLUMNS = 6
+MAX_TYPES_SHOWN = 120
+"""Part types that are drawn, so that a picture of thousands is drawn in seconds and can be opened."""
 EXEMPLAR_CAMERA = Camera(azimuth=-40.0, elevation=25.0, fov=24.0, margin=0.04)
 PART_MARGIN = 0.12
 PART_ELEVATION = 25.0
@@ -29,7 +31,7 @@ PART_TURNS = (0.0, 50.0, 100.0, 150.0)
 
 
 def kit_figure(kit: Kit) -> bytes:
-    """Return a PNG of the kit: its exemplars, then one picture for each part type, the commonest first.
+    """Return a PNG of the kit: its exemplars, then one picture for each of the commonest part types.
 
     Exemplars of one colour are shown twice: as they are, and by the labels of their parts. All are seen from where most
     of the exemplars' parts are seen.
@@ -38,7 +40,7 @@ def kit_figure(kit: Kit) -> bytes:
     """
     used = np.concatenate([exemplar.assembly.types for exemplar in kit.exemplars])
     counts = np.bincount(used, minlength=len(kit.types))
-    commonest = np.argsort(-counts, kind="stable").tolist()
+    commonest = np.argsort(-counts, kind="stable")[:MAX_TYPES_SHOWN].tolist()
     wholes = [kit_shape(kit, exemplar.assembly) for exemplar in kit.exemplars]
     camera = best_viewpoint([scene_of(shape) for shape in wholes], EXEMPLAR_CAMERA)
     part_camera = replace(camera, margin=PART_MARGIN, elevation=PART_ELEVATION)
@@ -60,9 +62,10 @@ def kit_figure(kit: Kit) -> bytes:
             span,
         ),
         Section(
-            _count(len(shown), "part type"),
+            _count(len(kit.types), "part type"),
             _rows(shown, FIGURE_COLUMNS),
-            "number of parts in the exemplars, and symmetries",
+            ("" if len(shown) == len(kit.types) else f"the {len(shown)} commonest; ")
+            + "number of parts in the exemplars, and symmetries",
         ),
     ]
     return picture_png(contact_sheet(sections, kit.name, CELL_PIXELS))

@@ -1,4 +1,4 @@
-"""The figure of a kit shows every part type, however thin."""
+"""The figure of a kit shows its part types, however thin, and of thousands the commonest."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 from io import BytesIO
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from stages.exemplars.kit_figure import kit_figure
@@ -21,3 +22,10 @@ def test_part_type_that_no_camera_sees_is_an_empty_cell() -> None:
     shown = replace(kit, types=(replace(thin, face_colors=cap.face_colors[:1]), *kit.types[1:]))
     picture = Image.open(BytesIO(kit_figure(shown)))
     assert picture.size == Image.open(BytesIO(kit_figure(kit))).size
+
+
+def test_of_many_types_the_commonest_are_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    kit = kit_of(CHAIN, [chain(3)])
+    monkeypatch.setattr("stages.exemplars.kit_figure.MAX_TYPES_SHOWN", len(kit.types))
+    whole, many = (Image.open(BytesIO(kit_figure(replace(kit, types=kit.types * times)))) for times in (1, 9))
+    assert whole.size == many.size
