@@ -62,10 +62,10 @@ class LayoutDraws:
             return (tuple(changes), layout) if changes else None
         # Along inserted bays a row would change in one bay alone, and leave a blank stretch of wall in another.
         barred = changes[0].normal if changes and isinstance(changes[0], RowChange) else None
-        shifts = set[bytes]()  # of rows that have been changed
+        changed_shifts = set[bytes]()
         for _ in range(int(rng.integers(1, self.config.max_changes + 1))):
             for _ in range(TRIES_PER_CHANGE):
-                changed = self._change(layout, rng, barred, shifts)
+                changed = self._change(layout, rng, barred, changed_shifts)
                 if changed is not None:
                     layout = changed[1]
                     changes += changed[0]
@@ -113,24 +113,28 @@ class LayoutDraws:
         return bool((layout.extent <= MAX_SIDE_FACTOR * self.exemplar.extent).all())
 
     def _change(
-        self, layout: Layout, rng: np.random.Generator, barred: FloatArray | None, shifts: set[bytes]
+        self, layout: Layout, rng: np.random.Generator, barred: FloatArray | None, changed_shifts: set[bytes]
     ) -> tuple[list[RowChange], Layout] | None:
         """Return one row of a layout made longer or shorter, or None where the draw is not valid.
 
         barred: direction along which rows stay as they are, float64 (3,), or None
-        shifts: those of rows that have been changed, each once: a house of two storeys that had three shows no more
-            that a window belongs over the door. The shift of this change is added.
+        changed_shifts: shifts of the rows that have been changed; each changes once, and that of this change is added.
+            A house that was shortened to two storeys no longer shows that a window belongs over the door.
         """
         # A layout with fewer parts than the exemplar may allow a step that the exemplar refuses.
-        own = {row.step for row in self.rows}
-        rows = [row for row in self._rows_of(layout) if row.step in own and (barred is None or not row.shift @ barred)]
+        allowed_steps = {row.step for row in self.rows}
+        rows = [
+            row
+            for row in self._rows_of(layout)
+            if row.step in allowed_steps
+            and row.shift.tobytes() not in changed_shifts
+            and (barred is None or not row.shift @ barred)
+        ]
         if not rows:
             return None
         row = rows[int(rng.integers(len(rows)))]
         least, most = self._limits[row.step]
         wanted = int(rng.integers(least, most + 1))
-        if row.shift.tobytes() in shifts:
-            return None
         if wanted > row.count and len(row.insertions):
             change = row.insertion(int(rng.integers(len(row.insertions))), wanted - row.count)
             longer = self._repeated(layout, change)
@@ -138,7 +142,7 @@ class LayoutDraws:
         else:
             changed = self._shortened(layout, row, wanted, rng)
         if changed is not None:
-            shifts.add(row.shift.tobytes())
+            changed_shifts.add(row.shift.tobytes())
         return changed
 
     def _shortened(

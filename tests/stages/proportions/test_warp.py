@@ -104,13 +104,13 @@ def test_shape_with_lost_contacts_is_rejected() -> None:
 
 def drum(sides: int, up: str = "y") -> Shape:
     """A drum on a polygon of `sides`, about y, with a board inside."""
-    drum, board = part(prism(sides)), part(box(1.2, 0.1, 3.0))
+    body, board = part(prism(sides)), part(box(1.2, 0.1, 3.0))
     upright = np.eye(4)
     upright[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
     assembly = Assembly(
         np.array([0, 1], dtype=np.int16), np.stack([upright, upright]), np.array([[0, 1]], dtype=np.int32)
     )
-    return Shape((drum, board), assembly, up, ("drum", "board"))
+    return Shape((body, board), assembly, up, ("drum", "board"))
 
 
 @pytest.mark.parametrize(("up", "sides"), [("y", 8), ("y", 48), ("z", 48)])
