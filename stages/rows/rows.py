@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ MIN_ROW = 2
 MIN_TORN_ROW = 3
 """Parts of a row from which no change of another row may tear it apart; two legs may stand further apart."""
 TORN_ROW = "a row with another step would be torn apart"
+BARE_PLACE = "a part would be bare there that holds parts of the row elsewhere"
 MIN_BAYS_SHORTENED = 3
 """Parts of a row from which a bay between two of them can be removed."""
 MIN_AREA_SHARE = 0.005
@@ -34,12 +36,16 @@ MAX_STRETCHING_PLACES = 2
 
 
 class _Place(NamedTuple):
-    """End of a slab, whether it can be inserted and removed, and what that does to parts that span it."""
+    """End of a slab, whether it can be inserted and removed, and what that does to parts that span it.
+
+    held: the types of the parts that a period copies, by the spanning part that they touch
+    """
 
     at: float
     may_insert: bool
     may_remove: bool
     cost: int
+    held: Mapping[int, Counter[int]]
 
 
 @dataclass(frozen=True)
@@ -193,8 +199,8 @@ def _rows_along(
             cost = LENGTHENING if slab.is_regular else STRETCHING if slab.stretches else CUTTING
             if cost == STRETCHING and (count < MIN_STRETCHING_ROW or slab.leaves_some_uncopied):
                 continue
-            found.setdefault(copied, []).append(_Place(at, may_insert, may_remove, cost))
-    for copied, places in found.items():
+            found.setdefault(copied, []).append(_Place(at, may_insert, may_remove, cost, slab.held))
+    for copied, places in _without_bare_places(found, refuse).items():
         # A cut leaves vertices, after which a part may no longer repeat itself elsewhere.
         cost = min(place.cost for place in places)
         best = [place for place in places if place.cost == cost]
@@ -206,6 +212,26 @@ def _rows_along(
         removals = np.array([place.at for place in best if place.may_remove])
         if len(insertions) or len(removals):
             yield Row(number, normal, step.shift, count, copied, insertions, removals, step.is_bay)
+
+
+def _without_bare_places(
+    found: Mapping[tuple[int, ...], Sequence[_Place]], refuse: Callable[[str], None]
+) -> dict[tuple[int, ...], list[_Place]]:
+    """Return the places of a row without those where a part becomes longer and holds less than at another place.
+
+    A wall would get a blank stretch at its door, where windows are elsewhere.
+    """
+    held_by: dict[int, list[Counter[int]]] = {}
+    for place in (places[0] for places in found.values()):
+        for holder, held in place.held.items():
+            held_by.setdefault(holder, []).append(held)
+    kept: dict[tuple[int, ...], list[_Place]] = {}
+    for copied, places in found.items():
+        if any(held < other for holder, held in places[0].held.items() for other in held_by[holder]):
+            refuse(BARE_PLACE)
+        else:
+            kept[copied] = list(places)
+    return kept
 
 
 def _tried(layout: Layout, normal: FloatArray, step: Step, places: Sequence[_Place]) -> Iterator[_Place]:
@@ -220,7 +246,7 @@ def _tried(layout: Layout, normal: FloatArray, step: Step, places: Sequence[_Pla
                 allowed.append(may_change)
             except SlabError:
                 allowed.append(False)
-        yield _Place(place.at, allowed[0], allowed[1], place.cost)
+        yield place._replace(may_insert=allowed[0], may_remove=allowed[1])
 
 
 def _may_end_slabs(

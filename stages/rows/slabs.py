@@ -11,6 +11,7 @@ The slab of a bay is whole: what occurs once in it is copied too, such as the do
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -157,6 +158,15 @@ class Slab:
         begins = self.low < self.start - self.layout.tolerance
         spans = begins & (self.high > self.at + self.layout.tolerance) & ~self._stands_out
         return np.flatnonzero(spans | self._overhangs)
+
+    @property
+    def held(self) -> dict[int, Counter[int]]:
+        """The types of the recurring parts that each spanning part touches."""
+        types, neighbours = self.layout.types, self.layout.neighbours
+        return {
+            holder: Counter(types[neighbours[holder][self.recurs[neighbours[holder]]]].tolist())
+            for holder in self.spanning.tolist()
+        }
 
     @cached_property
     def _is_spanning(self) -> BoolArray:

@@ -18,6 +18,7 @@ from stages.rows.draws import LayoutDraws
 from stages.rows.kit_rows import rows_of_kit
 from stages.rows.layout import Layout, layout_of
 from stages.rows.mirrored_bays import find_mirrored_bays, with_mirrored_bays
+from stages.rows.rows import BARE_PLACE, find_rows
 from stages.rows.settings import RowsConfig
 from stages.rows.slabs import RowChange, SlabError
 from stages.shape.geometry.contact import ContactTest
@@ -159,6 +160,20 @@ def test_every_storey_above_the_first_keeps_all_its_windows() -> None:
         first, *others = (storeys[height] for height in sorted(storeys))
         assert len(set(others)) <= 1
         assert all(count > first for count in others)
+
+
+def test_no_wall_gets_a_blank_stretch_beside_its_door() -> None:
+    """A period at the door has windows above only; elsewhere the same wall has one on the ground floor, too."""
+    kit = shipped_kit("house")
+    refused = Counter[str]()
+    rows = find_rows(layout_of(kit, kit.exemplars[0]), refuse=lambda reason: refused.update([reason]))
+    windows = [
+        sum(kit.types[kind].label == "window" for kind in row.copied)
+        for row in rows
+        if row.shift[0] == pytest.approx(3.0)
+    ]
+    assert windows == [3]
+    assert refused[BARE_PLACE]
 
 
 def test_a_text_says_the_bays_and_a_wrong_one_is_refused() -> None:
