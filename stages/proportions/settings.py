@@ -25,7 +25,7 @@ class ProportionsConfig(StrictModel):
         gt=0,
         le=1,
         description="Standard deviation of the logarithm of the size along an axis, and of each length between "
-        "the ends of parts. A shape that is round, seen from above or from a side, stays round.",
+        "the ends of parts. What is round, the whole or a part, seen from above or from a side, stays round.",
     )
     max_factor: float = Field(2.0, gt=1, le=4, description="Maximum factor by which a length grows or shrinks.")
     min_difference: float = Field(

@@ -2,19 +2,19 @@
 
 One map moves all vertices (substructures §5.2), so parts that touch keep touching, and separate parts stay separate.
 Lengths along an axis that were equal stay equal, and so do thin ones along all axes. So legs stay alike, boards equally
-thick, gaps even, and symmetric shapes symmetric. What is round stays round: along both of its axes all lengths have one
-factor.
+thick, gaps even, and symmetric shapes symmetric. What is round stays round, the whole or a part such as a wheel: along
+both of its axes all lengths have one factor.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stages.shape.appearance import unit_vectors
-from stages.shape.arrays import FloatArray
+from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.contact import world_boxes
 from stages.shape.geometry.pose import transform_points
 from stages.shape.kit import Assembly, PartMesh
@@ -34,7 +34,10 @@ SILHOUETTE_DIRECTIONS = 16
 MIN_ROUND_SHARE = 0.91
 """Shortest reach of a round silhouette from its middle, as a share of its longest: that of an octagon is .92, of a
 square .71."""
-
+MIN_ROUND_AREA_SHARE = 0.005
+"""Share of the surface from which round parts of a type stay round."""
+MAX_TIED_SHARE = 0.9
+"""Share of the sides of a shape, along all three axes, that one factor may have: more would leave one shape."""
 SLOPE_STEP_SHARE = 1e-3
 """How far from a corner to the middle of its face the map is looked at, since a corner may lie on a knot."""
 
@@ -63,29 +66,28 @@ class Lattice:
     knots: for each axis where parts begin or end, ascending, in the coordinates of the exemplar, float64 (k + 1,)
     lengths: for each axis the number of each interval's length, int64 (k,); equal lengths share a number along all axes
     up: axis that points up
-    round_axes: the two axes across which an exemplar is round, such as x and z of a barrel; empty for any other
+    sources: for each interval, of x, then y, then z, the one whose factor it has: the longest of those that keep a part
+        round, or itself; int64 (number of intervals,)
     """
 
     knots: tuple[FloatArray, FloatArray, FloatArray]
     lengths: tuple[np.ndarray, np.ndarray, np.ndarray]
     up: int
-    round_axes: tuple[int, ...] = ()
+    sources: np.ndarray
 
     def draw(self, rng: np.random.Generator, log_std: float, max_factor: float) -> Warp:
-        """Return random rounded factors, at most `max_factor` and at least its inverse; one for both round axes."""
+        """Return random rounded factors, at most `max_factor` and at least its inverse."""
         count = 1 + max((int(numbers.max()) for numbers in self.lengths if len(numbers)), default=-1)
         sizes = rng.normal(0.0, log_std, 3)
         own = rng.normal(0.0, log_std * min(1.0, np.sqrt(MAX_FREE_INTERVALS / max(count, 1))), count)
-        warp = []
-        large = MIN_SCALED_LENGTH_SHARE * max(float(axis_knots[-1] - axis_knots[0]) for axis_knots in self.knots)
-        for axis, (knots, lengths, size) in enumerate(zip(self.knots, self.lengths, sizes, strict=True)):
-            gaps = np.diff(knots)
-            follows = (gaps > large) | (len(gaps) > MAX_FREE_INTERVALS)
-            factors = np.exp(own[lengths] + np.where(follows, size, 0.0))
-            if axis in self.round_axes:
-                factors = np.full(len(gaps), np.exp(sizes[self.round_axes[0]]))
-            warp.append(np.round(np.clip(factors, 1 / max_factor, max_factor), FACTOR_DECIMALS))
-        x, y, z = warp
+        follows = _follows(self.knots)
+        exponents = [
+            own[lengths] + np.where(follow, size, 0.0)
+            for lengths, follow, size in zip(self.lengths, follows, sizes, strict=True)
+        ]
+        factors = np.exp(np.concatenate(exponents)[self.sources])
+        factors = np.round(np.clip(factors, 1 / max_factor, max_factor), FACTOR_DECIMALS)
+        x, y, z = np.split(factors, np.cumsum([len(lengths) for lengths in self.lengths])[:2])
         return x, y, z
 
     @property
@@ -138,28 +140,77 @@ def lattice_of(shape: Shape, contact_tolerance: float) -> Lattice:
         knots.append(knot_positions)
         lengths.append(np.array(numbers, dtype=np.int64))
     up = {"y": 1, "z": 2}[shape.up]
-    lattice = Lattice((knots[0], knots[1], knots[2]), (lengths[0], lengths[1], lengths[2]), up)
-    return replace(lattice, round_axes=_round_axes(shape, up))
+    sources = _sources(shape, boxes, knots, lengths, up)
+    return Lattice((knots[0], knots[1], knots[2]), (lengths[0], lengths[1], lengths[2]), up, sources)
 
 
-def _round_axes(shape: Shape, up: int) -> tuple[int, ...]:
-    """Return the two axes along which the silhouette of a shape is round, seen from above if it is round there."""
+def _follows(knots: Sequence[FloatArray]) -> list[BoolArray]:
+    """Return for each axis which intervals follow the size along it, bool (k,)."""
+    large = MIN_SCALED_LENGTH_SHARE * max(float(np.ptp(axis_knots)) for axis_knots in knots)
+    return [(np.diff(axis_knots) > large) | (len(axis_knots) > MAX_FREE_INTERVALS + 1) for axis_knots in knots]
+
+
+def _sources(
+    shape: Shape, boxes: FloatArray, knots: Sequence[FloatArray], lengths: Sequence[np.ndarray], up: int
+) -> np.ndarray:
+    """Return `Lattice.sources`.
+
+    Intervals that keep something round are tied, and with them all that have their factors. The whole comes first, then
+    large parts.
+    """
+    gaps = [np.diff(axis_knots) for axis_knots in knots]
+    axes = np.repeat(np.arange(3), [len(of_axis) for of_axis in gaps])
+    middles = np.concatenate([axis_knots[:-1] + of_axis / 2 for axis_knots, of_axis in zip(knots, gaps, strict=True)])
+    long = np.concatenate(gaps)
+    keys = np.stack([np.concatenate(lengths), np.where(np.concatenate(_follows(knots)), axes, -1)])
+    groups = np.unique(keys, axis=1, return_inverse=True)[1].reshape(-1)
+    sides = np.array([of_axis.sum() for of_axis in gaps])
+    is_tied = np.zeros(len(groups), dtype=bool)
+    for low, high, across in _round_boxes(shape, boxes, up):
+        within = (middles > low[axes]) & (middles < high[axes]) & np.isin(axes, across)
+        joined = np.isin(groups, groups[within])
+        shares = np.bincount(axes[joined], long[joined], minlength=3) / np.maximum(sides, 1e-12)
+        if (shares[sides > 0] < MAX_TIED_SHARE).any():
+            groups[joined] = groups[joined].min()
+            is_tied |= joined
+    sources = np.arange(len(groups))
+    for group in np.unique(groups[is_tied]).tolist():
+        members = np.flatnonzero(groups == group)
+        sources[members] = members[np.argmax(np.round(long[members] / long[members].max(), FACTOR_DECIMALS))]
+    return sources
+
+
+def _round_boxes(shape: Shape, boxes: FloatArray, up: int) -> Iterator[tuple[FloatArray, FloatArray, tuple[int, int]]]:
+    """Yield the ends of the box around each thing that is round, float64 (3,), and the two axes across which it is.
+
+    The whole comes first, then parts by the surface of their type.
+    """
     assembly = shape.assembly
-    points = np.concatenate(
-        [
-            transform_points(pose, shape.meshes[kind].vertices)
-            for kind, pose in zip(assembly.types.tolist(), assembly.poses, strict=True)
-        ]
-    )
-    points -= (points.min(axis=0) + points.max(axis=0)) / 2
+    types = assembly.types.tolist()
+    points = [
+        transform_points(pose, shape.meshes[kind].vertices) for kind, pose in zip(types, assembly.poses, strict=True)
+    ]
+    whole = np.concatenate(points)
+    for across in _round_across(whole, up):
+        yield whole.min(axis=0), whole.max(axis=0), across
+    counts = np.bincount(types, minlength=len(shape.meshes))
+    areas = counts * np.array([mesh.area for mesh in shape.meshes])
+    for part in np.argsort(-areas[types], kind="stable").tolist():
+        if areas[types[part]] >= MIN_ROUND_AREA_SHARE * areas.sum():
+            for across in _round_across(points[part], up):
+                yield boxes[part, 0], boxes[part, 1], across
+
+
+def _round_across(points: FloatArray, up: int) -> Iterator[tuple[int, int]]:
+    """Yield the pairs of axes across which a silhouette is round, that seen from above first."""
+    points = points - (points.min(axis=0) + points.max(axis=0)) / 2
     angles = 2.0 * np.pi * np.arange(SILHOUETTE_DIRECTIONS) / SILHOUETTE_DIRECTIONS
     directions = np.stack([np.cos(angles), np.sin(angles)])
     for axis in sorted(range(3), key=lambda axis: axis != up):
-        across = tuple(other for other in range(3) if other != axis)
-        reach = (points[:, across] @ directions).max(axis=0)
-        if reach.min() >= MIN_ROUND_SHARE * reach.max():
-            return across
-    return ()
+        first, second = (other for other in range(3) if other != axis)
+        reach = (points[:, [first, second]] @ directions).max(axis=0)
+        if reach.min() >= MIN_ROUND_SHARE * reach.max() > 0:
+            yield first, second
 
 
 def warped(shape: Shape, lattice: Lattice, warp: Sequence[FloatArray]) -> Shape:
