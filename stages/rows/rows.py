@@ -107,7 +107,11 @@ def find_rows(
         for normal in step.normals():
             ends = _bay_ends_along(layout, normal, steps, all_mates)
             rows += _rows_along(layout, number, step, count, normal, mates, others, ends, refuse, may_stretch)
-    return [row for row in rows if not any(_splits_units(layout, row, whole) for whole in rows)]
+    return [
+        row
+        for row in rows
+        if not any(_splits_units(layout, row, other) or _is_multiple(layout, row, other) for other in rows)
+    ]
 
 
 def is_visible(exemplar: Layout, copied: Sequence[int], count: int) -> bool:
@@ -138,6 +142,21 @@ def _splits_units(layout: Layout, row: Row, whole: Row) -> bool:
     takes = (layout.mates(row.shift) >= 0) | (layout.mates(-row.shift) >= 0)
     taken, left = units[takes & (units >= 0)], units[~takes & (units >= 0)]
     return bool(np.intersect1d(taken, left).size)
+
+
+def _is_multiple(layout: Layout, row: Row, other: Row) -> bool:
+    """Return whether periods of another row, two or more at once, insert all the types that a row does.
+
+    Over a longer step fewer parts recur: two columns of windows would lack the one that stands where a door is.
+    """
+    times = round(float(row.shift @ other.shift) / float(other.shift @ other.shift))
+    return (
+        times > 1
+        and not (row.is_bay or other.is_bay)
+        and bool((row.normal == other.normal).all())
+        and bool(np.abs(row.shift - times * other.shift).max() <= times * layout.tolerance)
+        and set(row.copied) <= set(other.copied)
+    )
 
 
 def _units(layout: Layout, shift: FloatArray) -> np.ndarray:

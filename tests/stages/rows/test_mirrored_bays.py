@@ -163,15 +163,14 @@ def test_every_storey_above_the_first_keeps_all_its_windows() -> None:
 
 
 def test_no_wall_gets_a_blank_stretch_beside_its_door() -> None:
-    """A period at the door has windows above only; elsewhere the same wall has one on the ground floor, too."""
+    """A period at the door has windows above only; elsewhere the same wall has one on the ground floor, too.
+
+    Two columns at once, over twice the step, would lack one, too.
+    """
     kit = shipped_kit("house")
     refused = Counter[str]()
     rows = find_rows(layout_of(kit, kit.exemplars[0]), refuse=lambda reason: refused.update([reason]))
-    windows = [
-        sum(kit.types[kind].label == "window" for kind in row.copied)
-        for row in rows
-        if row.shift[0] == pytest.approx(3.0)
-    ]
+    windows = [sum(kit.types[kind].label == "window" for kind in row.copied) for row in rows if row.shift[0] > 0]
     assert windows == [3]
     assert refused[BARE_PLACE]
 
