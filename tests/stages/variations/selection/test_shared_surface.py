@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -33,16 +33,17 @@ def by_every_motion(kit: Kit, first: Assembly, second: Assembly) -> float:
         turned = np.einsum("nij,nj->ni", assembly.poses[:, :3, :3], centroid[assembly.types])
         return np.asarray(turned + assembly.poses[:, :3, 3])
 
+    own, others = centres(first), centres(second)
+    is_alike = first.types[:, None] == second.types[None]
     most = 0.0
-    for i, j in np.argwhere(first.types[:, None] == second.types[None]).tolist():
-        for symmetry in kit.types[first.types[i]].symmetries:
-            motion = second.poses[j] @ symmetry @ invert(first.poses[i])
-            if motion[1, 1] > 0.999:
-                gaps = (centres(first) @ motion[:3, :3].T + motion[:3, 3])[:, None] - centres(second)[None]
-                meets = (np.abs(gaps).max(axis=2) <= CENTROID_TOLERANCES * kit.pose_tolerance) & (
-                    first.types[:, None] == second.types[None]
-                )
-                most = max(most, float(area[first.types[meets.any(axis=1)]].sum()))
+    for i, kind in enumerate(first.types.tolist()):
+        symmetries = np.stack(list(kit.types[kind].symmetries)) @ invert(first.poses[i])
+        motions = (second.poses[is_alike[i], None] @ symmetries).reshape(-1, 4, 4)
+        motions = motions[motions[:, 1, 1] > 0.999]
+        moved_there = own @ motions[:, :3, :3].transpose(0, 2, 1) + motions[:, None, :3, 3]
+        gaps = np.abs(moved_there[:, :, None] - others).max(axis=3)
+        meets = (is_alike & (gaps <= CENTROID_TOLERANCES * kit.pose_tolerance)).any(axis=2)
+        most = max(most, float((meets @ area[first.types]).max(initial=0.0)))
     return most / max(area[first.types].sum(), area[second.types].sum())
 
 
@@ -110,13 +111,15 @@ def test_near_relatives_are_those_of_brute_force_over_a_whole_pool() -> None:
     assemblies = [variant.assembly for variant in found[:40]]
     shapes = PackedShapes(kit, assemblies, upright=True)
     everything = np.arange(len(assemblies))
+    exact = np.eye(len(assemblies))
+    for i, j in combinations(range(len(assemblies)), 2):
+        exact[i, j] = exact[j, i] = by_every_motion(kit, assemblies[i], assemblies[j])
     near_count = 0
-    for place, assembly in enumerate(assemblies):
-        exact = np.array([by_every_motion(kit, assembly, other) for other in assemblies])
+    for place in range(len(assemblies)):
         for least in (0.6, 0.8, 0.9):
-            decided = np.abs(exact - least) > 1e-6
+            decided = np.abs(exact[place] - least) > 1e-6
             near = shapes.shares(place, everything, least, least) > 0.0
-            assert near[decided].tolist() == (exact >= least)[decided].tolist()
+            assert near[decided].tolist() == (exact[place] >= least)[decided].tolist()
             near_count += int(near.sum()) - 1
     assert near_count > 50
 
