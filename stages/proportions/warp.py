@@ -161,7 +161,7 @@ def _sources(
     gaps = [np.diff(axis_knots) for axis_knots in knots]
     axes = np.repeat(np.arange(3), [len(of_axis) for of_axis in gaps])
     middles = np.concatenate([axis_knots[:-1] + of_axis / 2 for axis_knots, of_axis in zip(knots, gaps, strict=True)])
-    long = np.concatenate(gaps)
+    all_gaps = np.concatenate(gaps)
     keys = np.stack([np.concatenate(lengths), np.where(np.concatenate(_follows(knots)), axes, -1)])
     groups = np.unique(keys, axis=1, return_inverse=True)[1].reshape(-1)
     sides = np.array([of_axis.sum() for of_axis in gaps])
@@ -169,14 +169,14 @@ def _sources(
     for low, high, across in _round_boxes(shape, boxes, up):
         within = (middles > low[axes]) & (middles < high[axes]) & np.isin(axes, across)
         joined = np.isin(groups, groups[within])
-        shares = np.bincount(axes[joined], long[joined], minlength=3) / np.maximum(sides, 1e-12)
+        shares = np.bincount(axes[joined], all_gaps[joined], minlength=3) / np.maximum(sides, 1e-12)
         if (shares[sides > 0] < MAX_TIED_SHARE).any():
             groups[joined] = groups[joined].min()
             is_tied |= joined
     sources = np.arange(len(groups))
     for group in np.unique(groups[is_tied]).tolist():
         members = np.flatnonzero(groups == group)
-        sources[members] = members[np.argmax(np.round(long[members] / long[members].max(), FACTOR_DECIMALS))]
+        sources[members] = members[np.argmax(np.round(all_gaps[members] / all_gaps[members].max(), FACTOR_DECIMALS))]
     return sources
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ MIN_ROW = 2
 MIN_TORN_ROW = 3
 """Parts of a row from which no change of another row may tear it apart; two legs may stand further apart."""
 TORN_ROW = "a row with another step would be torn apart"
-BARE_PLACE = "a part would be bare there that holds parts of the row elsewhere"
+BARE_PLACE = "a part would hold fewer parts of the row there than elsewhere"
 MIN_BAYS_SHORTENED = 3
 """Parts of a row from which a bay between two of them can be removed."""
 MIN_AREA_SHARE = 0.005
@@ -241,15 +242,18 @@ def _without_bare_places(
     A wall would get a blank stretch at its door, where windows are elsewhere.
     """
     held_by: dict[int, list[Counter[int]]] = {}
-    for place in (places[0] for places in found.values()):
+    for place in chain.from_iterable(found.values()):
         for holder, held in place.held.items():
-            held_by.setdefault(holder, []).append(held)
+            known = held_by.setdefault(holder, [])
+            if held not in known:
+                known.append(held)
     kept: dict[tuple[int, ...], list[_Place]] = {}
     for copied, places in found.items():
-        if any(held < other for holder, held in places[0].held.items() for other in held_by[holder]):
-            refuse(BARE_PLACE)
-        else:
-            kept[copied] = list(places)
+        for place in places:
+            if any(held < other for holder, held in place.held.items() for other in held_by[holder]):
+                refuse(BARE_PLACE)
+            else:
+                kept.setdefault(copied, []).append(place)
     return kept
 
 
