@@ -44,8 +44,8 @@ SECTIONS: dict[str, Any] = {
     },
     "structure": {"hierarchy": True},
     "points": {"uniform": 64},
-    # At 48 pixels a pennant seen from its edge is .4 wide, and gets no stroke.
-    "sketches": {"size": 96, "renderer": "raster", "views": [{"name": "front"}]},
+    # A pennant seen from its edge is .4 of these pixels wide, and gets no line.
+    "sketches": {"size": 48, "renderer": "raster", "views": [{"name": "front"}]},
     "package": {"previewed": 4},
 }
 
