@@ -89,19 +89,29 @@ def ticking(name: str, text: str) -> Iterator[None]:
 @contextmanager
 def counting(name: str, total: int, unit: str) -> Iterator[Callable[[int], None]]:
     """Show how many of `total` units are done, while the block runs; yields a function that takes their number."""
-    count, left = 0, TimeLeft()
+    count = 0
 
     def set_count(done: int) -> None:
         nonlocal count
         count = done
 
+    with watching(name, total, unit, lambda: count):
+        yield set_count
+
+
+@contextmanager
+def watching(name: str, total: int, unit: str, done: Callable[[], int]) -> Iterator[None]:
+    """Show how many of `total` units are done, which `done` is asked again and again, while the block runs."""
+    left = TimeLeft()
+
     def state(seconds: float) -> tuple[str, float, float]:
+        count = done()
         rest = left.after(count, total, seconds)
         more = "" if rest is None else f", about {duration_text(rest)} left"
         return f"{count:,} of {total:,} {unit}{more}", count, total
 
     with _refreshed(name, state):
-        yield set_count
+        yield
 
 
 @contextmanager

@@ -41,6 +41,7 @@ def check_shard(
     schema: str,
     index: Path | None,
     rechecked: Collection[int],
+    marks: Path,
 ) -> tuple[Findings, list[SampleRow], ClassCounts]:
     """Verify a shard of the dataset in `folder`; return its findings, a row for each sample, and its class counts.
 
@@ -48,6 +49,7 @@ def check_shard(
     schema: schema of the records, as JSON
     index: path of the index, if it can be read
     rechecked: indices of the samples that are rechecked by independent means, which is slow
+    marks: file to which a byte is added for each sample, for whoever shows the progress
     """
     findings, rows, tally, path = Findings(), list[SampleRow](), ClassCounts(), str(shard["path"])
     paths = DatasetPaths(folder.resolve().parent, folder.resolve().name)
@@ -58,6 +60,7 @@ def check_shard(
     stage_samples, indexed = _stage_samples(paths, path), _indexed(index, path)
     try:
         for number, (key, offset, members) in enumerate(shard_samples(folder / path)):
+            _add_byte(marks)
             findings.look("samples")
             where = f"{path}: {key}"
             if list(members) != wanted:
@@ -98,6 +101,12 @@ def check_shard(
     if count != shard["samples"]:
         findings.fault("samples", path, f"has {count} samples, the manifest counts {shard['samples']}")
     return findings, rows, tally
+
+
+def _add_byte(path: Path) -> None:
+    # Where the temporary folder is full or gone, the progress is not shown, and the verification goes on.
+    with suppress(OSError), open(path, "ab") as stream:
+        stream.write(b".")
 
 
 class _Rebuilders(dict[str, RebuildShape]):

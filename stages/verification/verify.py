@@ -13,11 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from pipeline.display import counting, ticking
+from pipeline.display import ticking, watching
 from pipeline.randomness import decision_rng
 from stages.package.layout import MANIFEST, VERIFIER
 from stages.verification.files import (
@@ -73,12 +74,10 @@ def verify_dataset(folder: Path, samples: int | None, seed: int, workers: int = 
         first += shard["samples"]
     rows: list[SampleRow] = []
     tally: ClassCounts = ClassCounts()
-    with counting("verify", sum(shard["samples"] for _, shard, *_ in work), "samples") as show:
-        for shard_findings, shard_rows, counts in _check_shards(work, workers):
-            findings.add(shard_findings)
-            rows += shard_rows
-            tally.update(counts)
-            show(len(rows))
+    for shard_findings, shard_rows, counts in _check_shards(work, workers):
+        findings.add(shard_findings)
+        rows += shard_rows
+        tally.update(counts)
     with ticking("verify", "running a verifier of its own"):
         _check_standalone(folder, samples, seed, workers, findings)
     check_splits(manifest, rows, findings)
@@ -101,9 +100,20 @@ def _check_standalone(folder: Path, samples: int | None, seed: int, workers: int
 def _check_shards(
     work: Sequence[tuple[Any, ...]], workers: int
 ) -> Iterator[tuple[Findings, list[SampleRow], ClassCounts]]:
-    if workers <= 1:
-        yield from (check_shard(*arguments) for arguments in work)
-        return
+    """Verify shards, in their order, and show how far this is: each has a file that gets a byte for each sample."""
     from joblib import Parallel, delayed
 
-    yield from Parallel(n_jobs=workers, return_as="generator")(delayed(check_shard)(*arguments) for arguments in work)
+    with TemporaryDirectory(prefix="shapemill-verify-") as folder:
+        marks = [Path(folder) / str(number) for number in range(len(work))]
+        total = sum(shard["samples"] for _, shard, *_ in work)
+        with watching("verify", total, "samples", lambda: sum(map(_size, marks))):
+            yield from Parallel(n_jobs=workers, return_as="generator")(
+                delayed(check_shard)(*arguments, path) for arguments, path in zip(work, marks, strict=True)
+            )
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from pipeline.config import Config, StrictModel
-from pipeline.display import ticking
+from pipeline.display import ticking, watching
 from pipeline.event_log import EventLog, Progress, progress_text
 from pipeline.paths import DatasetPaths
 from pipeline.run import run_stage
@@ -112,6 +112,26 @@ def test_command_that_says_nothing_shows_the_time_that_passes(
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) >= 2
     assert set(lines) == {"inspect: looking for contacts, 0s elapsed"}
+
+
+def test_count_is_asked_for_again_and_again(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pipeline.display._REFRESH_SECONDS", 0.01)
+    monkeypatch.setattr("pipeline.display.FIRST_LINE_SECONDS", 0.0)
+    asked: list[int] = []
+
+    def done() -> int:
+        asked.append(100 * len(asked))
+        return asked[-1]
+
+    with watching("verify", 1200, "samples", done):
+        while len(asked) < 4:
+            time.sleep(0.01)
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.split(", ")[0] for line in lines[:3]] == [
+        f"verify: {count} of 1,200 samples" for count in (0, 100, 200)
+    ]
 
 
 def seen_on_a_terminal(*arguments: object) -> str:
