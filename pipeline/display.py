@@ -80,10 +80,10 @@ class Display:
 
 
 @contextmanager
-def ticking(name: str, text: str) -> Iterator[None]:
-    """Show `text` and the time that has passed, while the block runs and says nothing itself."""
-    with _refreshed(name, lambda _: (text, 0.0, 0.0)):
-        yield
+def ticking(name: str, text: str) -> Iterator[Callable[[str], None]]:
+    """Show `text` and the time that has passed, while the block runs; yields a function that writes lines that stay."""
+    with _refreshed(name, lambda _: (text, 0.0, 0.0)) as say:
+        yield say
 
 
 @contextmanager
@@ -115,8 +115,10 @@ def watching(name: str, total: int, unit: str, done: Callable[[], int]) -> Itera
 
 
 @contextmanager
-def _refreshed(name: str, state: Callable[[float], tuple[str, float, float]]) -> Iterator[None]:
-    """Show text, done and total, as they are after some seconds, again and again while the block runs."""
+def _refreshed(name: str, state: Callable[[float], tuple[str, float, float]]) -> Iterator[Callable[[str], None]]:
+    """Show text, done and total, as they are after some seconds, again and again while the block runs; yields a
+    function that writes a line that stays.
+    """
     display, ended = Display(name), threading.Event()
 
     def refresh() -> None:
@@ -127,7 +129,7 @@ def _refreshed(name: str, state: Callable[[float], tuple[str, float, float]]) ->
     thread = threading.Thread(target=refresh, daemon=True)
     thread.start()
     try:
-        yield
+        yield display.say
     finally:
         ended.set()
         thread.join()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -89,21 +89,7 @@ def resolve_settings(
     Raises ConfigError for stated hubs that are no types.
     """
     auto_keys = config.auto_keys()
-    values: dict[str, Any] = {key: STRICTEST[key] for key in auto_keys}
-    reasons = dict.fromkeys(auto_keys, "the default")
-    if "up" in auto_keys:
-        values["up"], reasons["up"] = resolve_up_axis(models, identified)
-    if "contact.tolerance" in auto_keys:
-        tolerance = resolve_contact_tolerance(identified, STRICTEST["contact.tolerance"])
-        values["contact.tolerance"], reasons["contact.tolerance"] = tolerance
-    stated = config.resolve(values)
-    fit_tolerance = config.fit_tolerance if config.types == "meaning" else None
-    settings = stated.resolved()
-    analysed = settings.tolerance, config.pose_tolerance, settings.up, fit_tolerance
-    analyses = {} if analyses is None else analyses
-    if analysed not in analyses:
-        analyses[analysed] = ContactAnalysis(identified, *analysed)
-    analysis = analyses[analysed]
+    values, reasons, stated, analysis = resolve_contacts(config, models, identified, analyses)
     one_surface = any(model.is_cut for model in models)
     space = replace(_search_space(stated, analysis, auto_keys, one_surface), keeps_types=KEEP_TYPES_KEY in require)
     candidates = search_settings(analysis, space, tries)
@@ -134,6 +120,48 @@ def resolve_settings(
         parts = "1 part is" if dropped == 1 else f"{dropped} parts are"
         reasons["disconnected"] = f"{parts} apart from the largest piece" if dropped else "no part is apart"
     return Resolution(values, reasons, chosen.trial, chosen.kept_share, chosen.is_sufficient, len(candidates))
+
+
+class ResolvedContacts(NamedTuple):
+    """What is known of a kit before any search.
+
+    values, reasons: of the keys at `auto`, as in `Resolution`; only up axis and contact tolerance are resolved.
+    config: the kit's config with these values.
+    analysis: the contacts of the parts.
+    """
+
+    values: dict[str, Any]
+    reasons: dict[str, str]
+    config: KitConfig
+    analysis: ContactAnalysis
+
+
+def resolve_contacts(
+    config: KitConfig,
+    models: Sequence[Model],
+    identified: IdentifiedParts,
+    analyses: dict[Any, ContactAnalysis] | None = None,
+) -> ResolvedContacts:
+    """Resolve the up axis and the contact tolerance of a kit, and find the contacts of its parts.
+
+    analyses: as of `resolve_settings`
+    """
+    auto_keys = config.auto_keys()
+    values: dict[str, Any] = {key: STRICTEST[key] for key in auto_keys}
+    reasons = dict.fromkeys(auto_keys, "the default")
+    if "up" in auto_keys:
+        values["up"], reasons["up"] = resolve_up_axis(models, identified)
+    if "contact.tolerance" in auto_keys:
+        tolerance = resolve_contact_tolerance(identified, STRICTEST["contact.tolerance"])
+        values["contact.tolerance"], reasons["contact.tolerance"] = tolerance
+    stated = config.resolve(values)
+    fit_tolerance = config.fit_tolerance if config.types == "meaning" else None
+    settings = stated.resolved()
+    analysed = settings.tolerance, config.pose_tolerance, settings.up, fit_tolerance
+    analyses = {} if analyses is None else analyses
+    if analysed not in analyses:
+        analyses[analysed] = ContactAnalysis(identified, *analysed)
+    return ResolvedContacts(values, reasons, stated, analyses[analysed])
 
 
 def resolve_max_copied(trial: TrialResult | None) -> tuple[float, str]:

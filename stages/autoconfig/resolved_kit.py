@@ -78,15 +78,24 @@ def read_and_resolve(config: KitConfig, limits: ReadLimits, tries: int, require:
     single = [model for model in models if len(model.parts) < 2 and not model.why.endswith(NOT_CUT)]
     if single:
         raise ConfigError("\n".join(map(single_part_refusal, single)))
-    return resolve_models(config, models, limits, tries, require)
+    return resolve_models(config, models, identify_parts(models, config), limits, tries, require)
 
 
 def resolve_models(
-    config: KitConfig, models: Sequence[Model], limits: ReadLimits, tries: int, require: Sequence[str]
+    config: KitConfig,
+    models: Sequence[Model],
+    identified: IdentifiedParts,
+    limits: ReadLimits,
+    tries: int,
+    require: Sequence[str],
+    analyses: dict[Any, ContactAnalysis] | None = None,
 ) -> ResolvedKit:
-    """Resolve the `auto` keys of a kit of `models`; models that are cut into sections are read again."""
-    identified = identify_parts(models, config)
-    resolution = resolve_settings(config, models, identified, tries, require)
+    """Resolve the `auto` keys of a kit of `models`, whose parts are `identified`; models that are cut into sections are
+    read again.
+
+    analyses: as of `resolve_settings`
+    """
+    resolution = resolve_settings(config, models, identified, tries, require, analyses)
     return use_sections_if_empty(ResolvedKit(config, models, identified, resolution), limits, tries, require)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterable, Mapping
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
 
@@ -106,8 +105,11 @@ def inspect(
         config = config.model_copy(update={"appearance": textures})
     else:
         read = [model.with_colors_alone() for model in read]
-    with nullcontext() if as_json else ticking("inspect", "looking for settings and trying them out"):
+    if as_json:
         report = inspect_models(config, read, tries, limits)
+    else:
+        with ticking("inspect", "looking for settings and trying them out") as say:
+            report = inspect_models(config, read, tries, limits, say)
     observation = describe_observation(report.observed, report.models, report.config)
     if as_json:
         written = {} if out is None else dict(write_report_files(out, paths, report))

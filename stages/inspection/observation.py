@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from stages.autoconfig.resolve import ResolvedContacts
 from stages.exemplars.build import Observation
 from stages.exemplars.diagnostics import connected_pieces, hub_parts, mirror_twins
+from stages.exemplars.identify import IdentifiedParts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
+from stages.shape.kit import ContactKind
 from stages.shape.kit_files import kit_json
 
 MAX_TYPES_SHOWN = 40
 MAX_PIECES_SHOWN = 8
+MAX_TYPES_NAMED = 6
+CONTACT_WORDS: Mapping[ContactKind, str] = {"face": "over a face", "line": "along a line", "point": "in a point"}
 
 
 def describe_observation(observation: Observation, models: Sequence[Model], config: KitConfig) -> dict[str, Any]:
@@ -67,6 +72,36 @@ def _describe_model(observation: Observation, index: int, model: Model) -> dict[
     }
 
 
+def types_sentence(identified: IdentifiedParts) -> str:
+    """Return how many part types there are, and the commonest."""
+    parts = np.concatenate([assembly.types for assembly in identified.assemblies])
+    counts = np.bincount(parts, minlength=len(identified.types))
+    commonest = np.argsort(-counts, kind="stable")[:MAX_TYPES_NAMED]
+    named = ", ".join(f"{counts[kind]} {identified.types[kind].name}" for kind in commonest)
+    others = f" and {len(counts) - MAX_TYPES_NAMED} more" if len(counts) > MAX_TYPES_NAMED else ""
+    return f"{len(counts)} part type{'' if len(counts) == 1 else 's'}: {named}{others}"
+
+
+def contact_sentences(contacts: ResolvedContacts) -> Iterator[str]:
+    """Yield what touches what, and which axis points up."""
+    for assembly, kinds in zip(contacts.analysis.contacts.counted, contacts.analysis.contacts.kinds, strict=True):
+        sizes = np.bincount(connected_pieces(assembly)).tolist()
+        whole = "in one piece" if len(sizes) == 1 else f"in {_pieces(sizes)}"
+        counted = f" ({_counted(kinds)})" if kinds else ""
+        yield f"{len(kinds)} contacts{counted}, {whole}"
+    why = contacts.reasons.get("up", "stated")
+    yield f"{contacts.config.resolved().up} points up: {why}"
+
+
+def _counted(kinds: Sequence[ContactKind]) -> str:
+    return ", ".join(f"{kinds.count(kind)} {words}" for kind, words in CONTACT_WORDS.items() if kind in kinds)
+
+
+def _pieces(sizes: Sequence[int]) -> str:
+    listed = ", ".join(map(str, sizes[:MAX_PIECES_SHOWN])) + (" ..." if len(sizes) > MAX_PIECES_SHOWN else "")
+    return f"{len(sizes)} pieces of {listed} parts"
+
+
 def observation_lines(described: dict[str, Any], config: KitConfig) -> Iterator[str]:
     """Yield what `describe_observation` returns as lines for people; `config` has every key resolved."""
     models = described.get("models", [described])
@@ -113,13 +148,11 @@ def _model_lines(model: dict[str, Any], config: KitConfig) -> Iterator[tuple[str
     sizes = [len(piece) for piece in model["pieces"]]
     degrees = np.bincount(np.array(model["contacts"], dtype=int).ravel(), minlength=len(model["parts"]))
     yield "parts", f"{len(model['parts'])} by {model['segmentation']['parts']} ({model['segmentation']['why']})"
-    words = {"face": "over a face", "line": "along a line", "point": "in a point"}
-    counted = ", ".join(f"{kinds.count(kind)} {word}" for kind, word in words.items() if kind in kinds)
+    counted = _counted(kinds)
     uncounted = len(kinds) - len(model["contacts"])
     aside = f"; {uncounted} of them do not count, only kinds {', '.join(config.resolved().kinds)}" if uncounted else ""
     yield "contacts", f"{len(kinds)}" + (f": {counted}" if counted else "") + aside
-    listed = ", ".join(map(str, sizes[:MAX_PIECES_SHOWN])) + (" ..." if len(sizes) > MAX_PIECES_SHOWN else "")
-    yield "connected", "yes" if len(sizes) == 1 else f"no, {len(sizes)} pieces of {listed} parts"
+    yield "connected", "yes" if len(sizes) == 1 else f"no, {_pieces(sizes)}"
     if len(degrees) > 1:
         yield "degree", f"a part touches {degrees.min()} to {degrees.max()} others, {degrees.mean():.1f} on average"
 

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
 from pipeline.randomness import decision_rng
+from stages.autoconfig.contact_analysis import ContactAnalysis
 from stages.autoconfig.resize_fallback import ResizeEstimate, resize_fallback
-from stages.autoconfig.resolve import REQUIREMENT_KEYS, Resolution, trial_text
+from stages.autoconfig.resolve import REQUIREMENT_KEYS, Resolution, resolve_contacts, trial_text
 from stages.autoconfig.resolved_kit import resolve_models
 from stages.autoconfig.settings import RANDOM_STREAM
 from stages.autoconfig.yield_estimate import YieldEstimate
 from stages.exemplars.build import Observation
+from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 from stages.inspection.forecast import Forecast, forecast, kind_of
+from stages.inspection.observation import contact_sentences, types_sentence
 from stages.inspection.sample_figure import MAX_SHAPES_SHOWN, ShownShape
 from stages.model_files.limits import ReadLimits
 from stages.shape.geometry.contact_oracle import ContactOracle
@@ -144,20 +147,29 @@ class InspectionReport:
 
 
 def inspect_models(
-    config: KitConfig, models: Sequence[Model], tries: int, limits: ReadLimits | None = None
+    config: KitConfig,
+    models: Sequence[Model],
+    tries: int,
+    limits: ReadLimits | None = None,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> InspectionReport:
     """Resolve what `config` leaves at `auto`, and estimate what a run will find.
 
-    limits: for models that are read again, as `use_sections_if_empty` does. Raises ConfigError for a model in which no
-    part has any area, and for stated hubs that are no types.
+    limits: for models that are read again, as `use_sections_if_empty` does
+    tell: is told types, contacts and up axis, a sentence each, as soon as they are known
+
+    Raises ConfigError for a model in which no part has any area, and for stated hubs that are no types.
     """
     start = time.process_time()
-    resolved = resolve_models(config, models, limits or ReadLimits(), tries, REQUIREMENT_KEYS)
+    identified = identify_parts(models, config)
+    tell(types_sentence(identified))
+    analyses: dict[Any, ContactAnalysis] = {}
+    for sentence in contact_sentences(resolve_contacts(config, models, identified, analyses)):
+        tell(sentence)
+    resolved = resolve_models(config, models, identified, limits or ReadLimits(), tries, REQUIREMENT_KEYS, analyses)
     resolution = resolved.resolution
     stated = resolved.config.resolve(resolution.values)
-    built = observed = resolved.observe(resolution.values)
-    if stated.resolved().hubs or stated.resolved().disconnected == "largest":
-        observed = resolved.observe({**resolution.values, "hubs.types": "none", "disconnected": "error"})
+    built = resolved.observe(resolution.values)
     layouts, rate, resizing = None, 0.0, None
     shapes: list[ShownShape] = []
     typical: list[ShownShape] = []
@@ -181,6 +193,9 @@ def inspect_models(
                 ]
                 for drawn in (resizing.shapes, resizing.typical)
             )
+    observed = built
+    if stated.resolved().hubs or stated.resolved().disconnected == "largest":
+        observed = resolved.observe({**resolution.values, "hubs.types": "none", "disconnected": "error"})
     by_author = any(model.segmentation in ("nodes", "objects") for model in resolved.models)
     is_fragmented = resolved.config.parts == "auto" and not by_author
     seconds = time.process_time() - start

@@ -38,6 +38,9 @@ WHOLE = ("--parts", "objects")
 """Nothing is searched for repetitions, which takes a single object three CPU seconds."""
 
 
+RING_CONTACTS = "6 contacts (4 over a face, 2 along a line), in one piece"
+
+
 def single(folder: Path, name: str = "one.obj") -> Path:
     """Write one cube: a run refuses it, so that no new shapes are drawn, which takes seconds."""
     return write_obj(folder / name, {"only": box()})
@@ -162,7 +165,10 @@ class TestText:
         path, out = ring(tmp_path), Path("datasets/inspect")
         monkeypatch.chdir(tmp_path)
         assert inspect(path, "--up", "z", "--tries", "100") == 0
-        lines = capsys.readouterr().out.splitlines()
+        printed = capsys.readouterr()
+        lines = printed.out.splitlines()
+        first = [f"inspect: {fact}" for fact in ("1 part type: 4 cube", RING_CONTACTS, "z points up: stated")]
+        assert [line for line in printed.err.splitlines() if line in first] == first
         assert lines[0] == str(tmp_path / "ring.obj")
         text = "\n".join(" ".join(line.split()) for line in lines)
         assert "parts 4 by objects (4 named objects)" in text
