@@ -217,6 +217,19 @@ def _boxes_apart(a, b, r, ar, t, tolerance):
     return abs(ez) > b[5] + ar[0, 2] * a[3] + ar[1, 2] * a[4] + ar[2, 2] * a[5] + tolerance
 
 
+@numba.njit(cache=True, inline="always")
+def _bounds_apart(corners, u, tri, reach):
+    """Return whether the bounding boxes of triangle `u` and of `tri` are more than `reach` apart along an axis."""
+    for k in range(3):
+        low = min(min(corners[u, 0, k], corners[u, 1, k]), corners[u, 2, k])
+        if low - max(max(tri[0, k], tri[1, k]), tri[2, k]) > reach:
+            return True
+        high = max(max(corners[u, 0, k], corners[u, 1, k]), corners[u, 2, k])
+        if min(min(tri[0, k], tri[1, k]), tri[2, k]) - high > reach:
+            return True
+    return False
+
+
 @numba.njit(cache=True)
 def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, stop_at_first, pairs):
     """Return the number of triangle pairs within tolerance. Their indices go to `pairs` as far as it has rows."""
@@ -226,6 +239,8 @@ def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, stop_at_first, pairs):
     stack = np.empty((512, 2), dtype=np.int64)
     moved = np.empty((3, 3))
     scratch = np.empty((4, 3))
+    # farther than the tolerance by more than rounding errors
+    reach = tolerance + 1e-9 * np.abs(ba[0]).sum()
     count = 0
     stack[0, 0] = 0
     stack[0, 1] = 0
@@ -244,6 +259,8 @@ def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, stop_at_first, pairs):
                             r[axis, 0] * cb[v, k, 0] + r[axis, 1] * cb[v, k, 1] + r[axis, 2] * cb[v, k, 2] + t[axis]
                         )
                 for u in range(-la[i, 0] - 1, -la[i, 0] - 1 + la[i, 1]):
+                    if _bounds_apart(ca, u, moved, reach):
+                        continue
                     if _triangles_within(ca[u], moved, tolerance, scratch[0], scratch[1], scratch[2], scratch[3]):
                         if count < len(pairs):
                             pairs[count, 0] = u
