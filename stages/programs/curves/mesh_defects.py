@@ -7,7 +7,6 @@ import numpy as np
 from stages.programs.curves.mesh import QuadMesh
 from stages.programs.curves.vectors import cross, dots
 from stages.shape.arrays import IntArray
-from stages.shape.geometry.components import connected_components
 
 
 def mesh_defects(mesh: QuadMesh) -> list[str]:
@@ -25,13 +24,12 @@ def mesh_defects(mesh: QuadMesh) -> list[str]:
         return [f"a face names a vertex outside 0 to {len(mesh.vertices) - 1}"]
     faces = mesh.triangles
     defects = []
-    unused = len(mesh.vertices) - len(np.unique(faces))
+    unused = int((np.bincount(faces.ravel(), minlength=len(mesh.vertices)) == 0).sum())
     if unused:
         defects.append(f"{unused} vertices belong to no face")
-    corners = mesh.vertices[faces]
-    normals = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sides = corners - np.roll(corners, 1, axis=1)
-    longest = (sides * sides).sum(axis=2).max(axis=1)
+    a, b, c = (mesh.vertices[faces[:, k]] for k in range(3))
+    normals = cross(b - a, c - a)
+    longest = np.maximum(np.maximum(dots(b - a, b - a), dots(c - b, c - b)), dots(a - c, a - c))
     thin = int((dots(normals, normals) <= 1e-18 * longest * longest).sum())
     if thin:
         defects.append(f"{thin} triangles have no area")
@@ -39,20 +37,20 @@ def mesh_defects(mesh: QuadMesh) -> list[str]:
     if folded:
         defects.append(f"{folded} quads are folded over themselves")
     starts, ends = faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel().astype(np.int64)
-    count = len(mesh.vertices)
-    _, edge, uses = np.unique(
-        np.minimum(starts, ends) * count + np.maximum(starts, ends), return_inverse=True, return_counts=True
-    )
-    net = np.bincount(edge, weights=np.where(starts < ends, 1.0, -1.0))
+    edges = np.minimum(starts, ends) * len(mesh.vertices) + np.maximum(starts, ends)
+    order = np.argsort(edges)
+    first = np.flatnonzero(np.r_[True, np.diff(edges[order]) > 0])
+    uses = np.diff(np.r_[first, len(edges)])
+    net = np.add.reduceat(np.where(starts < ends, 1, -1)[order], first)
     for wrong, sentence in (
         (uses == 1, "edges are open"),
         (uses > 2, "edges belong to more than two faces"),
-        ((uses == 2) & (net != 0.0), "edges lie between faces turned against each other"),
+        ((uses == 2) & (net != 0), "edges lie between faces turned against each other"),
     ):
         if wrong.any():
             defects.append(f"{int(wrong.sum())} {sentence}")
     if (uses == 2).all() and not net.any():
-        defects += _surface_defects(mesh, faces, edge)
+        defects += _surface_defects(mesh, faces, order.reshape(-1, 2))
     return defects
 
 
@@ -65,22 +63,38 @@ def _folded(mesh: QuadMesh) -> int:
     return int(((first < 0.0) & (other < 0.0)).sum())
 
 
-def _surface_defects(mesh: QuadMesh, faces: IntArray, edge: np.ndarray) -> list[str]:
-    """Vertices where surfaces only touch, and surfaces inside out, where every edge has two faces."""
-    corner = np.arange(faces.size)
-    pairs = np.argsort(edge, kind="stable").reshape(-1, 2)
+def _surface_defects(mesh: QuadMesh, faces: IntArray, pairs: np.ndarray) -> list[str]:
+    """Vertices where surfaces only touch, and surfaces inside out, where every edge has two faces.
+
+    pairs: int (m, 2), the corners at the starts of the two sides of an edge
+    """
+    opposite = np.empty(faces.size, dtype=np.int64)
+    opposite[pairs], corner = pairs[:, ::-1], np.arange(faces.size)
     # Across an edge the start of one side is the end of the other.
-    after = corner - corner % 3 + (corner + 1) % 3
-    one = np.concatenate([pairs[:, 0], after[pairs[:, 0]]])
-    two = np.concatenate([after[pairs[:, 1]], pairs[:, 1]])
-    umbrellas = int(connected_components(faces.size, np.column_stack([one, two])).max(initial=-1)) + 1
+    around = (corner - corner % 3 + (corner + 1) % 3)[opposite]
+    umbrellas = _components(around[:, None])[0]
     defects = []
     if umbrellas > len(mesh.vertices):
         defects.append(f"surfaces touch in a vertex alone at {umbrellas - len(mesh.vertices)} places")
-    owner = connected_components(len(faces), pairs // 3)
-    surfaces = int(owner.max(initial=-1)) + 1
+    surfaces, owner = _components(opposite.reshape(-1, 3) // 3)
     a, b, c = (mesh.vertices[faces[:, k]] - mesh.vertices.mean(axis=0) for k in range(3))
     volumes = np.bincount(owner, weights=dots(a, cross(b, c)), minlength=surfaces)
     if (volumes <= 0.0).any():
         defects.append(f"{int((volumes <= 0.0).sum())} of {surfaces} surfaces are inside out or enclose nothing")
     return defects
+
+
+def _components(neighbours: np.ndarray) -> tuple[int, np.ndarray]:
+    """The number of components of a graph, and that of each node; every node has as many edges in as out.
+
+    neighbours: int (n, k), the nodes to which each has an edge
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    count, degree = neighbours.shape
+    starts = np.arange(0, neighbours.size + 1, degree)
+    graph = csr_array((np.ones(neighbours.size, dtype=bool), neighbours.ravel(), starts), shape=(count, count))
+    # such components are strongly connected, and these need no reversed edges
+    components: tuple[int, np.ndarray] = connected_components(graph, connection="strong")
+    return components
