@@ -346,9 +346,9 @@ def _search(
         for sample in precheck.tolist():
             if not len(transforms):
                 break
-            inverse = np.linalg.inv(transforms)
-            points = inverse[:, :3, :3] @ shape.points[sample] + inverse[:, :3, 3]
-            transforms = transforms[exemplar.lies_on(points, inverse[:, :3, :3] @ shape.normals[sample])]
+            back = transforms[:, :3, :3].transpose(0, 2, 1)
+            points = (back @ (shape.points[sample] - transforms[:, :3, 3])[:, :, None])[..., 0]
+            transforms = transforms[exemplar.lies_on(points, back @ shape.normals[sample])]
         for transform in transforms[:MAX_TRANSFORMS]:
             share = float(_matches(exemplar, shape, transform, np.array([probe]), [around])[0])
             if share >= 1.0:
