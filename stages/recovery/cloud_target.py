@@ -79,7 +79,7 @@ class CloudTarget:
 
         normalized = frame.normalized(surface)
         to_cloud, _ = self.tree.query(normalized[:: SEARCHED_POINTS // QUERY_POINTS])
-        to_surface, _ = cKDTree(normalized).query(self.points[:QUERY_POINTS])
+        to_surface, _ = cKDTree(normalized, compact_nodes=False, balanced_tree=False).query(self.points[:QUERY_POINTS])
         return float((to_cloud**2).mean() + (to_surface**2).mean())
 
 

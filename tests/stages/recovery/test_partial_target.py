@@ -119,7 +119,7 @@ def test_network_distinguishes_partial_from_otherwise_corrupted_clouds(program: 
         **{how: corrupt(given, np.random.default_rng(1)) for how, corrupt in CORRUPTIONS["points"].items()},
     }
     missing = {
-        how: recover_input(cloud, program, SHIPPED_MODELS, "y", 30, 0, turned=False).missing
+        how: recover_input(cloud, program, SHIPPED_MODELS, "y", 8, 0, turned=False).missing
         for how, cloud in clouds.items()
     }
     assert missing.pop("half missing") > 0.2

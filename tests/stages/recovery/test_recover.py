@@ -123,7 +123,7 @@ def test_recovery_is_deterministic() -> None:
 
 def test_unlike_input_is_reported() -> None:
     ball = np.random.default_rng(0).normal(size=(500, 3))
-    found = recover(ball / np.linalg.norm(ball, axis=1, keepdims=True), PROGRAM, budget=60)
+    found = recover(ball / np.linalg.norm(ball, axis=1, keepdims=True), PROGRAM, up="y", budget=20)
     assert any("unlike any stool" in warning for warning in found.warnings)
 
 
