@@ -46,10 +46,11 @@ def make_tables(
         print_table_of_files,
         read_settings,
     )
-    from stages.inspection.files import model_paths
 
     values = read_settings(settings or ())
     if files:
+        from stages.model_files.folder import model_paths
+
         paths = [path for text in files for path in model_paths(text)]
         print_table_of_files(table, paths, out, values, workers)
         return

@@ -59,9 +59,10 @@ def inspect(
     from stages.grammars.inspect import may_have_grammar, write_grammar_report
     from stages.grammars.read_surface import is_point_cloud
     from stages.inspection.config_text import dataset_name
-    from stages.inspection.files import model_paths, write_report_files
+    from stages.inspection.files import write_report_files
     from stages.inspection.observation import describe_observation, observation_lines
     from stages.inspection.report import inspect_models
+    from stages.model_files.folder import model_paths
     from stages.model_files.limits import ReadLimits
     from stages.shape.input_file import check_exists
 
@@ -133,8 +134,8 @@ def with_models(
 ) -> None:
     """Write a config with models in place of its kits, as OUT/<name>.yaml, and print its path."""
     from pipeline.paths import write_file
-    from stages.inspection.files import model_paths
     from stages.inspection.models_config import config_with_models
+    from stages.model_files.folder import model_paths
 
     paths = [path for text in models for path in model_paths(text)]
     name, content = config_with_models(config, paths)

@@ -12,7 +12,6 @@ from stages.exemplars.kit_figure import kit_figure
 from stages.inspection.config_text import config_text, dataset_name, proportions_section, variations_section
 from stages.inspection.report import InspectionReport
 from stages.inspection.sample_figure import ShownShapes, sample_figure
-from stages.model_files.scene_file import READERS
 from stages.shape.resolved_settings import FALLBACK_STABLE_KEY
 
 
@@ -44,11 +43,3 @@ def write_report_files(folder: Path, paths: Sequence[Path], report: InspectionRe
         name, report.config, report.models, resolution.reasons, section, report.sentence, bool(report.built.refusals)
     )
     yield "config", write_file(folder / f"{name}.yaml", text.encode())
-
-
-def model_paths(text: str) -> list[Path]:
-    """Return the paths that one argument names: a path, or several with spaces between, as in MESH="a.glb folder/"."""
-    several = [Path(word) for word in text.split()]
-    if Path(text).exists() or not all(path.suffix.lower() in READERS or path.exists() for path in several):
-        return [Path(text)]
-    return several
