@@ -29,6 +29,9 @@ STAGES = ("exemplars", "variations", "validity", "strings", "points", "sketches"
 
 RECORD = "kernels.jsonl"
 
+SHORT_OPTIONS = ("max_shapes=2", "dry_shapes=0", "probes=1", "radius=0.1", "graphs=1", "max_placements=1", "points=64")
+"""Options of the tables that the report only has to contain."""
+
 pytestmark = pytest.mark.slow
 
 
@@ -129,7 +132,7 @@ def test_every_table_about_kits_is_in_the_report(made: tuple[Path, Path], tmp_pa
     for name in ("small", ".work"):
         (tmp_path / name).symlink_to(out / name)
     asked = ["--config", str(config), "--out", str(tmp_path)]
-    few = [f"--set={option}" for option in ("max_shapes=2", "dry_shapes=0", "probes=10", "radius=0.1", "graphs=1")]
+    few = [f"--set={option}" for option in SHORT_OPTIONS]
     code, printed = shapemill("eval", "all", *asked, *few)
     assert code == 0, printed
     about_kits = {"compression", "corpora", "growth", "near_duplicates", "physical"}
@@ -146,14 +149,14 @@ def test_every_table_about_kits_is_in_the_report(made: tuple[Path, Path], tmp_pa
 
 def test_verify_finds_nothing_wrong_and_then_a_flipped_byte(made: tuple[Path, Path]) -> None:
     config, out = made
-    asked = ("verify", "--config", config, "--out", out, "--samples", 4)
-    code, printed = shapemill(*asked)
+    asked = ("verify", "--config", config, "--out", out, "--samples")
+    code, printed = shapemill(*asked, 4)
     assert code == 0, printed
     shard = next((out / "small" / "data" / "val").glob("*.tar"))
     content = bytearray(shard.read_bytes())
     content[len(content) // 2] ^= 1
     shard.write_bytes(bytes(content))
-    code, printed = shapemill(*asked)
+    code, printed = shapemill(*asked, 1)
     content[len(content) // 2] ^= 1
     shard.write_bytes(bytes(content))
     assert code == 1
