@@ -187,7 +187,8 @@ class _System:
             if not worth > 0:  # only rounding is left
                 break
             along = near + worth / before * along
-            acting = self._act(self._weight_x * self._lift(along), self._weight_f * (self._dense.T @ along))
+            acting = _act_on_lifted(self._wrenches, self._place, self._weight_x, along, self._count)
+            acting += self._dense @ (self._weight_f * (self._dense.T @ along))
             step = worth / float(along @ acting)
             answer, left, before = answer + step * along, left - step * acting, worth
         return answer
@@ -269,4 +270,24 @@ def _lift(wrenches, order, y):
             if p >= 0:
                 for i in range(6):
                     out[c] += y[6 * p + i] * wrenches[c, side, i]
+    return out
+
+
+@numba.njit(cache=True)
+def _act_on_lifted(wrenches, order, weights, y, count):
+    """Return `_act` of the weighted `_lift` of `y`: reading the wrenches, which takes most of the time, only once."""
+    out = np.zeros(6 * count)
+    for c in range(len(wrenches)):
+        lifted = 0.0
+        for side in range(2):
+            p = order[c, side]
+            if p >= 0:
+                for i in range(6):
+                    lifted += y[6 * p + i] * wrenches[c, side, i]
+        lifted *= weights[c]
+        for side in range(2):
+            p = order[c, side]
+            if p >= 0:
+                for i in range(6):
+                    out[6 * p + i] += lifted * wrenches[c, side, i]
     return out
