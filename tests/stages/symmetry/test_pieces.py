@@ -18,8 +18,8 @@ def copy_counts(triangles: np.ndarray) -> list[int]:
 
 @cache
 def pieces_of_wall() -> list[SurfacePiece]:
-    """The pieces of a wall of five windows."""
-    return repeated_pieces(*mesh(wall(5)))
+    """The pieces of a wall of twelve windows: cells are a share of its length, so a long wall has fewer."""
+    return repeated_pieces(*mesh(wall(12)))
 
 
 class TestCarve:
@@ -46,48 +46,48 @@ class TestCarve:
 class TestRepeatedPieces:
     def test_wall_is_two_ends_and_one_bay_per_window(self) -> None:
         pieces = pieces_of_wall()
-        assert sorted(len(piece.poses) for piece in pieces) == [1, 1, 5]
-        bays = next(piece for piece in pieces if len(piece.poses) == 5)
-        assert np.allclose(np.sort([pose[0, 3] for pose in bays.poses]) - min(p[0, 3] for p in bays.poses), range(5))
+        assert sorted(len(piece.poses) for piece in pieces) == [1, 1, 12]
+        bays = next(piece for piece in pieces if len(piece.poses) == 12)
+        assert np.allclose(np.sort([pose[0, 3] for pose in bays.poses]) - min(p[0, 3] for p in bays.poses), range(12))
 
     def test_a_row_is_cut_although_a_rail_runs_along_it_from_end_to_end(self) -> None:
         """No docking site separates the model, because the rail goes around it, as a crane's ladder does."""
         rail = blocks(
-            [0.1, 0.2, 4.0, 4.1], [-0.5, -0.4, 0.0], [1.8, 1.9], lambda x, y, _: y < -0.4 or not 0.2 < x < 4.0
+            [0.1, 0.2, 9.0, 9.1], [-0.5, -0.4, 0.0], [1.8, 1.9], lambda x, y, _: y < -0.4 or not 0.2 < x < 9.0
         )  # fmt: skip
-        pieces = repeated_pieces(*mesh(np.concatenate([wall(3), rail])))
-        assert max(len(piece.poses) for piece in pieces) >= 3
+        pieces = repeated_pieces(*mesh(np.concatenate([wall(8), rail])))
+        assert max(len(piece.poses) for piece in pieces) >= 8
         bays = max(pieces, key=lambda piece: len(piece.poses))
         assert bays.triangles.area == pytest.approx(2 * (2.4 - 0.5) + 0.3 * (2 * 0.5 + 2 * 1.0) + 2 * 0.3, rel=0.15)
 
     def test_two_grids_that_cross_make_nine_pieces(self) -> None:
         """Symmetry figure 7a: the corners once, the borders in one direction, the middle in both."""
-        assert copy_counts(wall(4, 3)) == [1, 1, 1, 1, 3, 3, 4, 4, 12]
+        assert copy_counts(wall(2, 3)) == [1, 1, 1, 1, 2, 2, 3, 3, 6]
 
     @pytest.mark.slow
     def test_the_steps_of_a_spiral_stair_are_one_piece_under_a_screw(self) -> None:
-        pieces = repeated_pieces(*mesh(spiral_stair(7)))
-        steps = [piece for piece in pieces if len(piece.poses) == 7]
+        pieces = repeated_pieces(*mesh(spiral_stair(5, 0.8)))
+        steps = [piece for piece in pieces if len(piece.poses) == 5]
         assert steps
         relative = np.linalg.inv(steps[0].poses[0]) @ steps[0].poses[1]
-        assert min(np.abs(relative - screw(a, b)).max() for a, b in ((0.5, 0.35), (-0.5, -0.35))) < 1e-6
+        assert min(np.abs(relative - screw(a, b)).max() for a, b in ((0.8, 0.35), (-0.8, -0.35))) < 1e-6
 
     def test_pieces_at_their_poses_are_the_surface(self) -> None:
         area = sum(len(piece.poses) * piece.triangles.area for piece in pieces_of_wall())
-        assert area == pytest.approx(2 * (6.2 * 2.4 - 2.5) + 0.3 * (2 * 8.6 + 15), rel=1e-6)
+        assert area == pytest.approx(2 * (13.2 * 2.4 - 6.0) + 0.3 * (2 * 15.6 + 36), rel=1e-6)
 
     def test_surface_without_repetition_stays_whole(self) -> None:
-        assert copy_counts(box((0, 0, 0), (3, 0.7, 0.5))) == [1]
+        assert copy_counts(box((0, 0, 0), (6, 0.7, 0.5))) == [1]
 
 
 class TestCutSurface:
     def test_mesh_in_one_piece_is_cut_by_its_repetitions(self) -> None:
-        source, why, parts = pick_segmentation(one_object(wall(4)))
+        source, why, parts = pick_segmentation(one_object(wall(12)))
         assert source == "symmetry"
         assert parts.warnings == ()
-        assert "6 pieces between copies of what repeats" in why
+        assert "14 pieces between copies of what repeats" in why
         assert len(parts.surfaces) == 3
-        assert sorted(np.bincount([placement.surface for placement in parts.placements]).tolist()) == [1, 1, 4]
+        assert sorted(np.bincount([placement.surface for placement in parts.placements]).tolist()) == [1, 1, 12]
 
     @pytest.mark.parametrize(
         ("taper", "warning"),
@@ -109,7 +109,7 @@ class TestCutSurface:
         assert parts.warnings == (warning,)
 
     def test_mesh_without_repetition_keeps_its_objects(self) -> None:
-        source, why, _ = pick_segmentation(one_object(box((0, 0, 0), (3, 0.7, 0.5))))
+        source, why, _ = pick_segmentation(one_object(box((0, 0, 0), (6, 0.7, 0.5))))
         assert source == "objects"
         assert "nothing tells parts apart" in why
 
