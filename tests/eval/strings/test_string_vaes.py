@@ -28,12 +28,12 @@ from stages.training.model_folder import curves_csv
 from stages.training.string_vae.latent_graph import PathFigures
 from stages.training.string_vae.latent_sampling import SAMPLING_METHODS, sample
 from stages.training.string_vae.trained import TrainedStringVae
-from tests.stages.training.string_vae.models import MAX_TOKENS, random_vae, toy_strings, trained_vae
+from tests.stages.training.string_vae.models import LEARNT_SHAPES, MAX_TOKENS, random_vae, toy_strings, trained_vae
 
 
 @pytest.mark.slow
 def test_overfitted_model_reconstructs_and_random_model_does_not() -> None:
-    strings = toy_strings()
+    strings = toy_strings(2 * LEARNT_SHAPES)  # half of the shapes are unknown, so that figures differ
     trained, random = (reconstruction(model, strings) for model in (trained_vae("transformer"), random_vae("masked")))
     assert trained.strings == len(strings)
     assert trained.valid == random.valid == 100

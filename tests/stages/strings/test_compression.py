@@ -72,18 +72,26 @@ def test_exemplars_are_rebuilt_from_any_string(name: str, edges: Edges) -> None:
             assert [category != NO_CATEGORY for category in described.categories] == parts
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("edges", EDGES)
-def test_parts_with_equal_labels_keep_their_own_surface(edges: Edges, tmp_path: Path) -> None:
-    """Also where they dock as parts of their labels do, though these two were never seen to."""
-    shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path, 4))
+@pytest.fixture(scope="module")
+def chairs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Kit, list[Assembly]]:
+    """A kit of chairs with types by meaning, and variants of them."""
+    shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path_factory.mktemp("chairs"), 4))
     kit = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").resolve(STRICTEST))
-    book = Codebook(kit, edges)
     assert len(kit.labels) < len(kit.types)
     search = Search(ContactOracle(kit), SearchConfig())
     found, _ = search.run(np.random.default_rng(0), 1000, 12, "test", lambda count: None)
-    assert any(set(shape.assembly.types.tolist()) - set(kit.exemplars[0].assembly.types.tolist()) for shape in found)
-    for assembly in (*(item.assembly for item in kit.exemplars), *(item.assembly for item in found)):
+    variants = [item.assembly for item in found]
+    assert any(set(variant.types.tolist()) - set(kit.exemplars[0].assembly.types.tolist()) for variant in variants)
+    return kit, variants
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edges", EDGES)
+def test_parts_with_equal_labels_keep_their_own_surface(edges: Edges, chairs: tuple[Kit, list[Assembly]]) -> None:
+    """Also where they dock as parts of their labels do, though these two were never seen to."""
+    kit, variants = chairs
+    book = Codebook(kit, edges)
+    for assembly in (*(exemplar.assembly for exemplar in kit.exemplars), *variants):
         for encoded in strings_of(book, assembly, 1, 0):
             assert_comes_back(book, assembly, encoded)
 

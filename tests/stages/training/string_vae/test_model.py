@@ -18,6 +18,7 @@ from stages.training.string_vae.vocabulary import END_TOKEN
 from tests.stages.strings.grammar_check import check_string
 from tests.stages.training import toy_training
 from tests.stages.training.string_vae.models import (
+    LEARNT_SHAPES,
     MAX_TOKENS,
     VOCABULARY,
     entry,
@@ -134,9 +135,9 @@ def test_equal_seeds_decode_equal_strings() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("decoder", DECODERS)
 def test_trained_decoder_returns_canonical_strings(decoder: str) -> None:
-    right = {}
+    right, strings = {}, toy_strings(LEARNT_SHAPES)
     for name, model in (("trained", trained_vae(decoder)), ("random", random_vae(decoder))):
-        pairs = zip(map(model.target_of, toy_strings()), model.decode(model.encode(toy_strings()), None), strict=True)
+        pairs = zip(map(model.target_of, strings), model.decode(model.encode(strings), None), strict=True)
         right[name] = np.mean([one == other for one, other in pairs])
     assert right["random"] < 0.05
     assert right["trained"] > 0.5
