@@ -181,7 +181,7 @@ class PartialAssembly:
                 return None
             joints = joints_of(choice, 2 if points[4] > 0.5 else 3)
             source, goal = points[:3], points[3:]
-            line = Attach(_name(moved), _name(others[0]), (*source,), (*goal,))
+            line = Attach(slot_name(moved), slot_name(others[0]), (*source,), (*goal,))
         elif command == SQUEEZE:
             face = FACES[numbers.face]
             if 0 in others and face not in ("top", "bot"):
@@ -189,14 +189,16 @@ class PartialAssembly:
             u, v = np.round(np.clip(numbers.uv.astype(float), 0, 1), 3).tolist()
             first, second = others
             joints = joints_of(choice, numbers.face)
-            line = Squeeze(_name(moved), _name(first), _name(second), face, u, v)
+            line = Squeeze(slot_name(moved), slot_name(first), slot_name(second), face, u, v)
         elif command == REFLECT:
             joints = joints_of(choice, numbers.axis)
-            line = Reflect(_name(moved), AXES[numbers.axis])
+            line = Reflect(slot_name(moved), AXES[numbers.axis])
         else:
             joints = joints_of(choice, numbers.axis)
             copies = min(max(numbers.copies, 1), MAX_COPIES)
-            line = Translate(_name(moved), AXES[numbers.axis], copies, round(min(max(numbers.distance, 0.0), 1.0), 3))
+            line = Translate(
+                slot_name(moved), AXES[numbers.axis], copies, round(min(max(numbers.distance, 0.0), 1.0), 3)
+            )
         return (line, joints) if self.free(joints) else None
 
     def put(self, choice: LineChoice, line: AttachedLine, joints: Sequence[Joint]) -> None:
@@ -215,20 +217,25 @@ class PartialAssembly:
     def fits(self) -> bool:
         """Return whether what is grounded stays within the bounding box."""
         try:
-            return not protruding_parts(self.block("Program_0", {}))
+            return not protruding_parts(self.draft_block())
         except ProgramError:
             return False
+
+    def draft_block(self) -> Block:
+        """Return the assembly without ungrounded cuboids, which are named as in `lines`: for checks only."""
+        cuboids = (Cuboid(slot_name(slot), self.sizes[slot - 1], self.aligned[slot - 1]) for slot in self.grounded)
+        return Block("Program_0", Cuboid(BBOX, self.box, True), (*cuboids, *self.lines))
 
     def block(self, name: str, names: dict[int, str]) -> Block:
         """Return the assembly without ungrounded cuboids.
 
         names: the names of expanded cuboids, by slot.
         """
-        kept = [slot for slot in range(1, len(self.sizes) + 1) if slot in self._grounded]
-        names_of_slots = {_name(0): BBOX}
-        names_of_slots |= {_name(slot): names.get(slot, f"cube{index}") for index, slot in enumerate(kept)}
+        names_of_slots = {BBOX: BBOX}
+        names_of_slots |= {slot_name(slot): names.get(slot, f"cube{index}") for index, slot in enumerate(self.grounded)}
         cuboids = tuple(
-            Cuboid(names_of_slots[_name(slot)], self.sizes[slot - 1], self.aligned[slot - 1]) for slot in kept
+            Cuboid(names_of_slots[slot_name(slot)], self.sizes[slot - 1], self.aligned[slot - 1])
+            for slot in self.grounded
         )
         return Block(
             name, Cuboid(BBOX, self.box, True), (*cuboids, *(_renamed(line, names_of_slots) for line in self.lines))
@@ -283,8 +290,9 @@ def _joint(moved: int, target: int, top: bool) -> Joint:
     return (moved, 0, int(top)) if target == 0 else (moved, target)
 
 
-def _name(slot: int) -> str:
-    return f"slot{slot}"
+def slot_name(slot: int) -> str:
+    """Return the name of a cuboid in the lines of a partial assembly."""
+    return f"slot{slot}" if slot else BBOX
 
 
 def _renamed(line: Line, names: dict[str, str]) -> Line:

@@ -6,6 +6,7 @@ Such a cuboid gets the size with which it reaches all its attachments, where one
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,10 @@ from stages.shapeassembly.execution.attachment_points import attachment_points
 from stages.shapeassembly.execution.parameters import MIN_CUBOID_SIZE
 from stages.shapeassembly.syntax.errors import ProgramError
 from stages.shapeassembly.syntax.program import Attach, Point, Squeeze
-from stages.training.program_vae.partial_assembly import LineChoice, LineNumbers, PartialAssembly
+from stages.training.program_vae.partial_assembly import LineChoice, LineNumbers, PartialAssembly, slot_name
+
+Ends = tuple[FloatArray, FloatArray, FloatArray]
+"""As `attachment_points` returns them: own local points of a cuboid, their positions, and where they should be."""
 
 MAX_GAP_SHARE = 0.01
 """Maximum gap between a cuboid and its attachment, as a share of the bounding box's diagonal: half of what connects
@@ -37,9 +41,9 @@ def add_line(draft: PartialAssembly, choice: LineChoice, numbers: LineNumbers, *
         return False
     line, moved = checked[0], choice[1]
     extended = draft.with_line(line, moved)
-    resized = _resized(extended, moved) if isinstance(line, Attach | Squeeze) else None
-    for candidate in (extended,) if resized is None else (resized, extended):
-        if candidate.fits() and not (reaching and attachment_gap(candidate, moved) > MAX_GAP_SHARE):
+    candidates = _candidates(extended, moved) if isinstance(line, Attach | Squeeze) else ((extended, 0.0),)
+    for candidate, gap in candidates:
+        if not (reaching and gap > MAX_GAP_SHARE) and candidate.fits():
             draft.sizes = candidate.sizes
             draft.put(choice, *checked)
             return True
@@ -50,16 +54,25 @@ def attachment_gap(draft: PartialAssembly, moved: int) -> float:
     """Return the largest gap between a cuboid and its attachments, as a share of the bounding box's diagonal; infinite
     where the assembly cannot be executed.
     """
+    return _gap(_ends(draft, moved), draft.box)
+
+
+def _candidates(draft: PartialAssembly, moved: int) -> Iterator[tuple[PartialAssembly, float]]:
+    """Yield the assembly with the `attachment_gap` of a cuboid; before it, where the cuboid is aligned and leaves a
+    gap, the assembly with a better size of it, if there is one.
+    """
     ends = _ends(draft, moved)
-    return np.inf if ends is None else _farthest(ends[1], ends[2], draft.box)
+    gap = _gap(ends, draft.box)
+    if ends is not None and draft.aligned[moved - 1] and gap > MAX_GAP_SHARE:
+        resized = _resized(draft, moved, ends)
+        if resized is not None and (resized_gap := attachment_gap(resized, moved)) < gap:
+            yield resized, resized_gap
+    yield draft, gap
 
 
-def _resized(draft: PartialAssembly, moved: int) -> PartialAssembly | None:
-    """Return the assembly with a better size of an aligned cuboid; None where its own serves, or none is better."""
-    ends = _ends(draft, moved) if draft.aligned[moved - 1] else None
-    if ends is None or _farthest(ends[1], ends[2], draft.box) <= MAX_GAP_SHARE:
-        return None
-    local, actual, wanted = ends
+def _resized(draft: PartialAssembly, moved: int, ends: Ends) -> PartialAssembly | None:
+    """Return the assembly with the size of a cuboid that its attachments determine; None for one beyond the limits."""
+    local, _, wanted = ends
     sizes = list(draft.sizes[moved - 1])
     for axis in range(3):
         low, high = local[:, axis].argmin(), local[:, axis].argmax()
@@ -69,18 +82,20 @@ def _resized(draft: PartialAssembly, moved: int) -> PartialAssembly | None:
     if any(not MIN_CUBOID_SIZE <= size <= limit for size, limit in zip(sizes, draft.box, strict=True)):
         return None
     x, y, z = sizes
-    resized = replace(draft, sizes=[*draft.sizes[: moved - 1], (x, y, z), *draft.sizes[moved:]])
-    return resized if attachment_gap(resized, moved) < _farthest(actual, wanted, draft.box) else None
+    return replace(draft, sizes=[*draft.sizes[: moved - 1], (x, y, z), *draft.sizes[moved:]])
 
 
-def _ends(draft: PartialAssembly, moved: int) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+def _ends(draft: PartialAssembly, moved: int) -> Ends | None:
     """Return `attachment_points` of a cuboid; None where the assembly cannot be executed."""
     try:
-        return attachment_points(draft.block("Program_0", {}), f"cube{draft.grounded.index(moved)}")
+        return attachment_points(draft.draft_block(), slot_name(moved))
     except ProgramError:
         return None
 
 
-def _farthest(actual: FloatArray, wanted: FloatArray, box: Point) -> float:
-    """Return the largest distance between points (n, 3), as a share of the bounding box's diagonal."""
+def _gap(ends: Ends | None, box: Point) -> float:
+    """Return the largest distance between a cuboid and its attachments, as a share of the bounding box's diagonal."""
+    if ends is None:
+        return np.inf
+    _, actual, wanted = ends
     return float(np.linalg.norm(actual - wanted, axis=1).max(initial=0.0) / np.linalg.norm(box))
