@@ -21,7 +21,7 @@ EXAMPLES = sorted(Path("datasets/exemplars/programs").glob("*.txt"))
 
 
 @pytest.mark.slow
-def test_models_of_programs_are_trained_loaded_and_sampled(tmp_path: Path) -> None:
+def test_models_of_programs_are_trained_loaded_and_sampled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "programs").mkdir()
     for path in EXAMPLES:
         for number in range(2):
@@ -93,10 +93,12 @@ def test_models_of_programs_are_trained_loaded_and_sampled(tmp_path: Path) -> No
     assert again[0] == again[1]
     assert np.isfinite(points).all()
     language = load_program_lm(out / "toy-models/words-furniture-0/weights.safetensors", {"kit": "furniture"})
-    found = [language.sample(3, np.random.default_rng(seed))[0] for seed in (0, 0, 1)]
+    found = [language.sample(1, np.random.default_rng(seed))[0] for seed in (0, 0, 1)]
     assert found[0] == found[1] != found[2]
     with pytest.raises(CheckpointError, match="another kit"):
         load_program_lm(out / "toy-models/words-furniture-0/weights.safetensors", {"kit": "chair"})
+    for size in ("stages.training.program_vae.trained.PROGRAMS_PER_BATCH", "eval.programs.quality.DECODE_BATCH_SIZE"):
+        monkeypatch.setattr(size, 8)
     settings = [f"--set={option}" for option in ("samples=2", "sequences=1", "steps=4")]
     code, printed = shapemill("eval", "shapeassembly", "--config", config, "--out", out, *settings)
     assert code == 0, printed
@@ -122,10 +124,10 @@ def test_models_of_programs_are_trained_loaded_and_sampled(tmp_path: Path) -> No
 
 def check_sampled_dataset(folder: Path, out: Path, model: str, asked: tuple[int, ...]) -> None:
     """What a model writes becomes samples, the same ones however they are shared out among shards and workers."""
-    source = {"name": "stool", "dataset": "toy", "model": model, "kit": "furniture", "samples": 7}
+    source = {"name": "stool", "dataset": "toy", "model": model, "kit": "furniture", "samples": 3}
     sections = {
         "shapeassembly": {"sampled": [source], "max_overflow": 100, "splits": {"shards": 1}},
-        "program_sampling": {"programs_per_shard": 5},
+        "program_sampling": {"programs_per_shard": 2},
     }
     config = folder / "sampled.yaml"
     config.write_text(yaml.safe_dump({"name": "sampled", "seed": 5, **sections}), encoding="utf-8")
@@ -142,7 +144,7 @@ def check_sampled_dataset(folder: Path, out: Path, model: str, asked: tuple[int,
             for path in sorted((work / "program_sampling").glob("*.jsonl"))
             for line in path.open(encoding="utf-8")
         ]
-        assert [row["name"] for row in written] == [f"toy-models/{model}-furniture-0/{n:06d}" for n in range(7)]
+        assert [row["name"] for row in written] == [f"toy-models/{model}-furniture-0/{n:06d}" for n in range(3)]
         texts = {row["name"]: row["text"] for row in written}
         samples = [sample for path in sorted((work / "shapeassembly").glob("*.tar")) for sample in read_samples(path)]
         assert samples
