@@ -31,10 +31,10 @@ AVERAGED_EPOCHS = 10
 class TwoSampleScores:
     """Similarity to real shapes."""
 
-    accepted: float
-    """Percentage that a classifier takes for real."""
+    accepted: Cell
+    """Percentage that a classifier takes for real; empty for fewer than two shapes."""
     frechet_distance: Cell
-    """Of network features; empty without a network."""
+    """Of network features; empty without a network, or for fewer than two shapes."""
 
 
 def two_sample_scores(samples: FloatArray, real: FloatArray, features: FloatArray | None, seed: int) -> TwoSampleScores:
@@ -42,6 +42,8 @@ def two_sample_scores(samples: FloatArray, real: FloatArray, features: FloatArra
 
     The classifier sees every fourth point.
     """
+    if min(len(samples), len(real)) < 2:
+        return TwoSampleScores("", "")
     own = None if features is None else features_of(samples)
     distance = "" if own is None or features is None else frechet_distance(own, features)
     return TwoSampleScores(classifier_acceptance(samples[:, ::4], real[:, ::4], seed), distance)
@@ -71,11 +73,14 @@ def _network(folder: Path) -> TrainedRecovery | None:
     return find_models(folder)[0].get(FEATURES)
 
 
-def frechet_distance(first: FloatArray, second: FloatArray) -> float:
-    """Return the Fréchet distance of normal distributions fitted to features (n, d) and (m, d), as in FID.
+def frechet_distance(first: FloatArray, second: FloatArray) -> Cell:
+    """Return the Fréchet distance of normal distributions fitted to features (n, d) and (m, d), as in FID; empty where
+    n or m is 1, since one sample has no covariance.
 
     It is the squared distance of the means plus `tr(A + B - 2 (AB)^(1/2))` of the covariances A and B.
     """
+    if min(len(first), len(second)) < 2:
+        return ""
     centred = [(rows - rows.mean(axis=0)) / np.sqrt(len(rows) - 1) for rows in (first, second)]
     of_means = float(((first.mean(axis=0) - second.mean(axis=0)) ** 2).sum())
     # The trace of the root is the sum of the singular values of X Y', which needs no root of a singular matrix.

@@ -173,7 +173,9 @@ def _openness(depth, normal, positions, reach, across, perspective):
         for column in range(width):
             if not np.isfinite(depth[row, column]):
                 continue
-            p, n = positions[row, column], normal[row, column]
+            # Numbers instead of rows of arrays, whose references would be counted for every pixel.
+            px, py, pz = positions[row, column, 0], positions[row, column, 1], positions[row, column, 2]
+            nx, ny, nz = normal[row, column, 0], normal[row, column, 1], normal[row, column, 2]
             pixels = reach / (across * (depth[row, column] if perspective else 1.0))
             # Sixteen turns of the spiral, one for each place in a square of four by four pixels.
             start = ((row % 4) * 4 + column % 4) * 5 % 16
@@ -184,9 +186,13 @@ def _openness(depth, normal, positions, reach, across, perspective):
                 r = int(row + 0.5 + away * sines[start, tap])
                 if c < 0 or r < 0 or c >= width or r >= height or not np.isfinite(depth[r, c]):
                     continue
-                dx, dy, dz = positions[r, c, 0] - p[0], positions[r, c, 1] - p[1], positions[r, c, 2] - p[2]
+                dx, dy, dz = positions[r, c, 0] - px, positions[r, c, 1] - py, positions[r, c, 2] - pz
+                towards = dx * nx + dy * ny + dz * nz
+                # Most taps lie on the surface itself or below it, and need no root.
+                if towards <= 0.0:
+                    continue
                 length = np.sqrt(dx * dx + dy * dy + dz * dz)
-                rise = (dx * n[0] + dy * n[1] + dz * n[2]) / (length + 1e-12) - 0.06
+                rise = towards / (length + 1e-12) - 0.06
                 if rise > 0.0 and length < 2.0 * reach:
                     near = 1.0 - length / (2.0 * reach)
                     hidden += rise * near

@@ -199,17 +199,22 @@ def _ink(seen: Visible, size: tuple[int, int]) -> FloatArray:
 
 def _reduced(picture: FloatArray) -> FloatArray:
     """Return the mean over each square of SUBPIXELS_PER_PIXEL pixels."""
-    height, width, channels = picture.shape
-    tiles = picture.reshape(
-        height // SUBPIXELS_PER_PIXEL, SUBPIXELS_PER_PIXEL, width // SUBPIXELS_PER_PIXEL, SUBPIXELS_PER_PIXEL, channels
-    )
-    mean: FloatArray = tiles.mean(axis=(1, 3))
+    rows = np.zeros_like(picture[::SUBPIXELS_PER_PIXEL])
+    total = np.zeros_like(rows[:, ::SUBPIXELS_PER_PIXEL])
+    for row in range(SUBPIXELS_PER_PIXEL):
+        rows += picture[row::SUBPIXELS_PER_PIXEL]
+    for column in range(SUBPIXELS_PER_PIXEL):
+        total += rows[:, column::SUBPIXELS_PER_PIXEL]
+    mean: FloatArray = total / SUBPIXELS_PER_PIXEL**2
     return mean
 
 
 @numba.njit(cache=True, error_model="numpy")
 def _balls(local, radius, projection, width, height):
-    """Return what the ground shadow leaves of the light, float64 (h, w, 3); 1 where ground is not seen."""
+    """Return depth (h, w), normal (h, w, 3) and number (h, w) of the ball that each pixel shows; -1 for none.
+
+    local: centres of the balls in eye space, float64 (n, 3)
+    """
     depth = np.full((height, width), np.inf, dtype=np.float32)
     normal = np.zeros((height, width, 3), dtype=np.float32)
     owner = np.full((height, width), -1, dtype=np.int32)

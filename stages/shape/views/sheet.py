@@ -127,7 +127,7 @@ def picture_png(picture: ByteArray) -> bytes:
     from PIL import Image
 
     stream = io.BytesIO()
-    Image.fromarray(picture).save(stream, "PNG", optimize=True)
+    Image.fromarray(picture).save(stream, "PNG")
     return stream.getvalue()
 
 

@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 from scipy.linalg import sqrtm
 
-from eval.programs.two_sample_test import classifier_acceptance, features_of, frechet_distance
+from eval.programs.two_sample_test import (
+    TwoSampleScores,
+    classifier_acceptance,
+    features_of,
+    frechet_distance,
+    two_sample_scores,
+)
 
 
 def test_frechet_distance_of_normal_distributions() -> None:
@@ -26,6 +32,12 @@ def test_frechet_distance_with_fewer_samples_than_features() -> None:
     rng = np.random.default_rng(1)
     first = rng.standard_normal((10, 40))
     assert frechet_distance(first, first + 1.0) == pytest.approx(40.0)
+
+
+def test_one_shape_has_no_covariance_and_teaches_no_classifier() -> None:
+    clouds = np.random.default_rng(4).uniform(-1, 1, (2, 1024, 3))
+    assert frechet_distance(clouds[:1, :5, 0], clouds[:, :5, 0]) == ""
+    assert two_sample_scores(clouds[:1], clouds, features_of(clouds), 0) == TwoSampleScores("", "")
 
 
 def test_features_do_not_depend_on_position_and_size() -> None:
