@@ -82,15 +82,17 @@ def types_sentence(identified: IdentifiedParts) -> str:
     return f"{len(counts)} part type{'' if len(counts) == 1 else 's'}: {named}{others}"
 
 
-def contact_sentences(contacts: ResolvedContacts) -> Iterator[str]:
-    """Yield what touches what, and which axis points up."""
-    for assembly, kinds in zip(contacts.analysis.contacts.counted, contacts.analysis.contacts.kinds, strict=True):
+def contact_sentences(contacts: ResolvedContacts, models: Sequence[Model]) -> Iterator[str]:
+    """Yield how many contacts the parts of each model have, and which axis points up."""
+    found = contacts.analysis.contacts
+    for model, assembly, kinds in zip(models, found.counted, found.kinds, strict=True):
         sizes = np.bincount(connected_pieces(assembly)).tolist()
         whole = "in one piece" if len(sizes) == 1 else f"in {_pieces(sizes)}"
         counted = f" ({_counted(kinds)})" if kinds else ""
-        yield f"{len(kinds)} contacts{counted}, {whole}"
-    why = contacts.reasons.get("up", "stated")
-    yield f"{contacts.config.resolved().up} points up: {why}"
+        name = f"{model.path.name}: " if len(models) > 1 else ""
+        yield f"{name}{len(kinds)} contacts{counted}, {whole}"
+    why = f": {contacts.reasons['up']}" if "up" in contacts.reasons else ", as stated"
+    yield f"{contacts.config.resolved().up} points up{why}"
 
 
 def _counted(kinds: Sequence[ContactKind]) -> str:

@@ -164,7 +164,7 @@ def inspect_models(
     identified = identify_parts(models, config)
     tell(types_sentence(identified))
     analyses: dict[Any, ContactAnalysis] = {}
-    for sentence in contact_sentences(resolve_contacts(config, models, identified, analyses)):
+    for sentence in contact_sentences(resolve_contacts(config, models, identified, analyses), models):
         tell(sentence)
     resolved = resolve_models(config, models, identified, limits or ReadLimits(), tries, REQUIREMENT_KEYS, analyses)
     resolution = resolved.resolution

@@ -50,10 +50,6 @@ PAIRS_PER_SAMPLE = 64
 VERTICES_PER_PAIR = 16
 OUTLINE_PIXELS = 4.0
 """Largest distance of a drawing's outline from that of the mesh, besides the line width."""
-THIN_PIXELS = 1.5
-"""A part that is thinner on the screen may have no line: it can lie between the pixels."""
-DIRECTIONS_ACROSS = 36
-"""Directions in which it is measured how thin a part is."""
 INK_LEVEL = 128
 FAULTS_SHOWN = 20
 SECONDS_BETWEEN_LINES = 5.0
@@ -542,7 +538,9 @@ def geometry_faults(
     if "joints.npy" in arrays:
         yield from rooted_faults(record, triangles, arrays["joints.npy"], diagonal)
     for index, camera in enumerate(record.get("sketches", ())):
-        yield from drawing_faults(f"sketch{index}.png", members[f"sketch{index}.png"], camera, triangles)
+        yield from drawing_faults(
+            f"sketch{index}.png", members[f"sketch{index}.png"], camera, np.concatenate(triangles)
+        )
     if "hierarchy" in record:
         yield from hierarchy_faults(record, scene)
     if "symmetry" in record:
@@ -1048,12 +1046,10 @@ def glb_extras(content: bytes) -> dict[str, dict[str, Any]]:
     return {node["name"]: node["extras"] for node in nodes if "class" in node.get("extras", {})}
 
 
-def drawing_faults(name: str, content: bytes, camera: dict[str, Any], parts: list[np.ndarray]) -> Iterator[str]:
-    """Yield a drawing whose ink does not reach as far as the mesh does in its camera.
+def drawing_faults(name: str, content: bytes, camera: dict[str, Any], triangles: np.ndarray) -> Iterator[str]:
+    """Yield a drawing whose ink does not reach as far as the mesh, triangles (t, 3, 3), does in its camera.
 
-    parts: triangles of each part, (t, 3, 3)
-
-    Parts that are thin on the screen may be drawn or not.
+    What is thinner than two pixels may be drawn or not: it can lie between the centres of pixels.
     """
     pixels = grey_png(content)
     if pixels.shape != (camera["height"], camera["width"]):
@@ -1063,35 +1059,47 @@ def drawing_faults(name: str, content: bytes, camera: dict[str, Any], parts: lis
     if not len(rows):
         yield f"{name} is blank"
         return
-    places = [places_on_screen(camera, np.unique(part.reshape(-1, 3), axis=0)) for part in parts]
-    if not all(np.isfinite(part).all() for part in places):
+    seen = triangles.reshape(-1, 3) @ np.array(camera["world_to_camera"])[:3, :3].T
+    seen = seen + np.array(camera["world_to_camera"])[:3, 3]
+    depth = seen[:, 2:] if camera["projection"] == "perspective" else np.ones((len(seen), 1))
+    if (depth <= 0).any():
         return
+    places = np.concatenate([seen[:, :2] / depth, np.ones((len(seen), 1))], axis=1) @ np.array(camera["intrinsics"]).T
+    limit = OUTLINE_PIXELS + float(camera["line_width"])
     size = np.array([camera["width"], camera["height"]])
-    ends = np.clip([[-part.min(axis=0), part.max(axis=0)] for part in places], [-size, 0 * size], [0 * size, size])
-    drawn = [part for part, seen in zip(ends, places, strict=True) if thinnest(seen) >= THIN_PIXELS]
-    farthest, nearest = ends.max(axis=0), np.max(drawn or ends, axis=0)
-    ink = np.array([[-columns.min(), -rows.min()], [columns.max() + 1, rows.max() + 1]])
-    gap = max((ink - farthest).max(), (nearest - ink).max())
-    if gap > OUTLINE_PIXELS + float(camera["line_width"]):
-        yield f"{name}: the outline of the drawing is {gap:.0f} pixels from that of the mesh"
+    whole = np.clip([places[:, :2].min(axis=0), places[:, :2].max(axis=0)], 0, size)
+    ink = np.array([[columns.min(), rows.min()], [columns.max() + 1, rows.max() + 1]])
+    outwards = np.array([[-1], [1]])
+    beyond, short = (outwards * (ink - whole)).max(), 0.0
+    if (outwards * (whole - ink)).max() > limit:
+        covered = covered_blocks(places[:, :2].reshape(-1, 3, 2), pixels.shape)
+        rows, columns = np.nonzero(covered)
+        if len(rows):
+            thick = np.array([[columns.min(), rows.min()], [columns.max() + 2, rows.max() + 2]])
+            short = (outwards * (thick - ink)).max()
+    if max(beyond, short) > limit:
+        yield f"{name}: the outline of the drawing is {max(beyond, short):.0f} pixels from that of the mesh"
 
 
-def places_on_screen(camera: dict[str, Any], points: np.ndarray) -> np.ndarray:
-    """Return where points (n, 3) are seen, in pixels, (n, 2); NaN for those behind a camera in perspective."""
-    pose = np.array(camera["world_to_camera"])
-    seen = points @ pose[:3, :3].T + pose[:3, 3]
-    if camera["projection"] == "perspective":
-        seen = seen / np.where(seen[:, 2:] > 0, seen[:, 2:], np.nan)
-    seen[:, 2] = 1.0
-    places: np.ndarray = seen @ np.array(camera["intrinsics"]).T
-    return places[:, :2]
+def covered_blocks(triangles: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Return where triangles (t, 3, 2), in pixels, cover the centres of a block of two by two pixels, by the block's
+    first pixel, bool (h - 1, w - 1).
 
-
-def thinnest(places: np.ndarray) -> float:
-    """Return how wide points (n, 2) are in the direction in which they are thinnest."""
-    angles = np.arange(DIRECTIONS_ACROSS) * np.pi / DIRECTIONS_ACROSS
-    across = places @ np.array([np.cos(angles), np.sin(angles)])
-    return float(np.ptp(across, axis=0).min())
+    shape: height and width of the picture
+    """
+    covered = np.zeros(shape, dtype=bool)
+    first = np.clip(np.ceil(triangles.min(axis=1) - 0.5), 0, None).astype(int)
+    last = np.clip(np.floor(triangles.max(axis=1) - 0.5), None, [shape[1] - 1, shape[0] - 1]).astype(int)
+    for number in np.flatnonzero((first <= last).all(axis=1)).tolist():
+        (left, top), (right, bottom) = first[number], last[number]
+        corners = triangles[number]
+        sides = np.roll(corners, -1, axis=0) - corners
+        x, y = np.arange(left, right + 1) + 0.5, np.arange(top, bottom + 1)[:, None] + 0.5
+        turns = [dx * (y - ay) - dy * (x - ax) for (dx, dy), (ax, ay) in zip(sides, corners, strict=True)]
+        inside = (np.min(turns, axis=0) >= 0) | (np.max(turns, axis=0) <= 0)
+        covered[top : bottom + 1, left : right + 1] |= inside
+    blocks: np.ndarray = covered[:-1, :-1] & covered[1:, :-1] & covered[:-1, 1:] & covered[1:, 1:]
+    return blocks
 
 
 def grey_png(content: bytes) -> np.ndarray:

@@ -85,7 +85,7 @@ def _surface_defects(mesh: QuadMesh, faces: IntArray, pairs: np.ndarray) -> list
 
 
 def _components(neighbours: np.ndarray) -> tuple[int, np.ndarray]:
-    """The number of components of a graph, and that of each node; every node has as many edges in as out.
+    """Return the number of components of a graph, and the component of each node; as many edges lead in as out.
 
     neighbours: int (n, k), the nodes to which each has an edge
     """

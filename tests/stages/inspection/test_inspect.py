@@ -167,7 +167,7 @@ class TestText:
         assert inspect(path, "--up", "z", "--tries", "100") == 0
         printed = capsys.readouterr()
         lines = printed.out.splitlines()
-        first = [f"inspect: {fact}" for fact in ("1 part type: 4 cube", RING_CONTACTS, "z points up: stated")]
+        first = [f"inspect: {fact}" for fact in ("1 part type: 4 cube", RING_CONTACTS, "z points up, as stated")]
         assert [line for line in printed.err.splitlines() if line in first] == first
         assert lines[0] == str(tmp_path / "ring.obj")
         text = "\n".join(" ".join(line.split()) for line in lines)
@@ -184,7 +184,9 @@ class TestText:
     def test_several_models_have_separate_columns(self, tmp_path: Path, capsys: Any) -> None:
         both = f"{single(tmp_path)} {single(tmp_path, 'again.obj')}"  # as in MESH="one.obj again.obj"
         assert inspect(both, "--out", tmp_path / "out", "--tries", "100", *WHOLE) == 0
-        text = " ".join(capsys.readouterr().out.split())
+        printed = capsys.readouterr()
+        assert all(f"inspect: {name}: 0 contacts, in one piece\n" in printed.err for name in ("one.obj", "again.obj"))
+        text = " ".join(printed.out.split())
         assert "type in 1 in 2 triangles symmetries only 1 1 12 24" in text
 
 

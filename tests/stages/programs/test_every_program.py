@@ -65,9 +65,10 @@ def crossings(mesh: QuadMesh) -> int:
     """The number of pairs of triangles of a mesh that intersect without a common corner."""
     tree = build_tree(mesh.vertices, mesh.triangles)
     pairs = near_pairs(tree, tree, np.eye(4), 0.0)
+    # A number for each corner, equal for equal corners; a matrix product may round equal rows differently.
     x, y, z = np.moveaxis(tree[0], -1, 0)
-    places = np.pi * x + np.e * y + np.sqrt(2.0) * z  # no matrix product: its sums may depend on the row
-    first, other = places[pairs[:, 0]], places[pairs[:, 1]]
+    numbers = np.pi * x + np.e * y + np.sqrt(2.0) * z
+    first, other = numbers[pairs[:, 0]], numbers[pairs[:, 1]]
     apart = np.ones(len(pairs), dtype=bool)
     for corner, other_corner in itertools.product(range(3), repeat=2):
         apart &= first[:, corner] != other[:, other_corner]
@@ -162,9 +163,9 @@ def test_parts_do_not_intersect_themselves(name: str) -> None:
 @pytest.mark.parametrize("name", program_names())
 def test_few_parts_of_many_shapes_intersect_themselves(name: str) -> None:
     # Thick arm supports with sharp bends do, in two of 400 chairs, and necks that fold over, in nine of 400 vases.
-    parts = {number: labels for number in range(40) if (labels := self_intersecting(name, number))}
-    texts = [find_program(name).schema.to_text(random_values(name, 40, False)[number]) for number in parts]
-    assert len(parts) <= 2, (parts, texts)
+    parts = {number: labels for number in range(80) if (labels := self_intersecting(name, number))}
+    texts = [find_program(name).schema.to_text(random_values(name, 80, False)[number]) for number in parts]
+    assert len(parts) <= 4, (parts, texts)
 
 
 def test_self_intersections_are_found() -> None:

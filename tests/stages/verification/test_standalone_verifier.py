@@ -109,6 +109,8 @@ def test_shard_outside_the_folder_is_not_opened(folder: Path) -> None:
 def test_a_drawing_must_reach_as_far_as_the_mesh_in_its_camera() -> None:
     panel = np.array([[[0, 0, 1.0], [1, 0, 1], [1, 2, 1]], [[0, 0, 1], [1, 2, 1], [0, 2, 3]]])
     wire = np.array([[[1, 1, 1.0], [3, 1.02, 1], [3, 1, 1]]])
+    tilted = np.array([[[1, 1, 1.0], [3, 1.13, 1], [3, 1.11, 1]]])
+    bent = np.array([*wire, [[3, 1, 1], [3.02, 1, 1], [3, 3, 1]]])
     camera = {
         "width": 100,
         "height": 90,
@@ -118,26 +120,27 @@ def test_a_drawing_must_reach_as_far_as_the_mesh_in_its_camera() -> None:
         "intrinsics": [[20, 0, 30], [0, 20, 25], [0, 0, 1]],
     }
 
-    def faults(left: int, top: int, right: int, bottom: int, parts: list[np.ndarray]) -> list[str]:
+    def faults(left: int, top: int, right: int, bottom: int, *parts: np.ndarray) -> list[str]:
         pixels = np.full((90, 100), 255, np.uint8)
         pixels[top : bottom + 1, left : right + 1] = 0
         stream = io.BytesIO()
         Image.fromarray(pixels).save(stream, "png")
-        return list(drawing_faults("sketch0.png", stream.getvalue(), camera, parts))
+        return list(drawing_faults("sketch0.png", stream.getvalue(), camera, np.concatenate(parts)))
 
     def outline(pixels: int) -> list[str]:
         return [f"sketch0.png: the outline of the drawing is {pixels} pixels from that of the mesh"]
 
-    assert faults(30, 25, 50, 65, [panel]) == []
-    assert faults(50, 25, 70, 65, [panel]) == outline(21)
-    assert faults(30, 25, 50, 45, [panel]) == outline(19)
-    assert faults(99, 89, 0, 0, [panel]) == ["sketch0.png is blank"]
-    # The wire is .4 pixels thick: it may be drawn, in part or as a whole, but nothing beyond it.
-    for right, expected in ((40, outline(9)), (50, []), (70, []), (90, []), (99, outline(10))):
-        assert faults(30, 25, right, 65, [panel, wire]) == expected
+    assert faults(30, 25, 50, 65, panel) == []
+    assert faults(50, 25, 70, 65, panel) == outline(21)
+    assert faults(30, 25, 50, 45, panel) == outline(19)
+    assert faults(99, 89, 0, 0, panel) == ["sketch0.png is blank"]
+    # The wires are .4 pixels thick: they may be drawn, in part or as a whole, but nothing beyond them.
+    for thin in (wire, tilted, bent):
+        for right, expected in ((40, outline(9)), (50, []), (70, []), (90, []), (99, outline(10))):
+            assert faults(30, 25, right, 65, panel, thin) == expected
     thicker = wire.copy()
     thicker[0, 1, 1] = 1.2
-    assert faults(30, 25, 50, 65, [panel, thicker]) == outline(39)
+    assert faults(30, 25, 50, 65, panel, thicker) == outline(39)
 
 
 @pytest.mark.parametrize("level", range(3))
