@@ -89,7 +89,7 @@ def contact_sentences(contacts: ResolvedContacts, models: Sequence[Model]) -> It
         sizes = np.bincount(connected_pieces(assembly)).tolist()
         whole = "in one piece" if len(sizes) == 1 else f"in {_pieces(sizes)}"
         counted = f" ({_counted(kinds)})" if kinds else ""
-        name = f"{model.path.name}: " if len(models) > 1 else ""
+        name = f"{model.path}: " if len(models) > 1 else ""
         yield f"{name}{len(kinds)} contacts{counted}, {whole}"
     why = f": {contacts.reasons['up']}" if "up" in contacts.reasons else ", as stated"
     yield f"{contacts.config.resolved().up} points up{why}"
