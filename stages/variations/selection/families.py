@@ -34,7 +34,11 @@ SAMPLE_SIZE = 128
 TRIAL_SIZE = 256
 """Variants of a larger pool that are cut first, in proportion, to learn what number of regions it allows."""
 
+MAX_BYTES_REMEMBERED = 2**28
+"""Memory for pairs that were compared; beyond it the oldest are forgotten."""
+
 Indices = npt.NDArray[np.int64]
+Flags = npt.NDArray[np.bool_]
 Near = Callable[[int, Indices], Indices]
 """Returns which of some others are too near to a variant to be in another split; symmetric."""
 
@@ -102,33 +106,50 @@ class _Ground:
 
     def __init__(self, near: Near, count: int, sample: Indices) -> None:
         self.near, self.count, self.sample = near, count, sample
-        self._known: dict[int, int] = {}  # rows of `_around` by variant
-        self._around = np.empty((16, -(-count // 8)), dtype=np.uint8)  # a bit for each variant of the pool
+        width = max(-(-count // 8), 1)  # bytes; an empty pool has none
+        max_rows = min(max(MAX_BYTES_REMEMBERED // (2 * width), 1), count)
+        self._rows: dict[int, int] = {}  # row of each variant that is remembered, the oldest first
+        self._variants = np.zeros(max_rows, dtype=np.int64)  # variant of each row
+        self._bits = np.zeros((max_rows, 2, width), dtype=np.uint8)
+        """Two bits for each variant of the pool: whether it was compared with the row's variant, and is near it."""
         self._near_sample: dict[int, Indices] = {}
 
-    def around(self, variant: int) -> Indices:
-        """Return all that is near a variant; what earlier answers tell is not computed again."""
-        row = self._known.get(variant)
-        if row is None:
-            row = len(self._known)
-            if row == len(self._around):
-                self._around = np.concatenate([self._around, np.empty_like(self._around)])
-            is_near = np.zeros(self.count, dtype=np.bool_)
-            known = np.array(list(self._known), dtype=np.int64)
-            byte, bit = divmod(variant, 8)
-            is_near[known] = self._around[:row, byte] >> bit & 1
-            unknown = np.ones(self.count, dtype=np.bool_)
-            unknown[known] = False
-            is_near[self.near(variant, np.flatnonzero(unknown))] = True
-            self._around[row] = np.packbits(is_near, bitorder="little")
-            self._known[variant] = row
-        return np.flatnonzero(np.unpackbits(self._around[row], count=self.count, bitorder="little"))
+    def around(self, variant: int, others: Indices) -> Indices:
+        """Return which of `others` are near a variant; pairs that are remembered are not compared again."""
+        row, (byte, bit) = self._row(variant), divmod(variant, 8)
+        is_known, is_near = np.unpackbits(self._bits[row], axis=-1, count=self.count, bitorder="little").view(np.bool_)
+        rows = len(self._rows)
+        answers = (self._bits[:rows, :, byte] >> bit & 1).astype(np.bool_)
+        is_known[self._variants[:rows]] |= answers[:, 0]
+        is_near[self._variants[:rows]] |= answers[:, 1]
+        unknown = others[~is_known[others]]
+        if len(unknown):
+            is_known[unknown] = True
+            is_near[self.near(variant, unknown)] = True
+            self._bits[row] = np.packbits([is_known, is_near], axis=-1, bitorder="little")
+        near_ones: Indices = others[is_near[others]]
+        return near_ones
 
-    def cost(self, variant: int, spent: npt.NDArray[np.bool_]) -> float:
-        """Return about how many variants that are not `spent` yet are near a variant."""
+    def near_sample(self, variant: int) -> Indices:
+        """Return what is near a variant in the sample."""
         if variant not in self._near_sample:
             self._near_sample[variant] = self.near(variant, self.sample)
-        return float((~spent[self._near_sample[variant]]).sum() * self.count / len(self.sample))
+        return self._near_sample[variant]
+
+    def cost(self, variant: int, spent: Flags) -> float:
+        """Return about how many variants that are not `spent` yet are near a variant."""
+        return float((~spent[self.near_sample(variant)]).sum() * self.count / len(self.sample))
+
+    def _row(self, variant: int) -> int:
+        """Return the row of a variant; a new one knows the sample, and takes the place of the oldest if need be."""
+        if variant not in self._rows:
+            is_full = len(self._rows) == len(self._bits)
+            row = self._rows.pop(next(iter(self._rows))) if is_full else len(self._rows)
+            answers = np.zeros((2, self.count), dtype=np.bool_)
+            answers[0, self.sample] = answers[1, self.near_sample(variant)] = True
+            self._bits[row] = np.packbits(answers, axis=-1, bitorder="little")
+            self._rows[variant], self._variants[row] = row, variant
+        return self._rows[variant]
 
 
 def _attempts(wanted: Mapping[str, int], max_regions: int) -> list[tuple[dict[str, int], int]]:
@@ -146,37 +167,62 @@ def _grow(
 ) -> Cut:
     """Return val and test grown to at most `sizes`, each of about `regions` regions.
 
-    Several regions are given up where they leave far less for train than is wanted.
+    Several regions are given up where they leave far less for train than is wanted. A member is compared only with
+    what is free, and with the sample: `touched` says for these which splits have a member near them, for others at
+    least one such split.
     """
     split_of = np.zeros(ground.count, dtype=np.int8)
-    touched = {split: np.zeros(ground.count, dtype=np.bool_) for split in sizes}
-    left, grown, rest = dict(sizes), 0, ground.count
-    while any(left.values()) and (regions == 1 or rest >= NEARLY_ENOUGH_SHARE * wanted["train"]):
+    touched = np.zeros((len(SPLITS), ground.count), dtype=np.bool_)
+    free = np.arange(ground.count)
+    left, grown = dict(sizes), 0
+    while any(left.values()) and (regions == 1 or len(free) >= NEARLY_ENOUGH_SHARE * wanted["train"]):
         split = max(left, key=lambda name: left[name])
-        barred = (split_of > 0) | np.any([touched[other] for other in sizes if other != split], axis=0)
-        free = np.flatnonzero(~barred & ~touched[split])
         if not len(free):
             left[split] = 0
             continue
+        number = SPLITS.index(split)
         size = min(left[split], -(-sizes[split] // regions))
-        affordable = max(rest - wanted["train"], 0) * size / sum(left.values())
-        member = _cheapest(ground, rng.permutation(free)[:MIDDLES_DRAWN], touched[split], affordable)
-        family = ground.around(member)
+        affordable = max(len(free) - wanted["train"], 0) * size / sum(left.values())
+        member = _cheapest(ground, rng.permutation(free)[:MIDDLES_DRAWN], touched[number], affordable)
+        family = _family(ground, member, number, split_of, touched)
         for _ in range(size):
-            split_of[member] = SPLITS.index(split)
-            touched[split][ground.around(member)] = True
+            split_of[member] = number
+            touched[number, ground.near_sample(member)] = True
+            touched[number, ground.around(member, _free(split_of, touched))] = True
             left[split] -= 1
-            family = family[~barred[family] & (split_of[family] == 0)]
+            family = family[split_of[family] == 0]
             if not len(family):
                 break
-            member = _cheapest(ground, rng.permutation(family)[:MEMBERS_DRAWN], touched[split], 0.0)
+            member = _cheapest(ground, rng.permutation(family)[:MEMBERS_DRAWN], touched[number], 0.0)
         grown += 1
-        rest = int((~np.any([split_of > 0, *touched.values()], axis=0)).sum())
-    split_of[(split_of == 0) & np.any(list(touched.values()), axis=0)] = DISCARDED_SPLIT
+        free = _free(split_of, touched)
+    split_of[(split_of == 0) & touched.any(axis=0)] = DISCARDED_SPLIT
     return Cut(split_of, grown)
 
 
-def _cheapest(ground: _Ground, rivals: Indices, spent: npt.NDArray[np.bool_], affordable: float) -> int:
+def _free(split_of: npt.NDArray[np.int8], touched: Flags) -> Indices:
+    """Return the variants that are in no region and near no member of one."""
+    return np.flatnonzero((split_of == 0) & ~touched.any(axis=0))
+
+
+def _family(ground: _Ground, middle: int, number: int, split_of: npt.NDArray[np.int8], touched: Flags) -> Indices:
+    """Return the variants near the middle of a region of split `number` that are near no member of another split.
+
+    What this split touched first was not compared with later members of the others: it is now, and `touched` completed.
+    """
+    others = np.arange(len(SPLITS)) != number
+    family = ground.around(middle, np.flatnonzero((split_of == 0) & ~touched[others].any(axis=0)))
+    doubtful = family[touched[number, family]]
+    for member in np.flatnonzero((split_of > 0) & (split_of != number)).tolist():
+        if not len(doubtful):
+            break
+        touched[split_of[member], ground.around(member, doubtful)] = True
+        doubtful = doubtful[~touched[split_of[member], doubtful]]
+    admitted: Indices = family[~touched[others][:, family].any(axis=0)]
+    return admitted
+
+
+def _cheapest(ground: _Ground, rivals: Indices, spent: Flags, affordable: float) -> int:
     """Return the first variant with at most `affordable` around it, or the one with least."""
     costs: list[float] = []
     for rival in rivals.tolist():

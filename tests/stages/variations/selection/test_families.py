@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stages.shape.collection.assignment import SPLITS
 from stages.variations.report.split_report import shortage, splits_table
+from stages.variations.selection import families
 from stages.variations.selection.ancestry import Ancestry
 from stages.variations.selection.families import DISCARDED_SPLIT, Cut, Near, cut_families
 
@@ -23,6 +28,70 @@ def crossings(matrix: np.ndarray, cut: Cut) -> int:
     i, j = np.nonzero(matrix)
     a, b = cut.split_of[i], cut.split_of[j]
     return int(((a != b) & (a != DISCARDED_SPLIT) & (b != DISCARDED_SPLIT)).sum())
+
+
+def grow_from_all_pairs(
+    ground: families._Ground, sizes: Mapping[str, int], wanted: Mapping[str, int], regions: int,
+    rng: np.random.Generator,
+) -> Cut:  # fmt: skip
+    """Grow val and test by their definition, from all pairs of the pool."""
+    everything = np.arange(ground.count)
+    matrix = np.array([np.isin(everything, ground.near(variant, everything)) for variant in everything.tolist()])
+    split_of = np.zeros(ground.count, dtype=np.int8)
+    left, grown = dict(sizes), 0
+
+    def near_any(members: np.ndarray) -> np.ndarray:
+        touched: np.ndarray = matrix[members].any(axis=0)
+        return touched
+
+    while any(left.values()):
+        free = np.flatnonzero((split_of == 0) & ~near_any(split_of > 0))
+        if regions > 1 and len(free) < families.NEARLY_ENOUGH_SHARE * wanted["train"]:
+            break
+        split = max(left, key=lambda name: left[name])
+        if not len(free):
+            left[split] = 0
+            continue
+        number = SPLITS.index(split)
+        size = min(left[split], -(-sizes[split] // regions))
+        affordable = max(len(free) - wanted["train"], 0) * size / sum(left.values())
+        rivals = rng.permutation(free)[: families.MIDDLES_DRAWN]
+        member = families._cheapest(ground, rivals, near_any(split_of == number), affordable)
+        family = np.flatnonzero(matrix[member] & ~near_any((split_of > 0) & (split_of != number)))
+        for _ in range(size):
+            split_of[member] = number
+            left[split] -= 1
+            family = family[split_of[family] == 0]
+            if not len(family):
+                break
+            rivals = rng.permutation(family)[: families.MEMBERS_DRAWN]
+            member = families._cheapest(ground, rivals, near_any(split_of == number), 0.0)
+        grown += 1
+    split_of[(split_of == 0) & near_any(split_of > 0)] = DISCARDED_SPLIT
+    return Cut(split_of, grown)
+
+
+@pytest.mark.parametrize("bytes_remembered", [families.MAX_BYTES_REMEMBERED, 512])
+@pytest.mark.parametrize("density", [0.0, 0.002, 0.01, 0.03, 0.1, 0.4, 1.0])
+@pytest.mark.parametrize("count", [0, 7, 90, 250])
+def test_cut_is_that_of_all_pairs(
+    count: int, density: float, bytes_remembered: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(families, "MAX_BYTES_REMEMBERED", bytes_remembered)
+    for seed, by_place in ((0, False), (1, True)):
+        rng = np.random.default_rng(seed)
+        places = rng.random(count)
+        matrix = np.abs(places[:, None] - places) < density / 2 if by_place else rng.random((count, count)) < density
+        near = near_by(np.triu(matrix) | np.triu(matrix).T)
+        wanted = {"train": count // 3, "val": count // 12, "test": count // 10}
+        ours, reference = np.random.default_rng(seed), np.random.default_rng(seed)
+        cut = cut_families(near, count, wanted, ours)
+        with monkeypatch.context() as patched:
+            patched.setattr(families, "_grow", grow_from_all_pairs)
+            expected = cut_families(near, count, wanted, reference)
+        assert cut.split_of.tolist() == expected.split_of.tolist()
+        assert cut.regions == expected.regions
+        assert ours.bit_generator.state == reference.bit_generator.state
 
 
 def test_clusters_are_not_divided_by_splits() -> None:
