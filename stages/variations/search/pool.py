@@ -193,12 +193,19 @@ class PoolIndex:
         return len(self.rows)
 
     def variants(self, task: Task, chosen: Sequence[int]) -> Iterator[tuple[FoundVariants, int]]:
-        """Yield variants, each as what its search found and its index there; files are opened when first needed."""
+        """Yield variants, each as what its search found and its index there.
+
+        Files are opened when first needed and closed after their last variant: pages of mapped files count as memory.
+        """
         opened: dict[int, FoundVariants] = {}
-        for number, index in self.rows[np.asarray(chosen, dtype=np.int64)].tolist():
+        rows = self.rows[np.asarray(chosen, dtype=np.int64)].tolist()
+        last = {number: place for place, (number, _) in enumerate(rows)}
+        for place, (number, index) in enumerate(rows):
             if number not in opened:
                 opened[number] = FoundVariants.of(task, self.searches[number])
             yield opened[number], index
+            if place == last[number]:
+                del opened[number]
 
 
 def write_kept(
