@@ -170,7 +170,7 @@ def _sources(
         within = (middles > low[axes]) & (middles < high[axes]) & np.isin(axes, across)
         joined = np.isin(groups, groups[within])
         shares = np.bincount(axes[joined], all_gaps[joined], minlength=3) / np.maximum(sides, 1e-12)
-        if (shares[sides > 0] < MAX_TIED_SHARE).any():
+        if joined.any() and (shares[sides > 0] < MAX_TIED_SHARE).any():  # no interval is as short as some round parts
             groups[joined] = groups[joined].min()
             is_tied |= joined
     sources = np.arange(len(groups))

@@ -171,3 +171,11 @@ def test_a_square_is_not_round_and_a_ball_may_become_flat() -> None:
     body = part((np.asarray(ball.vertices, dtype=np.float64), np.asarray(ball.faces, dtype=np.int32)))
     assembly = Assembly(np.zeros(1, dtype=np.int16), np.eye(4)[None], np.empty((0, 2), dtype=np.int32))
     assert lattice_of(Shape((body,), assembly, "y", ("ball",)), 1e-3).sources.tolist() == [0, 1, 0]
+
+
+def test_a_round_wire_thinner_than_any_interval_ties_nothing() -> None:
+    meshes = part(box(0.05, 0.05, 1.0)), part(prism(16, radius=5e-4, height=1.0))
+    poses = np.stack([np.eye(4), np.eye(4)])
+    poses[1, 0, 3] = 0.025
+    assembly = Assembly(np.arange(2, dtype=np.int16), poses, np.array([[0, 1]], dtype=np.int32))
+    assert is_free(lattice_of(Shape(meshes, assembly, "z", ("beam", "wire")), 1e-3))
