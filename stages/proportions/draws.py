@@ -73,10 +73,9 @@ def drawn_layouts(
     draws = LayoutDraws(shapes.layout(exemplar), rows, is_alone=True, up=AXES.index(shapes.kit.up))
     found: list[DrawnLayout] = []
     known = {draws.exemplar.key}
-    has_rows = bool(draws.rows or draws.circles or draws.mirrored_bays)
     for reason, count in sorted(draws.refused.items()):
         reject(f"row: {reason}", count)
-    if not has_rows:
+    if not draws.can_change:
         return [own]
     wanted = min(wanted, MAX_LAYOUTS)
     for number in range(TRIES_PER_LAYOUT * wanted):

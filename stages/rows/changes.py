@@ -1,5 +1,5 @@
-"""Changes of a layout: periods of a row along a line, bays between mirrored ends, or another number of sectors about an
-axis; and their JSON.
+"""Changes of a layout: periods of a row along a line, bays between mirrored ends, bays of modules, or another number of
+sectors about an axis; and their JSON.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 
 from stages.rows.layout import Layout
 from stages.rows.mirrored_bays import with_mirrored_bays
+from stages.rows.modular_bays import with_modular_bays
 from stages.rows.slabs import RowChange, repeat
 from stages.rows.turns import Turn, turned
 
@@ -25,6 +26,8 @@ def changed(layout: Layout, change: Change) -> Layout:
     """Return a changed layout. Raises SlabError for a change that is not valid."""
     if isinstance(change, Turn):
         return turned(layout, change)
+    if change.is_modular:
+        return with_modular_bays(layout, change)
     return with_mirrored_bays(layout, change) if change.is_mirrored else repeat(layout, change)
 
 
@@ -40,6 +43,7 @@ def change_json(change: Change) -> dict[str, Any]:
         "times": change.times,
         **({"is_bay": True} if change.is_bay else {}),
         **({"is_mirrored": True} if change.is_mirrored else {}),
+        **({"is_modular": True} if change.is_modular else {}),
     }
 
 
@@ -68,5 +72,5 @@ def read_change(stated: Mapping[str, Any]) -> Change:
         raise ValueError(
             f"a row changes by -1 or by 1 to {MAX_TIMES} periods, and its step follows its normal, unlike {stated}"
         )
-    is_bay, is_mirrored = (bool(stated.get(key, False)) for key in ("is_bay", "is_mirrored"))
-    return RowChange(normal, shift, at, times, is_bay, is_mirrored)
+    kinds = {key: bool(stated.get(key, False)) for key in ("is_bay", "is_mirrored", "is_modular")}
+    return RowChange(normal, shift, at, times, **kinds)

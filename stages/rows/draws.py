@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from stages.rows.changes import Change
 from stages.rows.layout import Layout
 from stages.rows.mirrored_bays import MIRRORED_ENDS, MirroredBay, find_mirrored_bays, with_mirrored_bays
+from stages.rows.modular_bays import ModularBay, find_modular_bays, with_modular_bays
 from stages.rows.rows import TOO_SMALL, Row, find_rows, is_visible
 from stages.rows.settings import RowsConfig
 from stages.rows.slabs import RowChange, SlabError, repeat
@@ -31,8 +33,8 @@ class LayoutDraws:
     def __init__(self, layout: Layout, config: RowsConfig, is_alone: bool = False, up: int | None = None) -> None:
         """Find the rows of a layout.
 
-        is_alone: whether nothing but rows makes layouts: then bays are inserted and removed too, and rows that are too
-            small to be seen stay as they are
+        is_alone: whether nothing but rows makes layouts: then bays are inserted and removed too, those of modules where
+            there are no rows, and rows that are too small to be seen stay as they are
         up: index of the axis that points up; with it, bays between mirrored ends are inserted too
         """
         self.exemplar, self.config, self._is_alone = layout, config, is_alone
@@ -43,6 +45,15 @@ class LayoutDraws:
         self.circles = find_circles(layout)
         self.mirrored_bays: list[MirroredBay] = [] if up is None else find_mirrored_bays(layout, up)
         self._with_bays: dict[tuple[int, int], tuple[RowChange, Layout | None]] = {}
+        self.modular_bays: list[ModularBay] = []
+        if is_alone and not (self.rows or self.circles):
+            self.modular_bays = find_modular_bays(layout, {0, 1, 2} - {bay.axis for bay in self.mirrored_bays})
+        self._with_modules: dict[tuple[tuple[int, int], ...], tuple[RowChange, Layout] | None] = {}
+
+    @property
+    def can_change(self) -> bool:
+        """Whether anything in the exemplar can become longer or shorter."""
+        return bool(self.rows or self.circles or self.mirrored_bays or self.modular_bays)
 
     @property
     def rows(self) -> Sequence[Row]:
@@ -53,6 +64,8 @@ class LayoutDraws:
         """Return changes and the layout that they make, or None where no change was possible."""
         layout, changes = self.exemplar, list[Change]()
         first = self._drawn_bays(rng) or self._drawn_circle(rng)
+        if first is None and self.modular_bays:
+            return self._drawn_modules(rng)
         if first is not None:
             change, made = first
             if made is None:
@@ -72,14 +85,48 @@ class LayoutDraws:
                     break
         return (tuple(changes), layout) if changes and layout.key != self.exemplar.key else None
 
+    def _drawn_modules(self, rng: np.random.Generator) -> tuple[tuple[Change, ...], Layout] | None:
+        """Return the exemplar with more or fewer bays of modules along one axis or several, or None."""
+        layout, changes, drawn = self.exemplar, list[Change](), list[tuple[int, int]]()
+        axes = sorted({bay.axis for bay in self.modular_bays})
+        for axis in rng.permutation(axes)[: int(rng.integers(1, self.config.max_changes + 1))].tolist():
+            bays = [number for number, bay in enumerate(self.modular_bays) if bay.axis == axis]
+            for _ in range(TRIES_PER_CHANGE):
+                number = bays[int(rng.integers(len(bays)))]
+                count = self.modular_bays[number].count
+                least, most = self._limits_of(count)
+                drawn.append((number, int(rng.integers(least, most + 1)) - count))
+                made = self._with_modular_bay(layout, tuple(drawn))
+                if made is not None:
+                    changes.append(made[0])
+                    layout = made[1]
+                    break
+                drawn.pop()
+        return (tuple(changes), layout) if changes else None
+
+    def _with_modular_bay(self, layout: Layout, drawn: tuple[tuple[int, int], ...]) -> tuple[RowChange, Layout] | None:
+        """Return the last of the drawn changes, each a bay and the number of bays inserted, and the layout with it."""
+        if drawn not in self._with_modules:
+            if len(self._with_modules) >= MAX_LAYOUTS_REMEMBERED:
+                self._with_modules.clear()
+            number, times = drawn[-1]
+            self._with_modules[drawn] = None
+            change = self.modular_bays[number].change(times)
+            with suppress(SlabError):
+                made = None if change is None else with_modular_bays(layout, change)
+                if change is not None and made is not None and self._is_within_limits(made):
+                    self._with_modules[drawn] = change, made
+        return self._with_modules[drawn]
+
     def _drawn_bays(self, rng: np.random.Generator) -> tuple[RowChange, Layout | None] | None:
-        """Return bays that are inserted between mirrored ends, or None where rows or circles are changed alone.
+        """Return bays that are inserted between mirrored ends, or None where others, rows or circles are changed alone.
 
         The layout with these bays comes with them, or None where it is not valid or exceeds the limits.
         """
         count = len(self.mirrored_bays)
         most = self._limits_of(MIRRORED_ENDS)[1] - MIRRORED_ENDS
-        if not count or most < 1 or rng.integers(count + len(self.circles) + len(self.rows)) >= count:
+        others = len(self.circles) + len(self.rows) + len({bay.axis for bay in self.modular_bays})
+        if not count or most < 1 or rng.integers(count + others) >= count:
             return None
         bay, times = int(rng.integers(count)), int(rng.integers(1, most + 1))
         if (bay, times) not in self._with_bays:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from stages.rows.layout import Layout, layout_of
 from stages.rows.mirrored_bays import MIRRORED_ENDS, MirroredBay, find_mirrored_bays
+from stages.rows.modular_bays import ModularBay, find_modular_bays
 from stages.rows.rows import Row, find_rows, is_visible
 from stages.rows.steps import bay_ends, bays_of
 from stages.rows.turns import Circle, find_circles
@@ -35,12 +37,15 @@ class KitRow:
     direction: str
     is_bay: bool = False
     is_mirrored: bool = False
+    is_modular: bool = False
 
     @property
     def sentence(self) -> str:
         """What the row is, such as `5 times board, along y`, or `bays between side, along x`."""
         names = [f"{count} {label}" if count > 1 else label for label, count in self.labels[:MAX_LABELS_SHOWN]]
         more = " and more" if len(self.labels) > MAX_LABELS_SHOWN else ""
+        if self.is_modular:
+            return f"bays of {', '.join(label for label, _ in self.labels[:MAX_LABELS_SHOWN])}{more}, {self.direction}"
         if self.is_bay:
             ends = ", ".join(label for label, _ in self.labels[:MAX_LABELS_SHOWN])
             return f"bays between {'mirrored ' if self.is_mirrored else ''}{ends}{more}, {self.direction}"
@@ -49,7 +54,7 @@ class KitRow:
 
 def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
     """Return the rows of all exemplars of a kit that can be seen: circles, then the longest along each direction, then
-    bays, those between mirrored ends last.
+    bays, those between mirrored ends last; bays of modules where these are missing.
     """
     found: list[KitRow] = []
     for exemplar in kit.exemplars:
@@ -62,11 +67,14 @@ def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
             if is_visible(layout, row.copied, row.count)
         ]
         bays = [_described_bay(kit, exemplar.name, layout, row) for row in along_bays]
-        mirrored = [
-            _described_mirrored(kit, exemplar.name, layout, bay)
-            for bay in find_mirrored_bays(layout, "xyz".index(kit.up))
-        ]
-        found += dict.fromkeys([*circles, *rows, *bays, *mirrored])
+        along_mirrored = find_mirrored_bays(layout, "xyz".index(kit.up))
+        mirrored = [_described_mirrored(kit, exemplar.name, layout, bay) for bay in along_mirrored]
+        modular: list[KitRow] = []
+        if not (circles or rows or bays):
+            free = {0, 1, 2} - {bay.axis for bay in along_mirrored}
+            longest = _longest(find_modular_bays(layout, free))
+            modular = [_described_modules(kit, exemplar.name, layout, bay) for bay in longest]
+        found += dict.fromkeys([*circles, *rows, *bays, *mirrored, *modular])
     return tuple(found)
 
 
@@ -107,6 +115,20 @@ def _described_mirrored(kit: Kit, exemplar: str, layout: Layout, bay: MirroredBa
     counts = Counter(kit.types[kind].label for kind in layout.types[bay.ends].tolist())
     ends, direction = tuple(counts.most_common()), f"along {'xyz'[bay.axis]}"
     return KitRow(exemplar, ends, MIRRORED_ENDS, direction, is_bay=True, is_mirrored=True)
+
+
+def _longest(bays: Sequence[ModularBay]) -> list[ModularBay]:
+    """Return of the bays along each axis the one of the longest row."""
+    by_axis: dict[int, ModularBay] = {}
+    for bay in sorted(bays, key=lambda bay: -bay.count):
+        by_axis.setdefault(bay.axis, bay)
+    return [by_axis[axis] for axis in sorted(by_axis)]
+
+
+def _described_modules(kit: Kit, exemplar: str, layout: Layout, bay: ModularBay) -> KitRow:
+    counts = Counter(kit.types[kind].label for kind in layout.types[bay.parts].tolist())
+    labels, direction = tuple(counts.most_common()), f"along {'xyz'[bay.axis]}"
+    return KitRow(exemplar, labels, bay.count, direction, is_bay=True, is_modular=True)
 
 
 def _direction(row: Row) -> str:

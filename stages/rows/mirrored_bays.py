@@ -7,17 +7,15 @@ nothing separates the two ends from each other, they are inserted as a pair.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from stages.rows.layout import VERTEX_REACH, Layout, sorted_edges
+from stages.rows.seams import kept_contacts, with_seams
 from stages.rows.slabs import APART, RowChange, Slab, SlabError, touch_all, with_copies
-from stages.rows.steps import MIN_END_SHARE, ROUNDING_DECIMALS
-from stages.shape.arrays import FloatArray
-from stages.shape.geometry.pose import relative_poses
-from stages.shape.stretch import STRETCHED_DEPTH
+from stages.rows.steps import MIN_END_SHARE, ROUNDING_DECIMALS, distinct_values
 
 MIRRORED_ENDS = 2
 """Ends of a shape between which bays are inserted; they count as a row of two parts."""
@@ -94,10 +92,10 @@ def _bays_along(layout: Layout, axis: int, is_longest: bool) -> list[MirroredBay
     low, high = layout.boxes[:, 0, axis], layout.boxes[:, 1, axis]
     middle, length = _middle(layout, axis), float(layout.extent[axis])
     found: list[MirroredBay] = []
-    for start in _apart(low[lower], 2.0 * layout.tolerance):
+    for start in distinct_values(low[lower], 2.0 * layout.tolerance):
         inner = lower[low[lower] >= start - layout.tolerance]
         thin = high[inner][high[inner] <= start + MAX_END_SHARE * length]
-        ends = [2.0 * middle - last for last in _apart(thin, 2.0 * layout.tolerance)]
+        ends = [2.0 * middle - last for last in distinct_values(thin, 2.0 * layout.tolerance)]
         for end in (*ends, 2.0 * middle - start):
             bay = _bay(layout, twins, axis, start, round(end, ROUNDING_DECIMALS), is_longest)
             if bay is not None:
@@ -179,60 +177,15 @@ def _inserted(slab: Slab, times: int) -> Layout:
     if len(slab.stretched):
         raise SlabError("a part that spans the bay is neither a prism there nor repeats itself")
     copied = np.flatnonzero(within)
-    made = with_copies(slab, copied, times, sorted_edges(list(_kept_contacts(slab, copied, times))))
+    made = with_copies(slab, copied, times, sorted_edges(list(kept_contacts(slab, copied, times))))
     number = np.concatenate([np.where(within, 0, -1), np.repeat(np.arange(1, times + 1), len(copied))])
-    made = _with_seams(made, number)
+    made = with_seams(made, number)
     degrees = np.bincount(made.edges.ravel(), minlength=len(made))
     if (degrees[number >= 0] == 0).any() or made.pieces().max() > layout.pieces().max():
         raise SlabError("a part of the bay would be held by nothing")
     if not touch_all(made, np.arange(len(made))):
         raise SlabError(APART)
     return made
-
-
-def _kept_contacts(slab: Slab, copied: np.ndarray, times: int) -> Iterator[tuple[int, int]]:
-    """Yield the contacts that copies and other parts keep: the first copy those before it, the last those beyond it."""
-    count = len(slab.layout)
-    index_of = np.full(count, -1, dtype=np.int64)
-    index_of[copied] = np.arange(len(copied))
-
-    def copy(part: int, number: int) -> int:
-        return part if number == 0 else count + (number - 1) * len(copied) + int(index_of[part])
-
-    for i, j in slab.layout.edges.tolist():
-        part, other = (i, j) if slab.within[i] else (j, i)
-        if not slab.within[part] or slab.before[other]:
-            yield part, other
-        elif slab.within[other]:
-            yield from ((copy(part, number), copy(other, number)) for number in range(times + 1))
-        elif slab.beyond[other]:
-            yield copy(part, times), other
-        else:  # it spans the bay
-            yield from ((copy(part, number), other) for number in range(times + 1))
-
-
-def _with_seams(made: Layout, number: np.ndarray) -> Layout:
-    """Return a layout with the contacts between bays. Raises SlabError where parts of two bays clash.
-
-    number: the bay of each part, 0 for the first, or -1 for parts of none, int64 (n,)
-    """
-    from stages.shape.geometry.contact import ContactTest, overlapping_boxes
-    from stages.shape.geometry.penetration import PenetrationTest
-
-    pairs = overlapping_boxes(made.boxes, made.tolerance)
-    pairs = pairs[(number[pairs[:, 0]] != number[pairs[:, 1]]) & (number[pairs] >= 1).any(axis=1)]
-    known = made.edges[:, 0].astype(np.int64) * len(made) + made.edges[:, 1]
-    pairs = pairs[~np.isin(pairs[:, 0].astype(np.int64) * len(made) + pairs[:, 1], known)]
-    contact, penetration = ContactTest(made.meshes, made.tolerance), PenetrationTest(made.meshes)
-    seams: list[tuple[int, int]] = []
-    for (i, j), pose in zip(pairs.tolist(), relative_poses(made.poses, pairs), strict=True):
-        if not contact.touches(i, j, pose):
-            continue
-        slack = STRETCHED_DEPTH * min(made.meshes[i].diagonal, made.meshes[j].diagonal)
-        if penetration.depth(i, j, pose) > made.tolerance + slack:
-            raise SlabError("parts of two bays clash")
-        seams.append((i, j))
-    return replace(made, edges=sorted_edges([*map(tuple, made.edges.tolist()), *seams]))
 
 
 def _twins(layout: Layout, axis: int) -> np.ndarray:
@@ -269,12 +222,3 @@ def _add_twins(layout: Layout, axis: int, axes: Sequence[int], twins: np.ndarray
 def _middle(layout: Layout, axis: int) -> float:
     """Return the middle of the box around a layout along an axis."""
     return float(layout.boxes[:, 0, axis].min() + layout.boxes[:, 1, axis].max()) / 2
-
-
-def _apart(values: FloatArray, gap: float) -> list[float]:
-    """Return values in ascending order, without those that follow another by at most a gap."""
-    kept: list[float] = []
-    for value in np.sort(np.round(values, ROUNDING_DECIMALS)).tolist():
-        if not kept or value - kept[-1] > gap:
-            kept.append(value)
-    return kept

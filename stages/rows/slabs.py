@@ -12,6 +12,7 @@ The slab of a bay is whole: what occurs once in it is copied too, such as the do
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -55,6 +56,7 @@ class RowChange:
     times: number of periods inserted, or -1 for one that is removed
     is_bay: whether a period holds everything in the slab, also what occurs once
     is_mirrored: whether the ends of the bay are mirror images, or turned by 180 degrees, instead of translates
+    is_modular: whether the bay is between planes that cut modules in the same way
     """
 
     normal: FloatArray
@@ -63,6 +65,7 @@ class RowChange:
     times: int
     is_bay: bool = False
     is_mirrored: bool = False
+    is_modular: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -510,16 +513,21 @@ def with_copies(slab: Slab, copied: np.ndarray, times: int, edges: IntArray) -> 
 
 def removed(slab: Slab) -> Layout:
     """Return the layout without the parts of a valid slab, those beyond it one step nearer."""
+    edges = [(i, j) for i, j in slab.layout.edges.tolist() if not (slab.within[i] or slab.within[j])]
+    for i, j in slab.layout.edges.tolist():
+        for part, other in ((i, j), (j, i)):
+            if slab.within[part] and slab.before[other]:
+                edges.append((int(slab.mates[part]), other))
+    return without(slab, edges)
+
+
+def without(slab: Slab, edges: Sequence[tuple[int, int]]) -> Layout:
+    """Return the layout without the parts of a slab, and with these contacts of the other parts."""
     layout = slab.layout
     meshes, poses = _moved(slab, -1)
     kept = np.flatnonzero(~slab.within)
     index_of = np.full(len(layout), -1, dtype=np.int64)
     index_of[kept] = np.arange(len(kept))
-    edges = [(i, j) for i, j in layout.edges.tolist() if not (slab.within[i] or slab.within[j])]
-    for i, j in layout.edges.tolist():
-        for part, other in ((i, j), (j, i)):
-            if slab.within[part] and slab.before[other]:
-                edges.append((int(slab.mates[part]), other))
     shorter = replace(
         layout,
         meshes=tuple(meshes[part] for part in kept.tolist()),

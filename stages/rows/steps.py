@@ -200,3 +200,12 @@ def _shifts(layout: Layout, max_share: float = MAX_STEP_SHARE) -> FloatArray:
     is_short = np.take_along_axis(shares, largest[:, None], axis=1)[:, 0] <= max_share
     usable: FloatArray = shifts[is_positive & is_short & (lengths > MIN_STEP_TOLERANCES * layout.mate_tolerance)]
     return usable
+
+
+def distinct_values(values: FloatArray, gap: float) -> list[float]:
+    """Return values in ascending order, without those that follow another by at most a gap."""
+    kept: list[float] = []
+    for value in np.sort(np.round(values, ROUNDING_DECIMALS)).tolist():
+        if not kept or value - kept[-1] > gap:
+            kept.append(value)
+    return kept

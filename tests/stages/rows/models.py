@@ -316,3 +316,34 @@ def casement() -> tuple[Kit, Layout]:
     leaves = [("leaf", pose(x, 0.5, 0.0)) for x in (-0.45, 0.45)]
     hinges = [("hinge", pose(-0.9, 0.4, 0.05)), ("other hinge", pose(0.9, 0.4, 0.05))]
     return layout(meshes, [*rails, *leaves, *hinges])
+
+
+@cache
+def tower(storeys: int = 4, has_door: bool = False) -> tuple[Kit, Layout]:
+    """Storeys of four tiles and four walls under a roof. No wall stands above one with an equal opening."""
+    xs, ys = [-0.4, -0.2, 0.2, 0.4], [-0.45, -0.2, 0.2, 0.45]
+    openings: dict[str, list[int]] = {"wall": [], "window": [1], "vent": [2], "hatch": [0], "door": [0, 1]}
+    meshes = {}
+    for name, opened in openings.items():
+        solid = np.ones((3, 3), dtype=bool)
+        solid[1, opened] = False
+        meshes[name] = plate(xs, ys, 0.1, solid)
+    meshes |= {"tile": box(0.45, 0.1, 0.45), "roof": box(1.3, 0.2, 1.3)}
+    placed: list[Placed] = [("roof", pose(0.0, storeys + 0.1, 0.0))]
+    for storey in range(storeys):
+        placed += [("tile", pose(x, storey + 0.05, z)) for x in (-0.225, 0.225) for z in (-0.225, 0.225)]
+        for number, (x, z) in enumerate([(0.0, -0.4), (0.4, 0.0), (0.0, 0.4), (-0.4, 0.0)]):
+            name = ("wall", "window", "vent", "hatch")[(number + storey) % 4]
+            is_door = has_door and storey == number == 0
+            placed.append(("door" if is_door else name, pose(x, storey + 0.55, z, quarter_turns=number)))
+    return layout(meshes, placed)
+
+
+@cache
+def zigzag_roof() -> tuple[Kit, Layout]:
+    """Four boxes in a row under wedges that rise and fall in turn."""
+    rising = trimesh.Trimesh([(x, y, z) for z in (-0.5, 0.5) for x, y in ((0, 0), (1, 0), (1, 1))]).convex_hull
+    falling = trimesh.Trimesh([(x, y, z) for z in (-0.5, 0.5) for x, y in ((0, 0), (1, 0), (0, 1))]).convex_hull
+    boxes = [("base", pose(number + 0.5, -0.5, 0.0)) for number in range(4)]
+    roofs = [("falling" if number % 2 else "rising", pose(float(number), 0.0, 0.0)) for number in range(4)]
+    return layout({"base": box(1.0, 1.0, 1.0), "rising": rising, "falling": falling}, [*boxes, *roofs])
