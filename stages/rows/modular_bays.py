@@ -292,10 +292,15 @@ class _Overlaps:
         return _sizes(self._layout)
 
     def _measured(self, low: int, high: int) -> float:
-        from stages.shape.geometry.penetration import PenetrationTest
+        from stages.shape.geometry.penetration import PenetrationTest, depth_bound
 
-        sizes = np.sort(self._sizes[self._layout.edges], axis=1)
-        pairs = self._layout.edges[(sizes == (low, high)).all(axis=1)]
-        test = PenetrationTest(self._layout.meshes)
-        poses = relative_poses(self._layout.poses, pairs)
-        return max((test.depth(i, j, pose) for (i, j), pose in zip(pairs.tolist(), poses, strict=True)), default=0.0)
+        layout = self._layout
+        pairs = layout.edges[(np.sort(self._sizes[layout.edges], axis=1) == (low, high)).all(axis=1)]
+        test, deepest = PenetrationTest(layout.meshes), 0.0
+        measured = set[tuple[int, int, bytes]]()
+        for (i, j), pose in zip(pairs.tolist(), relative_poses(layout.poses, pairs), strict=True):
+            key = id(layout.meshes[i]), id(layout.meshes[j]), np.rint(pose / layout.mate_tolerance).tobytes()
+            if key not in measured and depth_bound(layout.boxes[i], layout.boxes[j]) > deepest:
+                measured.add(key)
+                deepest = max(deepest, test.depth(i, j, pose))
+        return deepest

@@ -40,10 +40,10 @@ def with_seams(made: Layout, number: np.ndarray, overlap: Callable[[int, int], f
     """Return a layout with the contacts between bays. Raises SlabError where parts of two bays clash.
 
     number: the bay of each part, 0 for the first, or -1 for parts of none, int64 (n,)
-    overlap: how deep two parts may overlap, in the layout's units, beyond what resized parts may
+    overlap: how deep two parts may overlap, in units, where that is more than resized parts may
     """
     from stages.shape.geometry.contact import ContactTest, overlapping_boxes
-    from stages.shape.geometry.penetration import PenetrationTest
+    from stages.shape.geometry.penetration import PenetrationTest, depth_bound
 
     pairs = overlapping_boxes(made.boxes, made.tolerance)
     pairs = pairs[(number[pairs[:, 0]] != number[pairs[:, 1]]) & (number[pairs] >= 1).any(axis=1)]
@@ -54,8 +54,10 @@ def with_seams(made: Layout, number: np.ndarray, overlap: Callable[[int, int], f
     for (i, j), pose in zip(pairs.tolist(), relative_poses(made.poses, pairs), strict=True):
         if not contact.touches(i, j, pose):
             continue
-        depth = penetration.depth(i, j, pose) - made.tolerance
-        if depth > STRETCHED_DEPTH * min(made.meshes[i].diagonal, made.meshes[j].diagonal) and depth > overlap(i, j):
-            raise SlabError(CLASH)
+        allowed = made.tolerance + STRETCHED_DEPTH * min(made.meshes[i].diagonal, made.meshes[j].diagonal)
+        if depth_bound(made.boxes[i], made.boxes[j]) > allowed:
+            depth = penetration.depth(i, j, pose)
+            if depth > allowed and depth > made.tolerance + overlap(i, j):
+                raise SlabError(CLASH)
         seams.append((i, j))
     return replace(made, edges=sorted_edges([*map(tuple, made.edges.tolist()), *seams]))
