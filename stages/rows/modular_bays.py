@@ -24,10 +24,10 @@ SECTION_CELLS = 64
 """Cells along each side of the section of a shape with a plane."""
 CELL_ROUNDING = 1e-6
 """Part of a cell that rounding may add or take away."""
-MIN_EQUAL_SECTION = 0.9
+MIN_EQUAL_SECTION = 0.95
 """Share of the cells of either of two sections that both fill, from which they are equal."""
-MAX_REACH_SHARE = 0.25
-"""Parts that no module stands in for reach over an end of a bay by at most this share of it."""
+MAX_UNMATCHED_SECTION = 0.1
+"""Share of a section that may be of parts that no module stands in for at the other end of the bay."""
 MIN_BAY_AREA_SHARE = 0.005
 """Share of a shape's surface from which what a bay holds can be seen."""
 MAX_STEPS_PER_AXIS = 6
@@ -123,23 +123,35 @@ class _Sections:
                 return False
         return True
 
+    def share_of(self, parts: BoolArray, at: float) -> float:
+        """Return what share of a section is of some of the parts that cross the plane."""
+        crossing = self._cells(np.flatnonzero(parts & self._crosses(at)), at)
+        return float(crossing.sum()) / max(int((crossing | self._filled(at, False)).sum()), 1)
+
+    def _crosses(self, at: float) -> BoolArray:
+        crosses: BoolArray = (self._low < at - self._tolerance) & (self._high > at + self._tolerance)
+        return crosses
+
     def _filled(self, at: float, is_after: bool) -> BoolArray:
-        """Return the cells in the boxes of the parts' sections, bool (SECTION_CELLS, SECTION_CELLS)."""
+        """Return the cells of what crosses a plane, and begins or ends at it, bool (SECTION_CELLS, SECTION_CELLS)."""
         key = round(at, ROUNDING_DECIMALS), is_after
         if key not in self._known:
             edge = self._low if is_after else self._high
-            crossing = (self._low < at - self._tolerance) & (self._high > at + self._tolerance)
-            parts = np.flatnonzero(crossing | (np.abs(edge - at) <= self._tolerance)).tolist()
-            low = self._layout.boxes[:, 0].min(axis=0)[self._across]
-            cells = SECTION_CELLS / np.maximum(self._layout.extent[self._across], 1e-12)
-            filled: BoolArray = np.zeros((SECTION_CELLS, SECTION_CELLS), dtype=bool)
-            for part in parts:
-                points = (self._cut(part, at) - low) * cells
-                i, j = np.floor(points.min(axis=0) + CELL_ROUNDING).astype(np.int64).clip(0, SECTION_CELLS - 1).tolist()
-                k, m = np.ceil(points.max(axis=0) - CELL_ROUNDING).astype(np.int64).tolist()
-                filled[i : max(k, i + 1), j : max(m, j + 1)] = True
-            self._known[key] = filled
+            parts = np.flatnonzero(self._crosses(at) | (np.abs(edge - at) <= self._tolerance))
+            self._known[key] = self._cells(parts, at)
         return self._known[key]
+
+    def _cells(self, parts: np.ndarray, at: float) -> BoolArray:
+        """Return the cells in the boxes around the parts' sections, bool (SECTION_CELLS, SECTION_CELLS)."""
+        low = self._layout.boxes[:, 0].min(axis=0)[self._across]
+        cells = SECTION_CELLS / np.maximum(self._layout.extent[self._across], 1e-12)
+        filled: BoolArray = np.zeros((SECTION_CELLS, SECTION_CELLS), dtype=bool)
+        for part in parts.tolist():
+            points = (self._cut(part, at) - low) * cells
+            i, j = np.floor(points.min(axis=0) + CELL_ROUNDING).astype(np.int64).clip(0, SECTION_CELLS - 1).tolist()
+            k, m = np.ceil(points.max(axis=0) - CELL_ROUNDING).astype(np.int64).tolist()
+            filled[i : max(k, i + 1), j : max(m, j + 1)] = True
+        return filled
 
     def _cut(self, part: int, at: float) -> FloatArray:
         """Return where edges of a part cross a plane, and its vertices there, float64 (k, 2)."""
@@ -221,11 +233,9 @@ def _fault(slab: Slab, sections: _Sections) -> str | None:
         return "the shape is not cut in the same way at both ends of the bay"
     if (within & (slab.high - slab.low > length + tolerance)).any():
         return "a part is longer than the bay that it is copied with"
-    reach = MAX_REACH_SHARE * length
-    if (within & (slab.high > slab.at + reach) & (slab.previous < 0)).any():
-        return "a part that nothing stands in for reaches far beyond the bay"
-    if (before & (slab.high > slab.start + reach) & (slab.mates < 0)).any():
-        return "a part that nothing stands in for reaches far into the bay"
+    unmatched = (within & (slab.previous < 0), slab.at), (before & (slab.mates < 0), slab.start)
+    if any(sections.share_of(parts, at) > MAX_UNMATCHED_SECTION for parts, at in unmatched):
+        return "parts that no module stands in for cross an end of the bay"
     i, j = slab.both_ways
     if (before[i] & slab.beyond[j]).any():
         return "parts before and after the bay touch"
