@@ -148,6 +148,8 @@ class _Sections:
         filled: BoolArray = np.zeros((SECTION_CELLS, SECTION_CELLS), dtype=bool)
         for part in parts.tolist():
             points = (self._cut(part, at) - low) * cells
+            if not len(points):  # the part is in several pieces, and the plane passes between them
+                continue
             i, j = np.floor(points.min(axis=0) + CELL_ROUNDING).astype(np.int64).clip(0, SECTION_CELLS - 1).tolist()
             k, m = np.ceil(points.max(axis=0) - CELL_ROUNDING).astype(np.int64).tolist()
             filled[i : max(k, i + 1), j : max(m, j + 1)] = True

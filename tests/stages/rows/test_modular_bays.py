@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from stages.proportions.text import ProportionError, Proportions, ProportionShapes, proportion_text, read_proportions
 from stages.proportions.warp_check import warp_fault
@@ -20,6 +21,7 @@ from stages.rows.slabs import RowChange, SlabError
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Kit
 from tests.stages.rows import models
+from tests.toy_kits.chains_and_rings import box, pose
 
 UP_AXIS = 1
 
@@ -107,6 +109,16 @@ def test_a_part_that_reaches_across_bars_a_bay() -> None:
     poses = layout.poses.copy()
     poses[roof, :3, 3] = [0.0, 2.05, 0.0]  # in the middle of the tower: no plane cuts it as another one does
     assert not [bay for bay in storeys_of(replace(layout, poses=poses)) if bay.start < 2.0 < bay.end]
+
+
+def test_a_part_in_two_pieces_fills_nothing_between_them() -> None:
+    meshes = {"stone": box(1.0, 1.0, 1.0), "pair": box(1.0, 0.2, 1.0)}
+    meshes["pair"] = trimesh.util.concatenate([meshes["pair"].copy().apply_translation([0, y, 0]) for y in (-1.4, 1.4)])
+    stones = [("stone", pose(0.0, y, 0.0)) for y in (-1.0, 0.0, 1.0)]
+    kit, layout = models.layout(meshes, [*stones, ("pair", pose(1.0, 0.0, 0.0))])
+    found = find_modular_bays(layout)
+    assert [(bay.axis, round(bay.end, 3)) for bay in found] == [(UP_AXIS, 0.5)]
+    check(kit, with_modular_bays(layout, stated(found[0], 1)))
 
 
 def test_draws_are_deterministic_keep_to_their_limits_and_json_keeps_them() -> None:
