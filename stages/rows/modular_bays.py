@@ -28,6 +28,8 @@ MIN_EQUAL_SECTION = 0.95
 """Share of the cells of either of two sections that both fill, from which they are equal."""
 MAX_UNMATCHED_SECTION = 0.1
 """Share of a section that may be of parts that no module stands in for at the other end of the bay."""
+MAX_DEGREE_RATIO = 1.25
+"""Ratio up to which a part may touch more others than any part of its size, or fewer."""
 MIN_BAY_AREA_SHARE = 0.005
 """Share of a shape's surface from which what a bay holds can be seen."""
 MAX_STEPS_PER_AXIS = 6
@@ -275,14 +277,30 @@ def _removed(slab: Slab) -> Layout:
 def _joined(slab: Slab, made: Layout, number: np.ndarray, spanning: np.ndarray) -> Layout:
     """Return a layout with the contacts across its seams. number: as of `with_seams`; spanning: int64 (k,)"""
     joined = with_seams(made, number, _Overlaps(made).deepest)
-    had_none = np.bincount(slab.layout.edges.ravel(), minlength=len(slab.layout)).min() == 0
-    if not had_none and np.bincount(joined.edges.ravel(), minlength=len(joined)).min() == 0:
-        raise SlabError("a part would be held by nothing")
+    if not _have_usual_degrees(slab.layout, joined):
+        raise SlabError("a part would touch far more or far fewer others than parts of its size do")
     if joined.pieces().max() > slab.layout.pieces().max():
         raise SlabError("the shape would fall apart")
     if not touch_all(joined, spanning):
         raise SlabError(APART)
     return joined
+
+
+def _have_usual_degrees(layout: Layout, made: Layout) -> bool:
+    """Return whether no part touches far more or far fewer others than the parts of a layout do that have its size.
+
+    The corners of a closed road do not become crossings, and no road ends where another tile led on.
+    """
+    sizes = _sizes(layout)
+    degrees, new_degrees = (np.bincount(shape.edges.ravel(), minlength=len(shape)) for shape in (layout, made))
+    least, most = np.full(len(layout), len(made)), np.zeros(len(layout), dtype=np.int64)
+    np.minimum.at(least, sizes, degrees)
+    np.maximum.at(most, sizes, degrees)
+    index_of = np.zeros(int(layout.origins.max()) + 1, dtype=np.int64)
+    index_of[layout.origins] = np.arange(len(layout))
+    own = sizes[index_of[made.origins]]
+    is_usual = (MAX_DEGREE_RATIO * new_degrees >= least[own]) & (new_degrees <= MAX_DEGREE_RATIO * most[own])
+    return bool(is_usual.all())
 
 
 class _Overlaps:

@@ -14,14 +14,14 @@ from stages.proportions.warp_check import warp_fault
 from stages.rows.changes import change_json, changed, read_change
 from stages.rows.draws import LayoutDraws
 from stages.rows.kit_rows import rows_of_kit
-from stages.rows.layout import Layout
+from stages.rows.layout import Layout, layout_of
 from stages.rows.modular_bays import ModularBay, find_modular_bays, with_modular_bays
 from stages.rows.settings import RowsConfig
 from stages.rows.slabs import RowChange, SlabError
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Kit
 from tests.stages.rows import models
-from tests.toy_kits.chains_and_rings import box, pose
+from tests.toy_kits.chains_and_rings import ROAD, box, kit_of, pose, ring
 
 UP_AXIS = 1
 
@@ -109,6 +109,11 @@ def test_a_part_that_reaches_across_bars_a_bay() -> None:
     poses = layout.poses.copy()
     poses[roof, :3, 3] = [0.0, 2.05, 0.0]  # in the middle of the tower: no plane cuts it as another one does
     assert not [bay for bay in storeys_of(replace(layout, poses=poses)) if bay.start < 2.0 < bay.end]
+
+
+def test_a_closed_road_gets_no_road_across_and_is_not_opened() -> None:
+    kit = kit_of(ROAD, [ring(1, 1)], ("point", "line", "face"))
+    assert not find_modular_bays(layout_of(kit, kit.exemplars[0]))
 
 
 def test_a_part_in_two_pieces_fills_nothing_between_them() -> None:
