@@ -46,9 +46,9 @@ class SurfacePiece:
 def repeated_pieces(vertices: FloatArray, faces: IntArray) -> list[SurfacePiece]:
     """Cut a mesh, vertices (v, 3) and faces (f, 3), between the copies of what repeats.
 
-    Equal pieces are one, with all their poses; a mesh without repetition is one piece. Repetitions are taken in the
-    order of the surface that they save, as long as distinct pieces lose more than PART_COST of the surface each. Two
-    repetitions that cross cut the pieces of a 2-grid. Triangles without area are left out.
+    Equal pieces are one, with all their poses; a mesh without repetition is one piece. The repetition that saves most
+    is taken first, as long as distinct pieces lose more than PART_COST of the surface each. Two repetitions that cross
+    cut the pieces of a 2-grid. Triangles without area are left out.
     """
     corners = vertices[faces]
     grid = surface_grid(corners, RADIUS_SHARE)
@@ -82,16 +82,27 @@ def _grid_of_piece(grid: SurfaceGrid, piece: SurfacePiece) -> SurfaceGrid:
 def _searched(
     piece: SurfacePiece, others: list[SurfacePiece], grid: SurfaceGrid, whole_area: float, cost: float
 ) -> tuple[list[SurfacePiece], float]:
-    """Cut a piece by what it repeats; return it with the other pieces, and the cost of all."""
+    """Cut a piece by what it repeats; return it with the other pieces, and the cost of all.
+
+    The repetition that lowers the cost most comes first. One that does not lower it is not tried again.
+    """
     pieces = [piece]
-    for repetition in find_repetitions(grid)[:MAX_TRIED_REPETITIONS]:
-        cut = [part for known in pieces for part in _cut(known, grid, repetition)]
-        every = [*others, *cut]
-        area = sum(known.triangles.area for known in every)
-        price = area / whole_area + PART_COST * sum(len(known.poses) for known in every)
-        if price < MAX_COST_RATIO * cost:
-            pieces, cost = cut, price
+    waiting = find_repetitions(grid)[:MAX_TRIED_REPETITIONS]
+    while waiting:
+        cuts = [[part for known in pieces for part in _cut(known, grid, repetition)] for repetition in waiting]
+        prices = [_price([*others, *cut], whole_area) for cut in cuts]
+        best = int(np.argmin(prices))
+        if prices[best] >= MAX_COST_RATIO * cost:
+            break
+        waiting = [waiting[n] for n in range(len(waiting)) if n != best and prices[n] < MAX_COST_RATIO * cost]
+        pieces, cost = cuts[best], prices[best]
     return [*others, *pieces], cost
+
+
+def _price(pieces: list[SurfacePiece], whole_area: float) -> float:
+    """Return the cost of pieces: their surface without copies, as a share of the whole, and PART_COST for each copy."""
+    area = sum(piece.triangles.area for piece in pieces)
+    return area / whole_area + PART_COST * sum(len(piece.poses) for piece in pieces)
 
 
 def _cut(piece: SurfacePiece, grid: SurfaceGrid, repetition: Repetition) -> list[SurfacePiece]:
@@ -99,8 +110,8 @@ def _cut(piece: SurfacePiece, grid: SurfaceGrid, repetition: Repetition) -> list
     rest = piece.triangles
     cut: list[tuple[SurfacePiece, FloatArray]] = []
     for pose in repetition.poses:
-        inside, rest = carve(rest, grid, repetition.band, pose)
-        if repetition.ahead is not None:
+        inside, rest = carve(rest, grid, repetition.band, pose, repetition.planes)
+        if repetition.ahead is not None and repetition.planes is None:
             beyond, inside = carve(inside, grid, repetition.band, pose @ repetition.ahead)
             rest = join_soups(rest, beyond)
         if inside.area <= ROUNDING_SHARE * grid.area.sum():

@@ -14,7 +14,7 @@ from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.connected_faces import connected_faces
 from stages.shape.geometry.pose import rotation_angle
 from stages.symmetry.surface.grid import SurfaceGrid
-from stages.symmetry.surface.soup import Soup, join_soups
+from stages.symmetry.surface.soup import Soup, cut_by_plane, join_soups
 from stages.symmetry.surface.welding import weld
 
 MIN_COPIES_PER_ROW = 3
@@ -89,33 +89,6 @@ def chunks_along(copy: Soup, row: CopyRow, rest: Soup, grid: SurfaceGrid) -> tup
         runner = join_soups(before, after)
         chunks.append(chunk)
     return chunks, join_soups(left, runner)
-
-
-def cut_by_plane(soup: Soup, normal: FloatArray, offset: float) -> tuple[Soup, Soup]:
-    """Cut triangles by the plane `normal` (3,) times x = `offset`; return the parts below and above."""
-    height = soup.corners @ normal - offset
-    above = height > 0
-    crossing: BoolArray = np.asarray(above.any(axis=1) & ~above.all(axis=1))
-    cut = soup.select(crossing)
-    height, above = height[crossing], above[crossing]
-    two_above = above.sum(axis=1) == 2
-    alone = np.where(two_above, above.argmin(axis=1), above.argmax(axis=1))
-    turn = (alone[:, None] + np.arange(3)) % 3
-    tips = np.take_along_axis(cut.corners, turn[..., None], axis=1)
-    height = np.take_along_axis(height, turn, axis=1)
-    share = (height[:, :1] / (height[:, :1] - height[:, 1:]))[..., None]
-    seam = tips[:, :1] + share * (tips[:, 1:] - tips[:, :1])
-    tip = np.stack([tips[:, 0], seam[:, 0], seam[:, 1]], axis=1)
-    one = np.stack([seam[:, 0], tips[:, 1], tips[:, 2]], axis=1)
-    other = np.stack([seam[:, 0], tips[:, 2], seam[:, 1]], axis=1)
-    pieces = Soup(np.concatenate([tip, one, other]), np.tile(cut.faces, 3))
-    beyond = np.concatenate([~two_above, two_above, two_above])
-    real = pieces.areas > 0
-    whole: BoolArray = np.asarray((soup.corners @ normal > offset).all(axis=1))
-    return (
-        join_soups(soup.select(~whole & ~crossing), pieces.select(real & ~beyond)),
-        join_soups(soup.select(whole), pieces.select(real & beyond)),
-    )
 
 
 def _components(soup: Soup, tolerance: float) -> IntArray:

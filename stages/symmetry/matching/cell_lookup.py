@@ -65,6 +65,8 @@ def items_moved_into(grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> np
     Only items in the box around the moved centres are tested: no point of a cell is farther from its centre than the
     width of a cell.
     """
+    if not len(cells):
+        return np.empty(0, dtype=np.int64)
     centres = transform_points(pose, grid.centres(cells))
     home = np.ascontiguousarray(((centres - grid.origin) / grid.cell_size).T)
     low, high = np.floor(home.min(axis=1)) - 1, np.floor(home.max(axis=1)) + 1

@@ -16,11 +16,12 @@ from stages.symmetry.matching.cell_lookup import is_among, items_in, items_moved
 from stages.symmetry.matching.docking_sites import FREE_SLIPS, connected_regions, find_docking_sites
 from stages.symmetry.matching.r_symmetry import matched_items, r_symmetric_cells
 from stages.symmetry.surface.grid import SurfaceGrid
+from stages.symmetry.surface.soup import PlanePair
 
 MAX_TRANSFORMS = 40
 MAX_CELL_TESTS = 16_000_000
 """Cells tested in all, once per transform: large grids are searched with fewer transforms."""
-MAX_SEEDS = 16
+MAX_SEEDS = 32
 """Regions whose copies are searched, the most promising first."""
 MAX_COPIES = 400
 """Copies searched per region."""
@@ -50,13 +51,15 @@ BAND_CELLS = 3
 class Repetition:
     """A region of the surface and its copies.
 
-    A copy is what lies in its band and not in the band of the copy ahead, so that all copies have the same border.
+    A copy is the part of its band between two planes. Without planes, it is the part that is not in the band of the
+    copy ahead. So all copies have the same border.
 
     cells: int32, of the region, ascending
     area: of the region
     poses: float64 (4, 4) each, of the copies, the identity first
     ahead: float64 (4, 4), from one copy of a row to the next; None for separate copies
     band: int32, the cells and, in a row, some beyond the far border
+    planes: around the first copy, across a straight row; None for separate copies and where no plane fits all copies
     """
 
     cells: IntArray
@@ -64,6 +67,7 @@ class Repetition:
     poses: tuple[FloatArray, ...]
     ahead: FloatArray | None
     band: IntArray
+    planes: PlanePair | None
 
     @property
     def saved_area(self) -> float:
@@ -104,11 +108,12 @@ def _seeds(grid: SurfaceGrid, transform: FloatArray) -> Iterator[tuple[IntArray,
 
 
 def _is_known(grid: SurfaceGrid, cells: IntArray, ahead: FloatArray | None, known: Repetition) -> bool:
-    """Return whether a region lies in copies of a known one, and the transform ahead takes copies to copies."""
+    """Return whether a region lies in copies of a known one, and the transform ahead takes a copy to a copy."""
     corners = grid.points[_sample(grid, items_in(grid, known.cells))[[0, -1]]]
     if ahead is not None:
-        moved = transform_points(ahead, corners)
-        if min(float(np.abs(transform_points(pose, corners) - moved).max()) for pose in known.poses) > grid.cell_size:
+        copies = np.array([transform_points(pose, corners) for pose in known.poses])
+        moved = np.array([transform_points(ahead, corners) for corners in copies])
+        if np.abs(copies[:, None] - moved).max(axis=(2, 3)).min() > grid.cell_size:
             return False
     points = grid.points[items_in(grid, known.cells)]
     keys = np.sort(np.concatenate([keys_at(grid, pose, points) for pose in known.poses]))
@@ -197,7 +202,8 @@ def _repetition(
     cells = np.sort(np.concatenate(whole)).astype(np.int32)
     if not _continues(grid, cells, poses[1:], ahead):
         return None
-    return Repetition(cells, float(grid.area[cells].sum()), tuple(poses), ahead, _band(grid, cells, ahead))
+    band, planes = _planes(grid, cells, poses, ahead) or (_band(grid, cells, ahead), None)
+    return Repetition(cells, float(grid.area[cells].sum()), tuple(poses), ahead, band, planes)
 
 
 def _copies(
@@ -224,7 +230,7 @@ def _copies(
         tried = np.concatenate([tried, at])
         if _share(matched_items(grid, pose, sample)) <= MIN_COPY_SHARE:
             continue
-        same = _same_cells(grid, cells, items, pose)
+        same = _same_cells(grid, cells, items, pose, MIN_COPY_SHARE)
         if same is None:
             continue
         if len(tried) > 1:
@@ -262,22 +268,24 @@ def _share(chosen: BoolArray) -> float:
     return np.count_nonzero(chosen) / len(chosen)
 
 
-def _same_cells(grid: SurfaceGrid, cells: IntArray, items: np.ndarray, pose: FloatArray) -> BoolArray | None:
+def _same_cells(
+    grid: SurfaceGrid, cells: IntArray, items: np.ndarray, pose: FloatArray, min_share: float
+) -> BoolArray | None:
     """Return which of ascending `cells` with these `items` the surface has at a pose (4, 4) exactly, bool (n,).
 
-    None if they are at most MIN_COPY_SHARE of the region.
+    None if they are at most `min_share` of the region.
     """
     area = grid.area[cells]
     same = np.ones(len(cells), dtype=bool)
     missed = items[~matched_items(grid, pose, items)]
     same[np.searchsorted(cells, grid.item_cell[missed])] = False
-    if area[same].sum() <= MIN_COPY_SHARE * area.sum():
+    if area[same].sum() <= min_share * area.sum():
         return None  # before the slower half: what else lies there
     back = invert(pose)
     present = items_moved_into(grid, cells, pose)
     more = present[~matched_items(grid, back, present)]
     same[np.searchsorted(grid.keys[cells], keys_at(grid, back, grid.points[more]))] = False
-    return same if area[same].sum() > MIN_COPY_SHARE * area.sum() else None
+    return same if area[same].sum() > min_share * area.sum() else None
 
 
 def _inside(grid: SurfaceGrid, cells: IntArray) -> IntArray:
@@ -314,3 +322,44 @@ def _band(grid: SurfaceGrid, cells: IntArray, ahead: FloatArray | None) -> IntAr
         band[grid.neighbours[np.flatnonzero(band)]] = True
         band &= taken  # which has no empty neighbour
     return np.flatnonzero(band).astype(np.int32)
+
+
+def _planes(
+    grid: SurfaceGrid, cells: IntArray, poses: Sequence[FloatArray], ahead: FloatArray | None
+) -> tuple[IntArray, PlanePair] | None:
+    """Return the band and the planes of the first copy in a straight row.
+
+    None for other copies, and if no plane across the row fits all of them.
+
+    The border of a region follows, cell by cell, what differs at the end of the row. Cells do not move with the copies
+    of a row that crosses it, so that each of those copies gets another border. A plane cuts all of them in the same
+    way. It may be anywhere the surface up to one step ahead is the same for every pose; the middle is taken.
+    """
+    if ahead is None or rotation_angle(ahead) > NO_TURN_RADIANS:
+        return None
+    step = float(np.linalg.norm(ahead[:3, 3]))
+    direction = ahead[:3, 3] / step
+    behind, beyond = (_next_copy(grid, cells, way) for way in (invert(ahead), ahead))
+    row = np.unique(np.concatenate([behind, cells, beyond]))
+    items = items_in(grid, row)
+    differs = np.zeros(len(grid), dtype=bool)
+    for pose in poses[1:]:
+        same = _same_cells(grid, row, items, pose, 0.0)
+        differs[row] |= True if same is None else ~same
+    height = grid.centres() @ direction
+    reach = grid.cell_size * float(np.abs(direction).sum()) / 2
+    low, high = height[cells].min() - step / 2, height[cells].max() - step / 2
+    low = max(low, float(height[behind[differs[behind]]].max(initial=-np.inf)) + reach)
+    high = min(high, float(height[beyond[differs[beyond]]].min(initial=np.inf)) - reach - step)
+    if low > high:
+        return None
+    planes = PlanePair(direction, (low + high) / 2, (low + high) / 2 + step)
+    return row[(height[row] > planes.low - reach) & (height[row] < planes.high + reach)], planes
+
+
+def _next_copy(grid: SurfaceGrid, cells: IntArray, step: FloatArray) -> IntArray:
+    """Return the cells of a region moved by `step` (4, 4), without the region, with the joint between both: int32."""
+    region, moved = np.zeros((2, len(grid) + 1), dtype=bool)  # the last entry stands for empty neighbours
+    region[cells] = moved[grid.item_cell[items_moved_into(grid, cells, step)]] = True
+    moved[:-1] |= region[grid.neighbours].any(axis=1) & moved[grid.neighbours].any(axis=1)
+    return np.flatnonzero(moved & ~region).astype(np.int32)

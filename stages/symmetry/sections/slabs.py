@@ -8,10 +8,9 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.symmetry.pieces import MIN_PART_SHARE, RADIUS_SHARE, SurfacePiece
-from stages.symmetry.rows import cut_by_plane
 from stages.symmetry.sections.parallel_cuts import SAME_POINT_SHARE, ParallelCuts, find_parallel_cuts
 from stages.symmetry.surface.grid import CELLS_PER_RADIUS, has_area
-from stages.symmetry.surface.soup import Soup, connected_soups, join_soups, soups_match
+from stages.symmetry.surface.soup import Soup, connected_soups, cut_by_plane, join_soups, soups_match
 
 MAX_SLABS = 500
 """A family of planes that would make more slabs is not used."""

@@ -1,4 +1,4 @@
-"""Triangle soups of the original surface, cut along the borders of cells (symmetry §4)."""
+"""Triangle soups of the original surface, cut along the borders of cells (symmetry §4) or by planes."""
 
 from __future__ import annotations
 
@@ -59,11 +59,39 @@ class Soup:
         return float(self.areas.sum())
 
 
-def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> tuple[Soup, Soup]:
+@dataclass(frozen=True)
+class PlanePair:
+    """Two parallel planes, where `normal` times x equals `low` or `high`.
+
+    normal: float64 (3,), unit length
+    low, high: offsets, ascending
+    """
+
+    normal: FloatArray
+    low: float
+    high: float
+
+    def moved(self, pose: FloatArray) -> PlanePair:
+        """Return the planes moved by `pose` (4, 4)."""
+        normal = pose[:3, :3] @ self.normal
+        shift = float(normal @ pose[:3, 3])
+        return PlanePair(normal, self.low + shift, self.high + shift)
+
+    def cut(self, soup: Soup) -> tuple[Soup, Soup, Soup]:
+        """Cut a soup by both planes; return the parts below, between and above."""
+        below, rest = cut_by_plane(soup, self.normal, self.low)
+        between, above = cut_by_plane(rest, self.normal, self.high)
+        return below, between, above
+
+
+def carve(
+    soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray, planes: PlanePair | None = None
+) -> tuple[Soup, Soup]:
     """Split a soup into what lies in cells of a grid moved by `pose` (4, 4), and the rest.
 
     cells: int32, indices of the cells, ascending. Triangles are cut where they leave the cells and nowhere else, so
     that both sides of a seam have the same border. Splats are not cut; they lie where their centres are.
+    planes: moved by `pose` too; they cut through `cells`, and what is outside of them belongs to the rest.
     """
     if grid.splats:
         inside = centres_in(soup, grid, cells, pose)
@@ -77,6 +105,11 @@ def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> t
     near = _near_blocks(soup.corners, back, bounds[0], BLOCK_CELLS * grid.cell_size, blocks)
     if not len(near):
         return soup.select(near), soup
+    if planes is not None:
+        far = np.delete(np.arange(len(soup)), near)
+        below, between, above = planes.moved(pose).cut(soup.select(near))
+        kept, beside = carve(between, grid, cells, pose)
+        return kept, join_soups(soup.select(far), below, above, beside)
     local = transform_points(back, soup.corners[near].reshape(-1, 3)).reshape(-1, 3, 3)
     where, owner, _ = fragments(local, grid.origin, grid.cell_size, box)
     inside = is_among(grid.keys[cells], cell_keys(where))
@@ -103,6 +136,33 @@ def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> t
     return (
         join_soups(soup.select(within), pieces.select(side)),
         join_soups(soup.select(untouched), pieces.select(~side)),
+    )
+
+
+def cut_by_plane(soup: Soup, normal: FloatArray, offset: float) -> tuple[Soup, Soup]:
+    """Cut triangles by the plane `normal` (3,) times x = `offset`; return the parts below and above."""
+    height = soup.corners @ normal - offset
+    above = height > 0
+    crossing: BoolArray = np.asarray(above.any(axis=1) & ~above.all(axis=1))
+    cut = soup.select(crossing)
+    height, above = height[crossing], above[crossing]
+    two_above = above.sum(axis=1) == 2
+    alone = np.where(two_above, above.argmin(axis=1), above.argmax(axis=1))
+    turn = (alone[:, None] + np.arange(3)) % 3
+    tips = np.take_along_axis(cut.corners, turn[..., None], axis=1)
+    height = np.take_along_axis(height, turn, axis=1)
+    share = (height[:, :1] / (height[:, :1] - height[:, 1:]))[..., None]
+    seam = tips[:, :1] + share * (tips[:, 1:] - tips[:, :1])
+    tip = np.stack([tips[:, 0], seam[:, 0], seam[:, 1]], axis=1)
+    one = np.stack([seam[:, 0], tips[:, 1], tips[:, 2]], axis=1)
+    other = np.stack([seam[:, 0], tips[:, 2], seam[:, 1]], axis=1)
+    pieces = Soup(np.concatenate([tip, one, other]), np.tile(cut.faces, 3))
+    beyond = np.concatenate([~two_above, two_above, two_above])
+    real = pieces.areas > 0
+    whole: BoolArray = np.asarray((soup.corners @ normal > offset).all(axis=1))
+    return (
+        join_soups(soup.select(~whole & ~crossing), pieces.select(real & ~beyond)),
+        join_soups(soup.select(whole), pieces.select(real & beyond)),
     )
 
 

@@ -31,3 +31,4 @@ class TestItems:
         wanted = {tuple(cell) for cell in grid.cells[cells].tolist()}
         expected = [item for item, cell in enumerate(home.tolist()) if tuple(cell) in wanted]
         assert items_moved_into(grid, cells, pose).tolist() == expected
+        assert not len(items_moved_into(grid, cells[:0], pose))

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.symmetry.rows import chunks_along, cut_by_plane, find_row
+from stages.symmetry.rows import chunks_along, find_row
 from stages.symmetry.surface.grid import surface_grid
-from stages.symmetry.surface.soup import Soup
+from stages.symmetry.surface.soup import Soup, cut_by_plane
 from tests.stages.symmetry.planted import box, screw
 
 
