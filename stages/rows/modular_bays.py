@@ -33,6 +33,8 @@ MAX_DEGREE_RATIO = 1.25
 MIN_BAY_AREA_SHARE = 0.005
 """Share of a shape's surface from which what a bay holds can be seen."""
 MAX_STEPS_PER_AXIS = 6
+MAX_PLANES = 160
+"""Ends of bays that are tried for each step."""
 MAX_BAYS_PER_STEP = 6
 """Bays that are tried for each step, at evenly spread places."""
 
@@ -174,15 +176,14 @@ class _Sections:
 def _bays_along(layout: Layout, modules: _Modules, axis: int) -> Iterator[ModularBay]:
     """Yield the bays along an axis, of each length those with the fewest parts whose type occurs once, as a door's."""
     sections = _Sections(layout, axis)
-    planes = distinct_values(layout.boxes[:, :, axis].ravel(), 2.0 * layout.tolerance)
-    low, high = planes[0] - layout.tolerance, planes[-1] + layout.tolerance
+    low = float(layout.boxes[:, 0, axis].min()) - layout.tolerance
     for length in _steps(modules, axis):
         count = longest_row(modules.mates(length * np.eye(3)[axis]))
         if count < 2:
             continue
         slabs: dict[bytes, Slab] = {}
-        for end in planes:
-            if end - length >= low and end <= high and sections.are_equal(end - length, end):
+        for end in _planes(modules, axis, length):
+            if end - length >= low and sections.are_equal(end - length, end):
                 slab = _slab(layout, modules, axis, length, end)
                 if _fault(slab, sections) is None:
                     slabs.setdefault(slab.within.tobytes(), slab)
@@ -196,6 +197,18 @@ def _bays_along(layout: Layout, modules: _Modules, axis: int) -> Iterator[Modula
                 yield ModularBay(axis, slab.start, slab.at, count, parts, may_insert, may_remove)
 
 
+def _planes(modules: _Modules, axis: int, length: float) -> list[float]:
+    """Return where parts begin or end, ascending: of many parts at most MAX_PLANES planes, of modules a step apart."""
+    planes = distinct_values(modules.boxes[:, :, axis].ravel(), 2.0 * modules.tolerance)
+    if len(planes) <= MAX_PLANES:
+        return planes
+    shift = length * np.eye(3)[axis]
+    recurs = (modules.mates(shift) >= 0) | (modules.mates(-shift) >= 0)
+    planes = distinct_values(modules.boxes[recurs][:, :, axis].ravel(), 2.0 * modules.tolerance)
+    chosen = np.unique(np.linspace(0, len(planes) - 1, min(len(planes), MAX_PLANES)).astype(np.int64))
+    return [planes[index] for index in chosen.tolist()]
+
+
 def _unique_parts(slab: Slab) -> int:
     """Return how many parts of a bay are the only ones of their type."""
     types = slab.layout.types
@@ -204,14 +217,16 @@ def _unique_parts(slab: Slab) -> int:
 
 def _steps(modules: _Modules, axis: int) -> list[float]:
     """Return distances along an axis of modules of one size, those of most pairs first."""
+    from scipy.spatial import cKDTree
+
     across = [other for other in range(3) if other != axis]
     longest, tolerance = MAX_STEP_SHARE * float(modules.extent[axis]), modules.mate_tolerance
     lengths: list[FloatArray] = [np.empty(0)]
     for size in np.unique(modules.classes).tolist():
         places = modules.anchors[modules.classes == size]
-        gaps = places[None] - places[:, None]
-        is_along = (np.abs(gaps[:, :, across]) <= tolerance).all(axis=2)
-        lengths.append(gaps[:, :, axis][is_along & (gaps[:, :, axis] > MIN_STEP_TOLERANCES * tolerance)])
+        pairs = cKDTree(places[:, across]).query_pairs(tolerance, p=np.inf, output_type="ndarray")
+        gaps = np.abs(places[pairs[:, 0], axis] - places[pairs[:, 1], axis])
+        lengths.append(gaps[gaps > MIN_STEP_TOLERANCES * tolerance])
     sorted_lengths = np.sort(np.concatenate(lengths))
     groups = np.split(sorted_lengths, np.flatnonzero(np.diff(sorted_lengths) > tolerance) + 1)
     usable = [(len(group), float(np.median(group))) for group in groups if len(group) and np.median(group) <= longest]
