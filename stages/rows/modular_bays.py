@@ -24,7 +24,7 @@ SECTION_CELLS = 64
 """Cells along each side of the section of a shape with a plane."""
 CELL_ROUNDING = 1e-6
 """Part of a cell that rounding may add or take away."""
-MIN_EQUAL_SECTION = 0.95
+MIN_EQUAL_SECTION = 0.9
 """Share of the cells of either of two sections that both fill, from which they are equal."""
 MAX_UNMATCHED_SECTION = 0.1
 """Share of a section that may be of parts that no module stands in for at the other end of the bay."""
