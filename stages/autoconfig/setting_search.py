@@ -229,7 +229,11 @@ def _candidate_of(setting: Setting, kept_share: float, search: TrialSearch, tria
 
 
 def _settings(analysis: ContactAnalysis, space: SearchSpace) -> Iterator[Setting]:
-    """Yield settings, the strictest first and slots last; settings that the models cannot tell apart come once."""
+    """Yield settings, the strictest first and slots last; settings that the models cannot tell apart come once.
+
+    Fewer kinds of contact come before a looser grammar. Tiles of a race track that touch in a point are neighbours if
+    all kinds count, and a looser grammar takes such a neighbour for the corner that leads on.
+    """
     distinct: dict[tuple[ContactKind, ...], tuple[ContactKind, ...]] = {}
     for kinds in space.kinds:
         occurring = tuple(kind for kind in kinds if kind in analysis.kinds)
@@ -237,7 +241,7 @@ def _settings(analysis: ContactAnalysis, space: SearchSpace) -> Iterator[Setting
             distinct.setdefault(occurring, kinds)
     counting = [grammar for grammar in space.grammars if grammar not in SLOT_LEVELS]
     for hubs in _hub_candidates(analysis, space):
-        yield from (Setting(kinds, grammar, hubs) for kinds in distinct.values() for grammar in counting)
+        yield from (Setting(kinds, grammar, hubs) for grammar in counting for kinds in distinct.values())
     hubs = space.hubs or ()
     assemblies = analysis.counted(Setting(CANDIDATE_KINDS[0], CANDIDATE_GRAMMARS[0], hubs))
     degree = max(int(np.bincount(assembly.edges.ravel(), minlength=1).max()) for assembly in assemblies)
