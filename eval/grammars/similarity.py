@@ -16,6 +16,7 @@ import numpy as np
 
 from eval.engine.table import Cell, Table
 from stages.shape.arrays import BoolArray, FloatArray
+from stages.shape.geometry.distinct_rows import distinct_rows
 from stages.shape.geometry.pose import transform_points
 from stages.shape.geometry.triangles import area_vectors
 from stages.shape.shape import Shape
@@ -280,9 +281,7 @@ class SampledSurface:
     @cached_property
     def _welded(self) -> tuple[FloatArray, np.ndarray]:
         points = self.corners.reshape(-1, 3)
-        _, first, welded = np.unique(
-            np.round(points / (WELD_SHARE * self.radius)), axis=0, return_index=True, return_inverse=True
-        )
+        first, welded = distinct_rows(np.round(points / (WELD_SHARE * self.radius)))
         return points[first], welded.reshape(-1, 3)
 
     @property
@@ -299,8 +298,8 @@ class SampledSurface:
         sides = np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)])
         owner = np.tile(np.arange(len(faces)), 3)
         edge = np.sort(sides, axis=1)
-        _, inverse, count = np.unique(edge, axis=0, return_inverse=True, return_counts=True)
-        single = np.flatnonzero((count[inverse.reshape(-1)] == 1) & (edge[:, 0] != edge[:, 1]))
+        numbers = distinct_rows(edge).numbers
+        single = np.flatnonzero((np.bincount(numbers)[numbers] == 1) & (edge[:, 0] != edge[:, 1]))
         along = vertices[sides[single, 1]] - vertices[sides[single, 0]]
         out = np.cross(along, self.face_normals[owner[single]])
         out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
@@ -311,7 +310,7 @@ class SampledSurface:
         is_end = np.arange(len(at)) >= 3 * len(faces)
         points = np.concatenate([np.tile(middles, (3, 1)), np.tile(vertices[sides[single]].mean(axis=1), (2, 1))])
         labels = np.column_stack([at, is_end, np.round(normals / PLANE_RADIANS)])
-        _, first = np.unique(labels, axis=0, return_index=True)
+        first = distinct_rows(labels).first
         return at[first], normals[first], is_end[first], points[first]
 
     def _continues(self, middles: FloatArray, out: FloatArray, normals: FloatArray) -> BoolArray:

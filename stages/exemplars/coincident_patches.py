@@ -6,6 +6,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.components import connected_components
+from stages.shape.geometry.distinct_rows import distinct_rows
 
 MIN_NORMAL_COSINE = 1.0 - 1e-9
 """Cosine between the normals of neighbours from which they are one flat patch."""
@@ -18,28 +19,25 @@ def flat_patches(vertices: FloatArray, faces: IntArray, solid: IntArray) -> tupl
     A patch is a connected piece of one solid whose faces have one normal; where two surfaces coincide, their
     faces are joined only within each. Quads that are split along different diagonals have the same outline.
     """
-    _, position = np.unique(vertices + 0.0, axis=0, return_inverse=True)
-    corners = position.reshape(-1)[faces]
+    corners = distinct_rows(vertices).numbers[faces]
     spans = vertices[faces]
     normals = np.cross(spans[:, 1] - spans[:, 0], spans[:, 2] - spans[:, 0])
     normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     start, end = corners.ravel(), corners[:, [1, 2, 0]].ravel()
     owner = np.repeat(np.arange(len(faces)), 3)
     ends = np.stack([np.minimum(start, end), np.maximum(start, end)], axis=1)
-    _, edge = np.unique(ends, axis=0, return_inverse=True)
-    edge = edge.reshape(-1)
+    edge = distinct_rows(ends).numbers
     patch = connected_components(len(faces), _flat_neighbours(edge, start < end, owner, solid, normals))
     # sides that a patch has once are its outline, whose sum of hashes tells it from others in any order
-    _, first, counts = np.unique(np.column_stack([patch[owner], edge]), axis=0, return_index=True, return_counts=True)
-    outline = first[counts == 1]
+    first, numbers = distinct_rows(np.column_stack([patch[owner], edge]))
+    outline = first[np.bincount(numbers) == 1]
     mixed = (edge[outline, None].astype(np.uint64) + np.uint64(1)) * _FACTORS
     mixed ^= mixed >> np.uint64(29)
     mixed *= _FACTORS[::-1]
     mixed ^= mixed >> np.uint64(32)
     sums = np.zeros((int(patch.max(initial=-1)) + 1, 3), dtype=np.uint64)
     np.add.at(sums, patch[owner[outline]], np.column_stack([mixed, np.ones(len(outline), np.uint64)]))
-    _, shared = np.unique(sums, axis=0, return_inverse=True)
-    return patch, shared.reshape(-1)[patch].astype(np.int32)
+    return patch, distinct_rows(sums).numbers[patch].astype(np.int32)
 
 
 def _flat_neighbours(

@@ -10,6 +10,7 @@ from stages.exemplars.coincident_patches import flat_patches
 from stages.exemplars.orientation import face_outward, flipped_faces
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.connected_faces import connected_corners, connected_faces
+from stages.shape.geometry.distinct_rows import distinct_rows
 
 MIN_FACE_HEIGHT = 1e-7
 """Height of a face, as a share of the mesh's diagonal, below which 32-bit coordinates give it no area."""
@@ -118,8 +119,8 @@ def _cut_apart(vertices: FloatArray, faces: IntArray, solid: IntArray) -> tuple[
     """
     corners = connected_corners(vertices, faces, solid)
     sides = np.sort(corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    _, inverse, counts = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
-    crowded = (counts[inverse.reshape(-1)] > 2).reshape(-1, 3).any(axis=1)
+    numbers = distinct_rows(sides).numbers
+    crowded = (np.bincount(numbers)[numbers] > 2).reshape(-1, 3).any(axis=1)
     if crowded.any():  # a surface that touches itself in both ends of an edge: those faces stand alone
         corners[crowded] = corners.max() + 1 + np.arange(3 * np.count_nonzero(crowded)).reshape(-1, 3)
     _, first, inverse = np.unique(corners, return_index=True, return_inverse=True)
@@ -135,11 +136,10 @@ def _without_repeated_solids(vertices: FloatArray, faces: IntArray, solid: IntAr
     outline: the number of each face's flat patch, which patches with equal outlines share. A face is repeated if an
     earlier solid has a face with the same corners, or a patch with the same outline.
     """
-    _, position = np.unique(vertices, axis=0, return_inverse=True)
-    _, same = np.unique(np.sort(position.reshape(-1)[faces], axis=1), axis=0, return_inverse=True)
+    same = distinct_rows(np.sort(distinct_rows(vertices).numbers[faces], axis=1)).numbers
     repeats = np.ones(solid.max(initial=-1) + 1, dtype=bool)
     is_first = np.ones(len(faces), dtype=bool)
-    for group in (same.reshape(-1), outline):
+    for group in (same, outline):
         earliest = np.full(group.max(initial=-1) + 1, len(faces))
         np.minimum.at(earliest, group, solid)
         is_first &= earliest[group] == solid
@@ -153,8 +153,7 @@ def _without_repeated_patches(patch: IntArray, outline: IntArray, solid: IntArra
     kept: the faces that are left of those with the numbers `patch`, `outline` and `solid`.
     """
     is_whole = np.bincount(patch[kept], minlength=len(patch)) == np.bincount(patch, minlength=len(patch))
-    _, group = np.unique(np.column_stack([solid, outline]), axis=0, return_inverse=True)
-    group = group.reshape(-1)
+    group = distinct_rows(np.column_stack([solid, outline])).numbers
     first = np.full(group.max(initial=-1) + 1, len(patch))
     whole = kept[is_whole[patch[kept]]]
     np.minimum.at(first, group[whole], patch[whole])
@@ -164,12 +163,11 @@ def _without_repeated_patches(patch: IntArray, outline: IntArray, solid: IntArra
 def _crowded_edges(faces: IntArray) -> int:
     """Count the edges of a mesh at which more than two faces meet."""
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    _, counts = np.unique(edges, axis=0, return_counts=True)
-    return int(np.count_nonzero(counts > 2))
+    return int(np.count_nonzero(np.bincount(distinct_rows(edges).numbers) > 2))
 
 
 def _count_rows(rows: np.ndarray) -> int:
-    return len(np.unique(rows, axis=0))
+    return len(distinct_rows(rows).first)
 
 
 def _heights(vertices: FloatArray, faces: IntArray) -> FloatArray:

@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.distinct_rows import distinct_rows
 
 
 def triangulate(vertices: FloatArray, corners: np.ndarray, counts: np.ndarray) -> tuple[IntArray, IntArray]:
@@ -107,13 +108,12 @@ def _repeated(
     large = np.flatnonzero(counts > 3)
     if not len(large):
         return model, {}
-    _, position = np.unique(vertices + 0.0, axis=0, return_inverse=True)  # + 0.0 turns -0.0 into 0.0
-    position = position.reshape(-1)
+    position = distinct_rows(vertices).numbers
     for count in np.unique(counts[large]).tolist():
         same_count = np.flatnonzero(counts == count)
         rings = position[corners[starts[same_count, None] + np.arange(count)]]
-        _, first, group = np.unique(np.sort(rings, axis=1), axis=0, return_index=True, return_inverse=True)
-        earlier = first[group.reshape(-1)]
+        first, group = distinct_rows(np.sort(rings, axis=1))
+        earlier = first[group]
         for index in np.flatnonzero(earlier != np.arange(len(rings))).tolist():
             place = _place_in_ring(rings[earlier[index]].tolist(), rings[index].tolist())
             if place is not None:

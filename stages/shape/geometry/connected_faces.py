@@ -6,6 +6,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.components import connected_components
+from stages.shape.geometry.distinct_rows import distinct_rows
 
 
 def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> np.ndarray:
@@ -20,9 +21,9 @@ def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> 
     vertex_of = inverse.reshape(-1)[faces]
     turn = (vertex_of.argmin(axis=1)[:, None] + np.arange(3)) % 3
     turned = np.take_along_axis(vertex_of, turn, axis=1)
-    _, original, copy_of = np.unique(np.column_stack([turned, kinds]), axis=0, return_index=True, return_inverse=True)
+    original, copy_of = distinct_rows(np.column_stack([turned, kinds]))
     numbers = 3 * np.arange(len(faces))[:, None] + turn
-    pairs = [np.column_stack([numbers[original[copy_of.reshape(-1)]].ravel(), numbers.ravel()])]
+    pairs = [np.column_stack([numbers[original[copy_of]].ravel(), numbers.ravel()])]
 
     first_of = np.sort(original)
     from_corner = (3 * first_of[:, None] + np.arange(3)).ravel()
