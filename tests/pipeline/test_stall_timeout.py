@@ -12,7 +12,7 @@ import pytest
 
 from pipeline import workers
 from pipeline.inventory import Inventory
-from pipeline.paths import DatasetPaths
+from pipeline.paths import DatasetPaths, StagePaths
 from pipeline.stage import Shard
 from pipeline.stall_timeout import StallWatch
 from pipeline.task import Job
@@ -41,9 +41,9 @@ def test_stalled_shard_is_killed_retried_and_quarantined_and_the_rest_is_made(
     )
     before = descendants(os.getpid())
     results = run_toy_stages(
-        config, tmp_path / "out", "salt", "grain", "flour", workers=2, stall_minutes=0.12, retries=1
+        config, tmp_path / "out", "salt", "grain", "flour", workers=2, stall_minutes=4 / 60, retries=1
     )
-    message = "it made no progress for 7s, and its worker was killed"
+    message = "it made no progress for 4s, and its worker was killed"
     assert results["flour"].failed == {"harvest0-1": message}
     assert results["flour"].made == 1
     assert [(tmp_path / "marks" / name).read_text(encoding="utf-8") for name in ("harvest0-0", "harvest0-1")] == [
@@ -58,35 +58,36 @@ def test_stalled_shard_is_killed_retried_and_quarantined_and_the_rest_is_made(
     assert not [pid for pid in descendants(os.getpid()) - before if "LokyProcess" in _command(pid)]
 
 
-def test_any_change_counts_as_progress(bag: Job) -> None:
+def test_any_change_counts_as_progress(bag: Job, monkeypatch: pytest.MonkeyPatch) -> None:
     places = bag.paths.stage("salt")
-    watch, start, growing = StallWatch(0.025, places), time.monotonic(), places.root / ".bag-0.txt.tmp"
+    watch, start, growing = quick_watch(0.4, places, monkeypatch), time.monotonic(), places.root / ".bag-0.txt.tmp"
     (places.progress / "bag-0").write_text("1 4", encoding="utf-8")
-    while time.monotonic() - start < 4:
-        growing.write_bytes(b"a" * int(10 * (time.monotonic() - start)))
+    while time.monotonic() - start < 1.2:
+        growing.write_bytes(b"a" * int(100 * (time.monotonic() - start)))
         assert not watch.stalled([bag])
-        time.sleep(0.1)
+        time.sleep(0.02)
     while not watch.stalled([bag]):
         (places.progress / "bag-0").write_text("1 4", encoding="utf-8")
         assert time.monotonic() - start < 20, "the same words again are no progress"
-        time.sleep(0.1)
+        time.sleep(0.02)
     watch.restart("bag-0")
     start = time.monotonic()
     while not watch.stalled([bag]):
-        time.sleep(0.1)
-    assert time.monotonic() - start >= 1.4, "a retried shard has its full time"
+        time.sleep(0.02)
+    assert time.monotonic() - start >= 0.35, "a retried shard has its full time"
 
 
-def test_timeout_of_0_never_ends_a_shard(bag: Job) -> None:
-    watch = StallWatch(0, bag.paths.stage("salt"))
-    time.sleep(0.6)
+def test_timeout_of_0_never_ends_a_shard(bag: Job, monkeypatch: pytest.MonkeyPatch) -> None:
+    watch = quick_watch(0, bag.paths.stage("salt"), monkeypatch)
+    time.sleep(0.1)
     assert not watch.stalled([bag])
 
 
-def test_time_in_which_the_engine_was_stopped_does_not_count(bag: Job) -> None:
-    watch = StallWatch(0.05, bag.paths.stage("salt"))
+def test_time_in_which_the_engine_was_stopped_does_not_count(bag: Job, monkeypatch: pytest.MonkeyPatch) -> None:
+    watch = quick_watch(0.4, bag.paths.stage("salt"), monkeypatch)
+    time.sleep(0.1)
     watch.stalled([bag])
-    time.sleep(4)
+    time.sleep(0.6)
     assert not watch.stalled([bag])
 
 
@@ -100,6 +101,13 @@ def test_stopped_idle_worker_does_not_delay_the_end(bag: Job, monkeypatch: pytes
     os.kill(max(worker), signal.SIGSTOP)
     crew.stop(kill=False)
     wait_until(lambda: not alive(worker), seconds=10)
+
+
+def quick_watch(seconds: float, places: StagePaths, monkeypatch: pytest.MonkeyPatch) -> StallWatch:
+    """A watch that looks every twentieth of a second, where others look twice a second at most."""
+    watch = StallWatch(seconds / 60, places)
+    monkeypatch.setattr(watch, "_interval", 0.05)
+    return watch
 
 
 def _command(pid: int) -> str:
