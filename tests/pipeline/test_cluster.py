@@ -21,6 +21,15 @@ pytest.importorskip("distributed")
 
 ROOT = Path(__file__).resolve().parents[2]
 WORK = Path(".work/toys")
+IMPATIENT_RUN = """
+import pipeline.cluster
+from pipeline.cli import main
+from tests.pipeline.toy_run import PACKAGE
+
+pipeline.cluster._ANSWER_SECONDS = 1.0
+main(PACKAGE)
+"""
+"""The toy command line, with a scheduler that has one second to answer."""
 
 
 class Cluster:
@@ -94,8 +103,8 @@ def test_shard_ends_with_its_run_and_the_cluster_survives(
         run.kill()
     assert makers
     wait_until(lambda: not set(makers) <= set(cluster.pids("LokyProcess")), seconds=30)
-    result = run_toy_stages(config, out, "flour", cluster=cluster.address, stall_minutes=0.1, retries=0)["flour"]
-    assert result.failed == {"harvest0-0": "it made no progress for 6s, and its worker was killed"}
+    result = run_toy_stages(config, out, "flour", cluster=cluster.address, stall_minutes=2 / 60, retries=0)["flour"]
+    assert result.failed == {"harvest0-0": "it made no progress for 2s, and its worker was killed"}
     assert not run_toy_stages(write_config(grain=small), out, "flour", cluster=cluster.address)["flour"].failed
 
 
@@ -103,14 +112,16 @@ def test_shard_ends_with_its_run_and_the_cluster_survives(
 def test_lost_scheduler_is_reported_and_the_run_continues_here(
     tmp_path: Path, write_config: WriteConfig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pipeline.cluster._ANSWER_SECONDS", 3.0)
+    monkeypatch.setattr("pipeline.cluster._ANSWER_SECONDS", 1.0)
     out, mine = tmp_path / "out", Cluster(workers=1)
-    config = write_config(flour={"seconds": 0.1})
+    # The last shard waits for ever in the first run, and is made by the next.
+    config = write_config(grain={"wanted": 9}, flour={"trouble": {"harvest1-1": "stops once"}})
     run_toy_stages(config, out, "salt", "grain")
-    with subprocess.Popen(
-        [*run_command(config, out, "flour"), "--cluster", mine.address], cwd=ROOT, stderr=subprocess.PIPE, text=True
-    ) as run:
-        wait_until(lambda: list((out / WORK / "flour").glob("records/*.json")))
+    _, _, _, *arguments = run_command(config, out, "flour")
+    command = [sys.executable, "-c", IMPATIENT_RUN, *arguments, "--cluster", mine.address]
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as run:
+        wait_until(lambda: (tmp_path / "marks/harvest1-1").exists())
+        assert list((out / WORK / "flour").glob("records/*.json"))
         os.kill(mine.pids("dask_scheduler")[0], signal.SIGKILL)
         assert run.wait(timeout=120) == 3
         assert run.stderr is not None
