@@ -73,7 +73,7 @@ def test_cluster_makes_the_same_bytes_despite_dying_workers(
     run_toy_stages(write_config(), tmp_path / "calm", "salt", "grain", "flour")
     run_toy_stages(write_config(), out, "salt", "grain")
     trouble = {"harvest0-0": "stops once", "harvest1-0": "dies", "harvest2-1": "dies once"}
-    config = write_config(flour={"seconds": 0.1, "trouble": trouble})
+    config = write_config(flour={"trouble": trouble})
     command = [*run_command(config, out, "flour"), "--cluster", cluster.address]
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as run:
         wait_until(lambda: _with_stopped(cluster.pids("dask_worker")))
