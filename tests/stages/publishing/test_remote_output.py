@@ -17,7 +17,7 @@ from tests.stages.publishing.test_store import ROOT, contents
 
 CONFIG = """
 name: heaps
-primitives: {samples: 30, splits: {shards: 6}}
+primitives: {samples: 12, splits: {shards: 6}}
 points: {uniform: 64}
 sketches: {size: 64, views: [{name: right, azimuth: 35.0, elevation: 15.0}]}
 """
@@ -36,13 +36,13 @@ def test_killed_run_goes_on_and_the_store_has_the_bytes_of_the_folder(
     import s3fs
 
     server, work = s3fs.S3FileSystem(use_listings_cache=False), tmp_path / "work"
-    run = ("run", "--config", config, "--out", f"{bucket}/made", "--work", work, "--workers", "2")
+    run = ("run", "--config", config, "--out", f"{bucket}/made", "--work", work, "--workers", "1")
     process = subprocess.Popen(
         [sys.executable, "-m", "pipeline", *map(str, run)], cwd=ROOT, start_new_session=True, stdout=subprocess.DEVNULL
     )
     while len(server.find("bucket/made")) < 3:
         assert process.poll() is None
-        time.sleep(0.01)
+        time.sleep(0.05)
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
     before = server.find("bucket/made", detail=True)
@@ -62,7 +62,7 @@ def test_killed_run_goes_on_and_the_store_has_the_bytes_of_the_folder(
 
 
 def test_file_lost_in_the_store_is_sent_again(config: Path, tmp_path: Path) -> None:
-    run = ("run", "--config", config, "--out", "memory://made", "--work", tmp_path / "work", "--workers", "2")
+    run = ("run", "--config", config, "--out", "memory://made", "--work", tmp_path / "work", "--workers", "1")
     code, text = shapemill(*run)
     assert code == 0, text
     import fsspec
@@ -94,6 +94,7 @@ def test_store_that_takes_no_files_is_refused_before_the_run(
     assert "run `make publish DEST=hf://makers/heaps`" in refusal("hf://makers")
     with monkeypatch.context() as patch:
         patch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
+        patch.setenv("AWS_MAX_ATTEMPTS", "1")
         assert "check the network and AWS_ENDPOINT_URL" in refusal("s3://bucket/made")
     with monkeypatch.context() as patch:
         patch.delenv("AWS_ACCESS_KEY_ID")
