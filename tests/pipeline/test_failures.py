@@ -50,13 +50,13 @@ def alive(pids: set[int]) -> bool:
 
 
 def test_killed_run_goes_on_to_the_same_bytes_and_leaves_no_worker(tmp_path: Path, write_config: WriteConfig) -> None:
-    config = write_config(flour={"seconds": 0.1})
-    run_toy_stages(config, tmp_path / "whole", workers=2)
-    out = tmp_path / "killed"
+    # One shard stays half written in the first run, and is made by the next.
+    config, out = write_config(flour={"trouble": {"harvest1-1": "stops once"}}), tmp_path / "killed"
     run_toy_stages(config, out, "salt", "grain")
     with subprocess.Popen(run_command(config, out, "flour", workers=2), cwd=ROOT, stderr=subprocess.DEVNULL) as run:
         flour = out / WORK / "flour"
-        wait_until(lambda: list(flour.glob("records/*.json")) and list(flour.glob(".*.tmp")))
+        wait_until(lambda: list(flour.glob("records/*.json")) and (tmp_path / "marks/harvest1-1").exists())
+        assert list(flour.glob(".*.tmp"))
         workers = descendants(run.pid)
         os.kill(max(workers), signal.SIGSTOP)
         run.send_signal(signal.SIGKILL)
@@ -65,6 +65,7 @@ def test_killed_run_goes_on_to_the_same_bytes_and_leaves_no_worker(tmp_path: Pat
     assert 0 < len(list(flour.glob("records/*.json"))) < 6
     result = run_toy_stages(config, out)["flour"]
     assert 0 < result.made < 6
+    run_toy_stages(config, tmp_path / "whole", workers=2)
     assert made(out) == made(tmp_path / "whole")
 
 
