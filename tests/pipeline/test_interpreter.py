@@ -29,27 +29,7 @@ def shapemill(*arguments: str, **variables: str) -> subprocess.CompletedProcess[
 
 @pytest.mark.slow
 @pytest.mark.parametrize("variables", LOCALES, ids=["C", "POSIX", "latin-1"])
-def test_help_and_run_work_in_every_locale(tmp_path: Path, variables: dict[str, str]) -> None:
-    options = ["--config", str(write_config(tmp_path)), "--out", str(tmp_path / "größe")]
-    for arguments in (["--help"], ["run", "shapeassembly", "--workers", "1", *options]):
-        assert_works(*arguments, **variables)
-    assert list((tmp_path / "größe").rglob("stools-train-*.tar"))
-
-
-@pytest.mark.slow
-def test_trial_of_all_stages_works_in_latin_1(tmp_path: Path) -> None:
-    options = ["--config", str(write_config(tmp_path)), "--out", str(tmp_path / "größe")]
-    assert_works("plan", *options, **LOCALES[-1])
-
-
-def assert_works(*arguments: str, **variables: str) -> None:
-    done = shapemill(*arguments, **variables)
-    assert done.returncode == 0, done.stderr.decode()
-    assert b"Traceback" not in done.stderr
-
-
-def write_config(tmp_path: Path) -> Path:
-    """Write a config whose file, texts, title and credit have characters that some locales lack."""
+def test_help_plan_and_run_work_in_every_locale(tmp_path: Path, variables: dict[str, str]) -> None:
     config = tmp_path / "stühle.yaml"
     texts = tmp_path / "stühle"
     texts.mkdir()
@@ -66,7 +46,12 @@ def write_config(tmp_path: Path) -> Path:
         "package": {"previewed": 1},
     }
     config.write_text(yaml.safe_dump(sections, allow_unicode=True), encoding="utf-8")
-    return config
+    options = ["--config", str(config), "--out", str(tmp_path / "größe")]
+    for arguments in (["--help"], ["plan", *options], ["run", "shapeassembly", "--workers", "1", *options]):
+        done = shapemill(*arguments, **variables)
+        assert done.returncode == 0, done.stderr.decode()
+        assert b"Traceback" not in done.stderr
+    assert list((tmp_path / "größe").rglob("stools-train-*.tar"))
 
 
 def test_error_shows_characters_that_the_locale_lacks(tmp_path: Path) -> None:
