@@ -47,6 +47,7 @@ class ModularBay:
     start, end: where the bay begins and ends along it, in the kit's units
     count: modules of the longest row with the bay's length as step
     parts: the parts of the layout that the bay holds, int64 (k,)
+    may_insert, may_remove: whether the bay can be inserted again, and whether it can be removed
     """
 
     axis: int

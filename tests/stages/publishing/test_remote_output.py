@@ -36,7 +36,7 @@ def test_killed_run_goes_on_and_the_store_has_the_bytes_of_the_folder(
     import s3fs
 
     server, work = s3fs.S3FileSystem(use_listings_cache=False), tmp_path / "work"
-    run = ("run", "--config", config, "--out", f"{bucket}/made", "--work", work, "--workers", "1")
+    run = ("run", "--config", config, "--out", f"{bucket}/made", "--work", work, "--workers", "2")
     process = subprocess.Popen(
         [sys.executable, "-m", "pipeline", *map(str, run)], cwd=ROOT, start_new_session=True, stdout=subprocess.DEVNULL
     )

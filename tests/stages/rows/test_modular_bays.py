@@ -103,12 +103,13 @@ def test_modules_of_one_size_with_other_sections_are_not_interchangeable() -> No
         check(kit, with_modular_bays(layout, stated(bay, 1)))
 
 
-def test_a_part_that_reaches_across_bars_a_bay() -> None:
-    _, layout = models.tower()
-    (roof,) = np.flatnonzero(layout.types == layout.types[0])
-    poses = layout.poses.copy()
-    poses[roof, :3, 3] = [0.0, 2.05, 0.0]  # in the middle of the tower: no plane cuts it as another one does
-    assert not [bay for bay in storeys_of(replace(layout, poses=poses)) if bay.start < 2.0 < bay.end]
+def test_a_beam_that_no_module_stands_in_for_ends_no_bay_inside_it() -> None:
+    """At 1 and 3 the section is the same, but the first beam ends at 1.5: between two bays would be a gap."""
+    meshes = {"stone": box(1.0, 1.0, 1.0), "long": box(1.5, 0.5, 1.0), "short": box(1.0, 0.5, 1.0)}
+    stones = [("stone", pose(number + 0.5, -0.5, 0.0)) for number in range(4)]
+    beams = [("long", pose(0.75, 0.25, 0.0)), ("long", pose(2.25, 0.25, 0.0)), ("short", pose(3.5, 0.25, 0.0))]
+    _, layout = models.layout(meshes, [*stones, *beams])
+    assert (1.0, 3.0) not in [(round(bay.start, 3), round(bay.end, 3)) for bay in find_modular_bays(layout)]
 
 
 def test_a_closed_road_gets_no_road_across_and_is_not_opened() -> None:
