@@ -190,9 +190,10 @@ doctor: setup  ## Try everything that Shapemill needs on this machine, with the 
 # Working on it ------------------------------------------------------------------------------------------------------
 
 .PHONY: test chaos style lint bench kits kernels config-docs results release lock
+# One process more than cores: some tests wait, for files, for a time-out, for a process that starts.
 test: style  ## Check style and types and run the tests, on WORKERS cores
 	@$(PYTHON) -m mypy > types.tmp & types=$$!; code=0; \
-	$(PYTHON) -m pytest --numprocesses "$$WORKERS" --dist loadfile --no-loadscope-reorder || code=$$?; \
+	$(PYTHON) -m pytest --numprocesses "$$((WORKERS + 1))" --dist loadfile --no-loadscope-reorder || code=$$?; \
 	wait "$$types" || code=$$?; cat types.tmp; rm types.tmp; exit "$$code"
 chaos: setup-dev  ## Kill runs and corrupt their files in ROUNDS rounds, and check how each ends
 	$(PYTHON) -m tests.chaos --rounds "$$ROUNDS" $(SEEDED)
