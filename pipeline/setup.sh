@@ -33,19 +33,23 @@ has_library() {
     PATH="$PATH:/usr/sbin:/sbin" ldconfig -p | grep -qF "$1 "
 }
 
-missing_packages() {
+missing_python() {
     python=$(find_python)
     if [ -z "$python" ]; then
         echo python3 python3-venv
     elif ! "$python" -c 'import ensurepip' 2>/dev/null; then
         echo python3-venv
     fi
+}
+
+missing_libraries() {
     grep -v '^#' pipeline/libraries.txt | while read -r library package _; do
         if ! has_library "$library"; then echo "$package"; fi
     done
 }
 
-install_packages() {
+# Sets `sudo` to what lets apt install packages, or says who has to install them.
+find_rights() {
     command="apt-get install -y --no-install-recommends $*"
     if ! command -v apt-get >/dev/null; then
         fail "Shapemill needs what Debian calls: $*" "Install that, then run make again."
@@ -57,17 +61,31 @@ install_packages() {
         fail "Shapemill needs packages that only root may install. Run this, then make again:" \
             "    sudo apt-get update && sudo $command"
     fi
-    echo "installing $*"
-    # shellcheck disable=SC2086
-    $sudo apt-get update -q || echo "apt-get update failed; trying with the lists that are there" >&2
-    # shellcheck disable=SC2086
-    $sudo env DEBIAN_FRONTEND=noninteractive $command || fail "apt-get failed. This must work before make can go on:" \
-        "    $sudo $command"
 }
 
-packages=$(missing_packages | tr '\n' ' ')
+install_packages() {
+    command="apt-get install -y --no-install-recommends $*"
+    echo "installing $*"
+    if [ -z "$updated" ]; then
+        # shellcheck disable=SC2086
+        $sudo apt-get update -q || echo "apt-get update failed; trying with the lists that are there" >&2
+        updated=yes
+    fi
+    # A set-up that was stopped may have left an apt-get that goes on.
+    # shellcheck disable=SC2086
+    $sudo env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=120 ${command#apt-get } ||
+        fail "apt-get failed. This must work before make can go on:" "    $sudo $command"
+}
+
+python_packages=$(missing_python | tr '\n' ' ') libraries=$(missing_libraries | tr '\n' ' ')
+updated="" apt=""
 # shellcheck disable=SC2086
-if [ -n "${packages% }" ]; then install_packages $packages; fi
+if [ -n "${python_packages% }${libraries% }" ]; then find_rights $python_packages $libraries; fi
+# shellcheck disable=SC2086
+if [ -n "${python_packages% }" ]; then install_packages $python_packages; fi
+# Nothing that set-up runs loads the libraries: they come while pip works.
+# shellcheck disable=SC2086
+if [ -n "${libraries% }" ]; then install_packages $libraries & apt=$!; fi
 
 python=$(find_python)
 [ -n "$python" ] || fail "There is no Python of $VERSIONS that runs. Install one, then run make again."
@@ -87,6 +105,11 @@ END
 grep '^--' requirements.lock >> "$requirements"
 count() { grep -c "$1" .venv/install.log || true; }
 
+# Waits for the packages that apt installs; without them set-up ends, and apt has said why.
+end_apt() {
+    if [ -n "$apt" ]; then wait "$apt" || exit 1; apt=""; fi
+}
+
 # Installs with pip, and says every five seconds how far it is; pip itself says nothing while it unpacks.
 pip_install() {
     .venv/bin/python -m pip install --disable-pip-version-check --no-compile --progress-bar off "$@" > .venv/install.log 2>&1 &
@@ -95,6 +118,7 @@ pip_install() {
     while kill -0 "$pip" 2>/dev/null; do
         sleep 1
         seconds=$((seconds + 1))
+        if [ -n "$apt" ] && ! kill -0 "$apt" 2>/dev/null; then end_apt; fi
         if [ $((seconds % 5)) = 0 ]; then
             found=$(count '^Collecting\|^Requirement already')
             new=$(find .venv/lib -maxdepth 3 -name '*.dist-info' -newer .venv/requirements.txt | wc -l)
@@ -120,3 +144,4 @@ nice .venv/bin/python -m pipeline.compile_kernels > .venv/kernels.log 2> .venv/k
 kernels=$!
 pip_install --constraint requirements.lock --requirement "$requirements"
 pip_install --no-deps --no-build-isolation --editable .
+end_apt

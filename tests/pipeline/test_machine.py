@@ -32,7 +32,8 @@ def set_up(project: Path, tools: Path) -> subprocess.CompletedProcess[str]:
     for name in ("sh", "grep", "tr", "id", "env", "ldconfig"):
         found = shutil.which(name, path=f"{os.environ['PATH']}:/usr/sbin:/sbin")
         assert found is not None, name
-        (tools / name).symlink_to(found)
+        if not (tools / name).exists():
+            (tools / name).symlink_to(found)
     (tools / "python3").symlink_to(sys.executable)
     return subprocess.run(
         ["sh", "pipeline/setup.sh"],
@@ -53,18 +54,23 @@ def test_set_up_names_the_packages_without_apt(tmp_path: Path) -> None:
     assert not (tmp_path / "project/.venv").exists()
 
 
-def test_set_up_prints_the_exact_command_where_apt_may_not_or_cannot(tmp_path: Path) -> None:
+def test_set_up_prints_the_exact_command_where_only_root_may_install(tmp_path: Path) -> None:
     tools = tmp_path / "tools"
     tools.mkdir()
-    (tools / "apt-get").write_text("#!/bin/sh\nexit 100\n", encoding="utf-8")
-    (tools / "apt-get").chmod(0o755)
+    write_programs(tools, {"apt-get": "exit 0", "id": "echo 1000"})
     done = set_up(project_with_missing_library(tmp_path / "project"), tools)
     assert done.returncode == 1
-    assert "apt-get install -y --no-install-recommends libnowhere9" in done.stderr
+    assert "    sudo apt-get update && sudo apt-get install -y --no-install-recommends libnowhere9\n" in done.stderr
     assert not (tmp_path / "project/.venv").exists()
 
 
-FAKE_PYTHON = """#!/bin/sh
+def write_programs(folder: Path, scripts: dict[str, str]) -> None:
+    for name, script in scripts.items():
+        (folder / name).write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
+        (folder / name).chmod(0o755)
+
+
+FAKE_PYTHON = """
 case "$*" in
     *"pip install"*) echo "Collecting numpy"; echo "  Downloading numpy.whl"; sleep 6; echo "no space left"; exit 1 ;;
     "-") echo numpy ;;
@@ -72,13 +78,31 @@ esac
 """
 
 
-def test_set_up_says_how_far_it_is_while_pip_works_and_what_pip_said_when_it_fails(tmp_path: Path) -> None:
-    project = project_with_missing_library(tmp_path / "project")
-    (project / "pipeline/libraries.txt").write_text("# library, package\n", encoding="utf-8")
+def test_set_up_stops_with_the_exact_command_where_apt_cannot_although_pip_still_works(tmp_path: Path) -> None:
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    write_programs(tools, {"apt-get": "exit 100", "id": "echo 0"})
+    project = with_fake_python(project_with_missing_library(tmp_path / "project"))
+    environment = {**os.environ, "PATH": f"{tools}:{os.environ['PATH']}"}
+    done = subprocess.run(
+        ["sh", "pipeline/setup.sh"], cwd=project, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "apt-get install -y --no-install-recommends libnowhere9" in done.stderr
+    assert "pip failed" not in done.stderr
+
+
+def with_fake_python(project: Path) -> Path:
+    """Give a project an environment whose pip works for six seconds, then fails."""
     (project / "requirements.lock").write_text("--no-binary :none:\n", encoding="utf-8")
     (project / ".venv/bin").mkdir(parents=True)
-    (project / ".venv/bin/python").write_text(FAKE_PYTHON, encoding="utf-8")
-    (project / ".venv/bin/python").chmod(0o755)
+    write_programs(project / ".venv/bin", {"python": FAKE_PYTHON})
+    return project
+
+
+def test_set_up_says_how_far_it_is_while_pip_works_and_what_pip_said_when_it_fails(tmp_path: Path) -> None:
+    project = with_fake_python(project_with_missing_library(tmp_path / "project"))
+    (project / "pipeline/libraries.txt").write_text("# library, package\n", encoding="utf-8")
     done = subprocess.run(["sh", "pipeline/setup.sh"], cwd=project, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "set-up: 1 packages found, 1 fetched, 0 installed, 0 kernels compiled, 5s elapsed" in done.stdout
