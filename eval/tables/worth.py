@@ -23,7 +23,7 @@ from stages.training.point_encoder.settings import Augmentation
 if TYPE_CHECKING:
     from stages.training.point_encoder.clouds import LabelledClouds
 
-SECONDS_PER_STEP = 0.25
+SECONDS_PER_STEP = 0.15
 NETWORKS_OF_A_SEED = 5
 """Of random weights, the dataset, and real shapes without one category."""
 

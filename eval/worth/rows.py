@@ -1,4 +1,4 @@
-"""Rows of the table of worth: a source, what a network learns from it, and its precision on real shapes."""
+"""Rows of the table of worth: a source, what a network learns from it, and how well it does on real shapes."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 
 from eval.engine.table import Cell, Table
+from eval.worth.categories import tells_categories
 from eval.worth.learning import precision_of_distance, precision_of_encoder, trained_encoder
 from eval.worth.real_sets import RealSet
 from pipeline.randomness import decision_rng
@@ -23,8 +24,11 @@ NORMAL_95 = 1.96
 """Standard deviations of a normal distribution to each side that hold 95 %."""
 
 
+CATEGORY = "category"
+"""Column of the share of categories that are told; the other columns are real sets."""
+
 Results = Mapping[tuple[int, str], FloatArray]
-"""Average precision by number of labelled shapes and name of the real set, float64 (seeds, test shapes)."""
+"""Percent by number of labelled shapes and column, float64 (seeds, test shapes)."""
 
 
 @dataclass(frozen=True)
@@ -70,25 +74,51 @@ def network_tables(
         if clouds is not None:
             rng = decision_rng(training.seed, "worth", "training", name, repetition)
             encoder = trained_encoder(encoder, clouds, training.steps, rng, training.ways)
-        for real in tested:
-            test_clouds, labelled, _ = _read(real)
-            for count in training.labelled:
-                if count <= len(labelled):
-                    learnt = _learnt(encoder, real.name, labelled, count, training, repetition)
-                    results.setdefault((count, real.name), []).append(precision_of_encoder(learnt, test_clouds))
+        for count in training.labelled:
+            of_count = _results(encoder, tested, count, training, repetition)
+            if tested == sets:
+                of_count |= _category_results(encoder, sets, count, training, repetition)
+            for column, percents in of_count.items():
+                results.setdefault((count, column), []).append(percents)
     stacked = {key: np.stack(precisions) for key, precisions in results.items()}
     return _tables(name, "" if clouds is None else len(clouds), stacked, sets, training.labelled)
 
 
-def _learnt(
-    encoder: PointEncoder, name: str, labelled: LabelledClouds, count: int, training: Training, repetition: int
-) -> PointEncoder:
-    """Return the encoder after learning from `count` random labelled shapes, the same for all sources."""
-    if not count:
-        return encoder
-    rng = decision_rng(training.seed, "worth", "labelled", name, count, repetition)
-    chosen = labelled.chosen(rng.permutation(len(labelled))[:count])
-    return trained_encoder(encoder, chosen, training.labelled_steps, rng)
+def _results(
+    encoder: PointEncoder, tested: Sequence[RealSet], count: int, training: Training, repetition: int
+) -> dict[str, FloatArray]:
+    """Return the precision on each real set with as many labelled shapes, after learning from them."""
+    results = {}
+    for real in tested:
+        test_clouds, labelled, _ = _read(real)
+        if count <= len(labelled):
+            rng = decision_rng(training.seed, "worth", "labelled", real.name, count, repetition)
+            learnt = encoder
+            if count:
+                learnt = trained_encoder(encoder, _drawn(labelled, count, rng), training.labelled_steps, rng)
+            results[real.name] = precision_of_encoder(learnt, test_clouds)
+    return results
+
+
+def _category_results(
+    encoder: PointEncoder, sets: Sequence[RealSet], count: int, training: Training, repetition: int
+) -> dict[str, FloatArray]:
+    """Return which categories are told after learning from `count` labelled shapes of each set, where there are two."""
+    sets = [real for real in sets if real.category and count <= len(_read(real)[1])]
+    if not count or len({real.category for real in sets}) < 2:
+        return {}
+    learnt, tested = [], []
+    for real in sets:
+        test_clouds, labelled, _ = _read(real)
+        rng = decision_rng(training.seed, "worth", "labelled", real.name, count, repetition)
+        learnt.append((real.category, _drawn(labelled, count, rng)))
+        tested.append((real.category, test_clouds))
+    return {CATEGORY: tells_categories(encoder, learnt, tested)}
+
+
+def _drawn(labelled: LabelledClouds, count: int, rng: np.random.Generator) -> LabelledClouds:
+    """Return `count` random labelled shapes, the same for all sources."""
+    return labelled.chosen(rng.permutation(len(labelled))[:count])
 
 
 @cache
@@ -96,13 +126,13 @@ def _read(real: RealSet) -> tuple[LabelledClouds, LabelledClouds, str]:
     return real.read()
 
 
-def mean_and_interval(precisions: FloatArray) -> tuple[float, float]:
+def mean_and_interval(percents: FloatArray) -> tuple[float, float]:
     """Return the mean of float (seeds, shapes), and half of its 95 % interval over shapes and seeds."""
-    of_shapes, of_seeds = precisions.mean(axis=0), precisions.mean(axis=1)
+    of_shapes, of_seeds = percents.mean(axis=0), percents.mean(axis=1)
     variance = of_shapes.var(ddof=1) / len(of_shapes) if len(of_shapes) > 1 else 0.0
     if len(of_seeds) > 1:
         variance += of_seeds.var(ddof=1) / len(of_seeds)
-    return float(precisions.mean()), NORMAL_95 * float(np.sqrt(variance))
+    return float(percents.mean()), NORMAL_95 * float(np.sqrt(variance))
 
 
 def _tables(name: str, shapes: Cell, results: Results, sets: Sequence[RealSet], labelled: Sequence[int]) -> list[Table]:
@@ -111,10 +141,11 @@ def _tables(name: str, shapes: Cell, results: Results, sets: Sequence[RealSet], 
     for count in labelled:
         columns: list[str] = ["learnt from", "shapes"]
         cells: list[Cell] = [name, shapes]
-        for real in sets:
-            precisions = results.get((count, real.name))
-            columns += [real.name, f"{real.name} ±"]
-            cells += ["", ""] if precisions is None else mean_and_interval(precisions)
+        categories = {real.category for real in sets if real.category}
+        for column in [*(real.name for real in sets), *([CATEGORY] if count and len(categories) > 1 else [])]:
+            percents = results.get((count, column))
+            columns += [column, f"{column} ±"]
+            cells += ["", ""] if percents is None else mean_and_interval(percents)
         title = f"{count} labelled real shapes" if count else "No labelled real shapes"
         tables.append(Table(title, tuple(columns), (tuple(cells),), _notes(sets)))
     return tables
@@ -124,6 +155,8 @@ def _notes(sets: Sequence[RealSet]) -> list[str]:
     note = (
         'Average precision, percent, of "these two points are of one part", for points nearer than '
         f"{MAX_PAIR_DISTANCE:g} of the diagonal: the mean of all test shapes and seeds. ±: half of the 95 % interval "
-        "over shapes and seeds. distance of points: nearer pairs first, without a network."
+        "over shapes and seeds. distance of points: nearer pairs first, without a network. category: share of the test "
+        "shapes whose category (chair, table, storage) a linear classifier tells from the network's description of the "
+        "whole cloud; it learns from the labelled shapes, the network does not."
     )
     return [note, *(text for _, _, text in map(_read, sets) if text)]

@@ -8,18 +8,22 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import binary_cross_entropy_with_logits, leaky_relu, normalize
 
+from stages.training.point_encoder.local_surface import FEATURES_PER_COUNT, NEIGHBOR_COUNTS, local_surface
 from stages.training.recovery.model import LEAKY_SLOPE, EdgeConvolution, batch_normed
 from stages.training.recovery.neighbors import edge_maximum, nearest_neighbors
 
 OFFSET_WIDTH = 32
-"""Features of the offsets to the neighbours, and as many of the positions."""
-WIDTHS = (2 * OFFSET_WIDTH, 64, 64, 128)
+"""Features of the offsets to the neighbours, as many of the positions, and as many of the local surface."""
+WIDTHS = (64, 64, 64, 128)
 """Features of each point after the first layer and after each edge convolution."""
 CONTEXT_WIDTH = 128
 """Features of the whole cloud."""
 HIDDEN_WIDTH = 128
 EMBEDDING_WIDTH = 32
 NEIGHBORS_PER_POINT = 16
+STRIDES = (1, 2, 4)
+"""Each edge convolution looks at every n-th of the nearest points: the later, the farther."""
+NEAREST_POINTS = max(*NEIGHBOR_COUNTS, NEIGHBORS_PER_POINT * STRIDES[-1])
 MAX_PAIR_DISTANCE = 0.15
 """Largest distance of a near pair, in diagonals of the bounding box."""
 INITIAL_THRESHOLD = 0.6
@@ -31,13 +35,17 @@ INITIAL_LOG_SHARPNESS = 1.5
 class PointEncoder(nn.Module):
     """Clouds float (n, points, 3) of diagonal 1 to unit embeddings float (n, points, EMBEDDING_WIDTH).
 
-    Edge convolutions over the neighbours in space; the maximum of their features over the cloud is the context of each
-    point. 128,738 weights.
+    Edge convolutions over the neighbours in space, near ones first, then farther ones. They begin with the position of
+    each point, the offsets to its neighbours and the surface around it. The maximum of their features over the cloud is
+    the context of each point. 135,874 weights.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self.offsets = OffsetConvolution(OFFSET_WIDTH)
+        self.surface = nn.Linear(len(NEIGHBOR_COUNTS) * FEATURES_PER_COUNT, OFFSET_WIDTH, bias=False)
+        self.surface_norm = nn.BatchNorm1d(OFFSET_WIDTH)
+        self.first = nn.Linear(3 * OFFSET_WIDTH, WIDTHS[0])
         self.convolutions = nn.ModuleList(EdgeConvolution(before, after) for before, after in pairwise(WIDTHS))
         self.context = nn.Linear(WIDTHS[-1], CONTEXT_WIDTH)
         self.context_norm = nn.BatchNorm1d(CONTEXT_WIDTH)
@@ -51,16 +59,37 @@ class PointEncoder(nn.Module):
 
     def forward(self, points: Tensor, chosen: Tensor | None = None) -> Tensor:
         """Embed the points, or only those with the indices `chosen` int (m,): float (n, m, EMBEDDING_WIDTH)."""
-        neighbors = nearest_neighbors(points, min(NEIGHBORS_PER_POINT, points.shape[1]))
-        layers = [self.offsets(points, neighbors)]
-        for convolution in self.convolutions:
-            layers.append(convolution(layers[-1], neighbors))
-        context = leaky_relu(batch_normed(self.context_norm, self.context(layers[-1])), LEAKY_SLOPE)
-        whole = self.whole(context.amax(dim=1, keepdim=True))
+        layers = self._layers(points)
+        whole = self.whole(self._context(layers[-1])[:, None])
         joined = torch.cat(layers if chosen is None else [layer[:, chosen] for layer in layers], dim=-1)
         mixed = leaky_relu(self.local(joined) + whole, LEAKY_SLOPE)
         hidden = leaky_relu(batch_normed(self.hidden_norm, self.hidden(mixed)), LEAKY_SLOPE)
         return normalize(self.embedding(hidden), dim=-1)
+
+    def describe(self, points: Tensor) -> Tensor:
+        """Describe each cloud as a whole: float (n, CONTEXT_WIDTH)."""
+        return self._context(self._layers(points)[-1])
+
+    def _layers(self, points: Tensor) -> list[Tensor]:
+        """Return the features of each point after the first layer and after each edge convolution."""
+        nearest = nearest_neighbors(points, min(NEAREST_POINTS, points.shape[1]))
+        layers = [self._first_layer(points, nearest)]
+        for convolution, stride in zip(self.convolutions, STRIDES, strict=True):
+            layers.append(convolution(layers[-1], _strided(nearest, stride)))
+        return layers
+
+    def _context(self, features: Tensor) -> Tensor:
+        return leaky_relu(batch_normed(self.context_norm, self.context(features)), LEAKY_SLOPE).amax(dim=1)
+
+    def _first_layer(self, points: Tensor, nearest: Tensor) -> Tensor:
+        surface = batch_normed(self.surface_norm, self.surface(local_surface(points, nearest)))
+        offsets = self.offsets(points, _strided(nearest, 1))
+        layer: Tensor = self.first(torch.cat([offsets, leaky_relu(surface, LEAKY_SLOPE)], dim=-1))
+        return layer
+
+
+def _strided(nearest: Tensor, stride: int) -> Tensor:
+    return nearest[..., : NEIGHBORS_PER_POINT * stride : stride].contiguous()
 
 
 class OffsetConvolution(nn.Module):
@@ -98,13 +127,15 @@ def near_point_pairs(points: Tensor) -> Tensor:
 
 
 def same_part_loss(encoder: PointEncoder, points: Tensor, parts: Tensor, chosen: Tensor) -> Tensor:
-    """Return the cross entropy of "same part" over the near pairs of the chosen points of clouds.
+    """Return the cross entropy of "same part" over the near pairs of the chosen points: the mean of the clouds' means.
 
     points: float (n, k, 3); parts: int (n, k); chosen: indices of points, int (m,).
     """
     embeddings = encoder(points, chosen)
     near = near_point_pairs(points[:, chosen])
-    logits = encoder.log_sharpness.exp() * (encoder.threshold - squared_distances(embeddings)[near])
+    logits = encoder.log_sharpness.exp() * (encoder.threshold - squared_distances(embeddings))
     parts = parts[:, chosen]
-    same = (parts[:, :, None] == parts[:, None, :])[near]
-    return binary_cross_entropy_with_logits(logits, same.float())
+    same = (parts[:, :, None] == parts[:, None, :]).float()
+    losses = binary_cross_entropy_with_logits(logits, same, reduction="none") * near
+    of_clouds = losses.sum(dim=(1, 2)) / near.sum(dim=(1, 2)).clamp(min=1)
+    return of_clouds.mean()

@@ -33,7 +33,7 @@ class PointEncoderConfig(ModelConfig):
     batch_size: int = Field(8, ge=1, le=65_536, description="samples of an optimiser step; unit: samples")
     learning_rate: float = Field(6e-3, gt=0, le=1, description="initial rate of Adam; it falls linearly to a twentieth")
     steps: int = Field(
-        100, ge=1, le=1_000_000, description="optimiser steps of a round, one or two minutes of work; unit: steps"
+        100, ge=1, le=1_000_000, description="optimiser steps of a round, some fifteen seconds of work; unit: steps"
     )
     max_rounds: int = Field(6, ge=1, le=10_000, description="maximum number of rounds; unit: rounds")
     precision: Literal["auto", "float32", "bfloat16"] = Field(

@@ -32,11 +32,21 @@ class TrainedPointEncoder:
         Points of one part lie close together. It was trained on clouds of some 1,000 points.
         Raises ValueError for an array of another shape, without points, or with numbers that are not finite.
         """
-        cloud = np.asarray(points, np.float64)
-        if cloud.ndim != 2 or cloud.shape[1] != 3 or not len(cloud) or not np.isfinite(cloud).all():
-            raise ValueError(f"a cloud is finite points (n, 3), at least one; this one has the shape {cloud.shape}")
-        embedded: npt.NDArray[np.float32] = self.module(torch.from_numpy(scaled_to_diagonal(cloud))[None])[0].numpy()
+        embedded: npt.NDArray[np.float32] = self.module(_one_cloud(points))[0].numpy()
         return embedded
+
+    @torch.no_grad()
+    def describe(self, points: FloatArray) -> npt.NDArray[np.float32]:
+        """Describe a cloud as a whole, for classifiers and searches: float32 (128,). Takes and raises as `embed`."""
+        description: npt.NDArray[np.float32] = self.module.describe(_one_cloud(points))[0].numpy()
+        return description
+
+
+def _one_cloud(points: FloatArray) -> torch.Tensor:
+    cloud = np.asarray(points, np.float64)
+    if cloud.ndim != 2 or cloud.shape[1] != 3 or not len(cloud) or not np.isfinite(cloud).all():
+        raise ValueError(f"a cloud is finite points (n, 3), at least one; this one has the shape {cloud.shape}")
+    return torch.from_numpy(scaled_to_diagonal(cloud))[None]
 
 
 def load_point_encoder(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedPointEncoder:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import trimesh
 
 from eval.worth.labelled_clouds import model_clouds
 from eval.worth.real_sets import PROGRAMS, real_sets
+from eval.worth.rows import Training, network_tables
 from pipeline.errors import ConfigError
 from pipeline.shards import ShardWriter, array_bytes
 from stages.model_files.folder import model_files
@@ -112,3 +114,18 @@ def test_test_shapes_of_published_programs_are_of_the_validation_split() -> None
     tested, labelled, note = chairs.read()
     assert (tested.points.shape, labelled.points.shape, note) == ((3, 1024, 3), (2, 2048, 3), "")
     assert all(len(np.unique(parts)) > 2 for parts in tested.parts)
+
+
+def test_categories_are_recognised_where_there_are_two() -> None:
+    if not (SHARED / PROGRAMS).is_file():
+        pytest.skip("needs the published programs")
+    sets = [real for real in real_sets(SHARED, None, "auto", 4, 3, 1) if real.name in ("chair", "storage")]
+    training = Training(steps=1, labelled=(0, 3), labelled_steps=1, repetitions=1, ways=(), seed=1)
+    without, labelled = network_tables("random weights", None, sets, sets, training)
+    columns = ("learnt from", "shapes", "chair", "chair ±", "storage", "storage ±")
+    assert (without.columns, labelled.columns) == (columns, (*columns, "category", "category ±"))
+    assert labelled.rows[0][6] in [100 * right / 8 for right in range(9)]
+    (one_category,) = network_tables("random weights", None, sets[:1], sets[:1], replace(training, labelled=(3,)))
+    assert one_category.columns == columns[:4]
+    (one_tested,) = network_tables("real furniture", None, sets[:1], sets, replace(training, labelled=(3,)))
+    assert one_tested.rows[0][4:] == ("", "", "", "")

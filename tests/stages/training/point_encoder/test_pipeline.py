@@ -50,6 +50,11 @@ def test_encoder_learns_from_all_samples_of_a_mixture(tmp_path: Path) -> None:
     for wrong in (cloud[:0], cloud[:, :2], np.full((4, 3), np.nan)):
         with pytest.raises(ValueError, match="a cloud is finite points"):
             model.embed(wrong)
+        with pytest.raises(ValueError, match="a cloud is finite points"):
+            model.describe(wrong)
+    description = model.describe(cloud)
+    assert description.shape == (128,)
+    np.testing.assert_allclose(model.describe(3.0 * cloud[::-1] + 7.0), description, atol=1e-3)
     card = (tmp_path / "toy-models" / "tiny-toy-0" / "README.md").read_text(encoding="utf-8")
     assert "A `point_encoder` of collection `toy`" in card
     assert json.dumps(model.header["counts"]["train"]) == '{"shapes": 6}'
