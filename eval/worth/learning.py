@@ -17,6 +17,9 @@ from stages.training.point_encoder.settings import Augmentation, PointEncoderCon
 from stages.training.point_encoder.training import PointEncoderTask
 
 TESTED_POINTS_IN_PAIRS = 512
+FIRST_RATE: float = PointEncoderConfig.model_fields["learning_rate"].default
+FINE_TUNING_RATE = 1e-3
+"""Initial rate of Adam for a network that has learnt already: with that of a first training it forgets."""
 
 
 def trained_encoder(
@@ -25,15 +28,21 @@ def trained_encoder(
     steps: int,
     rng: np.random.Generator,
     ways: Collection[Augmentation] = (),
-    progress: Callable[[int, int], None] = lambda done, steps: None,
+    learning_rate: float = FIRST_RATE,
 ) -> PointEncoder:
     """Return a copy of an encoder after `steps` further steps on clouds."""
     config = PointEncoderConfig(
-        name="worth", kind="point_encoder", steps=steps, max_rounds=1, device="cpu", augmentation=tuple(ways)
+        name="worth",
+        kind="point_encoder",
+        steps=steps,
+        max_rounds=1,
+        device="cpu",
+        augmentation=tuple(ways),
+        learning_rate=learning_rate,
     )
     task = PointEncoderTask(deepcopy(encoder), {}, config, clouds, None)
     with torch.random.fork_rng(devices=[]):
-        train(TrainState.of(task), rng, progress)
+        train(TrainState.of(task), rng, lambda done, steps: None)
     learnt: PointEncoder = task.module.eval()
     return learnt
 

@@ -10,7 +10,13 @@ import numpy as np
 
 from eval.engine.table import Cell, Table
 from eval.worth.categories import tells_categories
-from eval.worth.learning import precision_of_distance, precision_of_encoder, trained_encoder
+from eval.worth.learning import (
+    FINE_TUNING_RATE,
+    FIRST_RATE,
+    precision_of_distance,
+    precision_of_encoder,
+    trained_encoder,
+)
 from eval.worth.real_sets import RealSet
 from pipeline.randomness import decision_rng
 from stages.shape.arrays import FloatArray
@@ -75,7 +81,8 @@ def network_tables(
             rng = decision_rng(training.seed, "worth", "training", name, repetition)
             encoder = trained_encoder(encoder, clouds, training.steps, rng, training.ways)
         for count in training.labelled:
-            of_count = _results(encoder, tested, count, training, repetition)
+            rate = FIRST_RATE if clouds is None else FINE_TUNING_RATE
+            of_count = _results(encoder, tested, count, rate, training, repetition)
             if tested == sets:
                 of_count |= _category_results(encoder, sets, count, training, repetition)
             for column, percents in of_count.items():
@@ -85,7 +92,7 @@ def network_tables(
 
 
 def _results(
-    encoder: PointEncoder, tested: Sequence[RealSet], count: int, training: Training, repetition: int
+    encoder: PointEncoder, tested: Sequence[RealSet], count: int, rate: float, training: Training, repetition: int
 ) -> dict[str, FloatArray]:
     """Return the precision on each real set with as many labelled shapes, after learning from them."""
     results = {}
@@ -95,7 +102,8 @@ def _results(
             rng = decision_rng(training.seed, "worth", "labelled", real.name, count, repetition)
             learnt = encoder
             if count:
-                learnt = trained_encoder(encoder, _drawn(labelled, count, rng), training.labelled_steps, rng)
+                chosen = _drawn(labelled, count, rng)
+                learnt = trained_encoder(encoder, chosen, training.labelled_steps, rng, learning_rate=rate)
             results[real.name] = precision_of_encoder(learnt, test_clouds)
     return results
 
