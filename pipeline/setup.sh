@@ -6,6 +6,7 @@
 set -eu
 
 VERSIONS="3.11 3.12 3.13"
+APT_INSTALL="install -y --no-install-recommends"
 KERNEL_PACKAGES="numba scipy pydantic PyYAML tqdm"  # what modules with kernels import
 
 fail() { printf '%s\n' "$@" >&2; exit 1; }
@@ -49,8 +50,7 @@ missing_libraries() {
 }
 
 # Sets `sudo` to what lets apt install packages, or says who has to install them.
-find_rights() {
-    command="apt-get install -y --no-install-recommends $*"
+find_sudo() {
     if ! command -v apt-get >/dev/null; then
         fail "Shapemill needs what Debian calls: $*" "Install that, then run make again."
     elif [ "$(id -u)" = 0 ]; then
@@ -59,12 +59,11 @@ find_rights() {
         sudo="sudo"
     else
         fail "Shapemill needs packages that only root may install. Run this, then make again:" \
-            "    sudo apt-get update && sudo $command"
+            "    sudo apt-get update && sudo apt-get $APT_INSTALL $*"
     fi
 }
 
 install_packages() {
-    command="apt-get install -y --no-install-recommends $*"
     echo "installing $*"
     if [ -z "$updated" ]; then
         # shellcheck disable=SC2086
@@ -73,14 +72,14 @@ install_packages() {
     fi
     # A set-up that was stopped may have left an apt-get that goes on.
     # shellcheck disable=SC2086
-    $sudo env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=120 ${command#apt-get } ||
-        fail "apt-get failed. This must work before make can go on:" "    $sudo $command"
+    $sudo env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=120 $APT_INSTALL "$@" ||
+        fail "apt-get failed. This must work before make can go on:" "    $sudo apt-get $APT_INSTALL $*"
 }
 
 python_packages=$(missing_python | tr '\n' ' ') libraries=$(missing_libraries | tr '\n' ' ')
 updated="" apt=""
 # shellcheck disable=SC2086
-if [ -n "${python_packages% }${libraries% }" ]; then find_rights $python_packages $libraries; fi
+if [ -n "${python_packages% }${libraries% }" ]; then find_sudo $python_packages $libraries; fi
 # shellcheck disable=SC2086
 if [ -n "${python_packages% }" ]; then install_packages $python_packages; fi
 # Nothing that set-up runs loads the libraries: they come while pip works.
@@ -106,7 +105,7 @@ grep '^--' requirements.lock >> "$requirements"
 count() { grep -c "$1" .venv/install.log || true; }
 
 # Waits for the packages that apt installs; without them set-up ends, and apt has said why.
-end_apt() {
+wait_for_apt() {
     if [ -n "$apt" ]; then wait "$apt" || exit 1; apt=""; fi
 }
 
@@ -118,7 +117,7 @@ pip_install() {
     while kill -0 "$pip" 2>/dev/null; do
         sleep 1
         seconds=$((seconds + 1))
-        if [ -n "$apt" ] && ! kill -0 "$apt" 2>/dev/null; then end_apt; fi
+        if [ -n "$apt" ] && ! kill -0 "$apt" 2>/dev/null; then wait_for_apt; fi
         if [ $((seconds % 5)) = 0 ]; then
             found=$(count '^Collecting\|^Requirement already')
             new=$(find .venv/lib -maxdepth 3 -name '*.dist-info' -newer .venv/requirements.txt | wc -l)
@@ -144,4 +143,4 @@ nice .venv/bin/python -m pipeline.compile_kernels > .venv/kernels.log 2> .venv/k
 kernels=$!
 pip_install --constraint requirements.lock --requirement "$requirements"
 pip_install --no-deps --no-build-isolation --editable .
-end_apt
+wait_for_apt

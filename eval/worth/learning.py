@@ -17,8 +17,8 @@ from stages.training.point_encoder.settings import Augmentation, PointEncoderCon
 from stages.training.point_encoder.training import PointEncoderTask
 
 TESTED_POINTS_IN_PAIRS = 512
-FIRST_RATE: float = PointEncoderConfig.model_fields["learning_rate"].default
-FINE_TUNING_RATE = 1e-3
+FIRST_LEARNING_RATE: float = PointEncoderConfig.model_fields["learning_rate"].default
+FINE_TUNING_LEARNING_RATE = 1e-3
 """Initial rate of Adam for a network that has learnt already: with that of a first training it forgets."""
 
 
@@ -28,9 +28,10 @@ def trained_encoder(
     steps: int,
     rng: np.random.Generator,
     ways: Collection[Augmentation] = (),
-    learning_rate: float = FIRST_RATE,
+    learning_rate: float = FIRST_LEARNING_RATE,
+    on_step: Callable[[], None] = lambda: None,
 ) -> PointEncoder:
-    """Return a copy of an encoder after `steps` further steps on clouds."""
+    """Return a copy of an encoder after `steps` further steps on clouds, in evaluation mode."""
     config = PointEncoderConfig(
         name="worth",
         kind="point_encoder",
@@ -42,7 +43,7 @@ def trained_encoder(
     )
     task = PointEncoderTask(deepcopy(encoder), {}, config, clouds, None)
     with torch.random.fork_rng(devices=[]):
-        train(TrainState.of(task), rng, lambda done, steps: None)
+        train(TrainState.of(task), rng, lambda done, steps: on_step())
     learnt: PointEncoder = task.module.eval()
     return learnt
 

@@ -21,9 +21,9 @@ CONTEXT_WIDTH = 128
 HIDDEN_WIDTH = 128
 EMBEDDING_WIDTH = 32
 NEIGHBORS_PER_POINT = 16
-STRIDES = (1, 2, 4)
+DILATIONS = (1, 2, 4)
 """Each edge convolution looks at every n-th of the nearest points: the later, the farther."""
-NEAREST_POINTS = max(*NEIGHBOR_COUNTS, NEIGHBORS_PER_POINT * STRIDES[-1])
+NEAREST_POINTS = max(*NEIGHBOR_COUNTS, NEIGHBORS_PER_POINT * DILATIONS[-1])
 MAX_PAIR_DISTANCE = 0.15
 """Largest distance of a near pair, in diagonals of the bounding box."""
 INITIAL_THRESHOLD = 0.6
@@ -74,8 +74,8 @@ class PointEncoder(nn.Module):
         """Return the features of each point after the first layer and after each edge convolution."""
         nearest = nearest_neighbors(points, min(NEAREST_POINTS, points.shape[1]))
         layers = [self._first_layer(points, nearest)]
-        for convolution, stride in zip(self.convolutions, STRIDES, strict=True):
-            layers.append(convolution(layers[-1], _strided(nearest, stride)))
+        for convolution, dilation in zip(self.convolutions, DILATIONS, strict=True):
+            layers.append(convolution(layers[-1], _dilated(nearest, dilation)))
         return layers
 
     def _context(self, features: Tensor) -> Tensor:
@@ -83,13 +83,13 @@ class PointEncoder(nn.Module):
 
     def _first_layer(self, points: Tensor, nearest: Tensor) -> Tensor:
         surface = batch_normed(self.surface_norm, self.surface(local_surface(points, nearest)))
-        offsets = self.offsets(points, _strided(nearest, 1))
+        offsets = self.offsets(points, _dilated(nearest, 1))
         layer: Tensor = self.first(torch.cat([offsets, leaky_relu(surface, LEAKY_SLOPE)], dim=-1))
         return layer
 
 
-def _strided(nearest: Tensor, stride: int) -> Tensor:
-    return nearest[..., : NEIGHBORS_PER_POINT * stride : stride].contiguous()
+def _dilated(nearest: Tensor, dilation: int) -> Tensor:
+    return nearest[..., : NEIGHBORS_PER_POINT * dilation : dilation].contiguous()
 
 
 class OffsetConvolution(nn.Module):
