@@ -128,7 +128,7 @@ def inspect(
 
 @COMMANDS.command(rich_help_panel=DATASETS)
 def with_models(
-    models: Annotated[list[str], typer.Argument(metavar="MODEL", help="a folder of models, or models of one kit")],
+    models: Annotated[list[str], typer.Argument(metavar="MODEL", help="models, or a folder of them")],
     config: ConfigOption = DEFAULT_CONFIG,
     out: OutOption = DEFAULT_OUT,
 ) -> None:
@@ -138,7 +138,8 @@ def with_models(
     from stages.model_files.folder import model_paths
 
     paths = [path for text in models for path in model_paths(text)]
-    name, content = config_with_models(config, paths)
+    name, content, warnings = config_with_models(config, paths)
+    print(*warnings, sep="\n", end="\n" if warnings else "", file=sys.stderr)
     print(write_file(out / f"{name}.yaml", content))
 
 

@@ -40,7 +40,7 @@ def test_models_take_the_place_of_the_kits_and_all_else_stays(models: Path, tmp_
     config = tmp_path / "two.yaml"
     text = "name: two\nseed: 7\nexemplars:\n  kits: [{name: a, shapes: [a.glb]}]\n  limits: {parts: 99}\n"
     config.write_text(text, encoding="utf-8")
-    name, content = config_with_models(config, [models])
+    name, content, warnings = config_with_models(config, [models])
     values = yaml.safe_load(content)
     assert name == values["name"] == f"two-{models.name}"
     assert values["seed"] == 7
@@ -48,12 +48,51 @@ def test_models_take_the_place_of_the_kits_and_all_else_stays(models: Path, tmp_
     (kit,) = values["exemplars"]["kits"]
     assert "appearance" not in kit
     assert kit["shapes"] == [str(models / f"rack{shelves}.glb") for shelves in (2, 3, 4)]
+    assert kit["name"] == models.name
+    assert warnings == []
 
 
 def test_textures_stay_asked_for(models: Path) -> None:
-    _, content = config_with_models(FEW_SHOT, [models])
+    _, content, _ = config_with_models(FEW_SHOT, [models])
     (kit,) = yaml.safe_load(content)["exemplars"]["kits"]
     assert kit["appearance"] == "textures"
+
+
+def write_pair(path: Path, side: float) -> Path:
+    """Two equal cubes, one on the other."""
+    scene = trimesh.Scene()
+    for height in (0.5, 1.5):
+        cube = trimesh.creation.box((side, side, side))
+        cube.apply_translation((0.0, height * side, 0.0))
+        scene.add_geometry(cube, node_name=f"cube.{height}", geom_name=f"cube{height}")
+    scene.export(path)
+    return path
+
+
+def test_models_without_a_type_in_common_are_kits_of_their_own(models: Path, tmp_path: Path) -> None:
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+    small, large = write_pair(tmp_path / "one" / "pair.glb", 1.0), write_pair(tmp_path / "two" / "pair.glb", 3.0)
+    racks = [models / f"rack{shelves}.glb" for shelves in (2, 3, 4)]
+    _, content, warnings = config_with_models(FEW_SHOT, [racks[0], small, *racks[1:], large])
+    kits = {kit["name"]: kit["shapes"] for kit in yaml.safe_load(content)["exemplars"]["kits"]}
+    assert kits == {"rack2": [str(rack) for rack in racks], "pair": [str(small)], "pair-2": [str(large)]}
+    assert warnings == []
+
+
+def test_models_without_use_are_left_out_and_named(models: Path, tmp_path: Path) -> None:
+    trimesh.creation.icosphere(1).export(tmp_path / "ball.stl")
+    (tmp_path / "broken.glb").write_bytes(b"no model")
+    kept = write_pair(tmp_path / "pair.glb", 1.0)
+    _, content, warnings = config_with_models(FEW_SHOT, [tmp_path])
+    (kit,) = yaml.safe_load(content)["exemplars"]["kits"]
+    assert kit["shapes"] == [str(kept)]
+    ball, broken = warnings
+    assert ball.startswith(f"left out: {tmp_path / 'ball.stl'}: has 1 part")
+    assert broken.startswith(f"left out: {tmp_path / 'broken.glb'}: ")
+    kept.unlink()
+    with pytest.raises(ConfigError, match=r"(?s)ball\.stl: has 1 part.*broken\.glb"):
+        config_with_models(FEW_SHOT, [tmp_path])
 
 
 def test_missing_path_and_folder_without_models_are_refused(tmp_path: Path) -> None:
@@ -74,7 +113,7 @@ def test_three_models_become_shapes_with_other_rows_and_proportions(models: Path
 
     code, printed = shapemill("with-models", "--config", config, "--out", out, "--", models)
     assert code == 0, printed
-    written = Path(printed.strip())
+    written = Path(printed.splitlines()[-1])
     assert written.parent == out
     code, printed = shapemill("run", "--config", written, "--out", out, "--workers", 1)
     assert code == 0, printed
