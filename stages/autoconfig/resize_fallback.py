@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 from pipeline.randomness import decision_rng
 from stages.autoconfig.closed_box import is_closed_box
@@ -23,6 +24,8 @@ from stages.proportions.stage import CANDIDATES_PER_SAMPLE
 from stages.proportions.text import ProportionShapes, proportion_text
 from stages.proportions.warp import Lattice
 from stages.proportions.warp_check import warp_fault
+from stages.rows.changes import Change
+from stages.rows.divisions import Division
 from stages.rows.held_rows import is_held_together
 from stages.rows.kit_rows import KitRow, rows_of_kit
 from stages.rows.layout import layout_of
@@ -33,6 +36,8 @@ from stages.shape.physics.settings import Requirements
 from stages.shape.resolved_settings import FALLBACK_KEY, FALLBACK_STABLE_KEY, PROPORTIONS_FALLBACK, ROWS_FALLBACK
 from stages.shape.shape import Shape, kit_shape
 
+Kind = Literal["new plan", "longer or shorter", "other proportions"]
+"""What is new in a shape: other parts or others next to each other, other lengths of rows, or other sizes alone."""
 TRIAL_DRAWS = 36
 """Draws of a trial, of all exemplars together."""
 MAX_LAYOUTS_TRIED = 24
@@ -53,28 +58,33 @@ class ResizeEstimate:
 
     success_rate: share of the draws that hold together.
     different: number of different shapes that a dataset finds, at most MAX_SAMPLES_REQUESTED.
-    shapes: the most different of the draws, at most the number asked for, each with whether it has other rows.
+    shapes: the most different of the draws, at most the number asked for, each with what is new in it.
     typical: the first of the draws, as many.
     stable: whether a dataset should require stable shapes, since all exemplars are.
     is_closed_box: whether all exemplars are closed boxes.
-    other_layouts: number of layouts with longer or shorter rows among the draws.
-    rows_share: share of the draws with longer or shorter rows, of those that hold together.
-    rows: rows of the exemplars that become longer and shorter.
+    layouts: number of other layouts among the draws, by what is new in them.
+    shares: share of each kind in the draws that hold together.
+    rows: rows of the exemplars that become longer and shorter, and fronts that are divided.
     """
 
     success_rate: float
     different: int
-    shapes: Sequence[tuple[Shape, bool]]
-    typical: Sequence[tuple[Shape, bool]]
+    shapes: Sequence[tuple[Shape, Kind]]
+    typical: Sequence[tuple[Shape, Kind]]
     stable: bool
     is_closed_box: bool
-    other_layouts: int = 0
-    rows_share: float = 0.0
+    layouts: Mapping[Kind, int]
+    shares: Mapping[Kind, float]
     rows: Sequence[KitRow] = ()
 
     @property
+    def other_layouts(self) -> int:
+        """Number of other layouts among the draws."""
+        return sum(self.layouts.values())
+
+    @property
     def has_rows(self) -> bool:
-        """Whether there are enough layouts with longer or shorter rows to speak of."""
+        """Whether there are enough other layouts to speak of."""
         return self.other_layouts >= MIN_OTHER_LAYOUTS_FOUND
 
     @property
@@ -83,7 +93,10 @@ class ResizeEstimate:
         if self.has_rows:
             count = "dozens of" if self.other_layouts >= MAX_LAYOUTS_TRIED else f"about {self.other_layouts}"
             named = "; ".join(row.sentence for row in self.rows[:MAX_ROWS_SHOWN])
-            return f"{count} layouts with longer and shorter rows ({named}), in hundreds of proportions"
+            has_divisions = [row.is_division for row in self.rows]
+            rows, fronts = "longer and shorter rows" * (not all(has_divisions)), "divided fronts" * any(has_divisions)
+            what = " and ".join(filter(None, (rows, fronts)))
+            return f"{count} layouts with {what} ({named}), in hundreds of proportions"
         count = "hundreds" if self.different >= MAX_SAMPLES_REQUESTED else f"about {rounded_text(self.different)}"
         sentence = f"{count} of the same layout in other proportions"
         if not self.is_closed_box:
@@ -160,6 +173,13 @@ def _unvaried(resolved: ResolvedKit, own_kinds: bool) -> Resolution:
     return replace(resolution, values=values, reasons=reasons)
 
 
+def _kind(changes: Sequence[Change]) -> Kind:
+    """Return what is new in a layout with some changes."""
+    if any(isinstance(change, Division) for change in changes):
+        return "new plan"
+    return "longer or shorter" if changes else "other proportions"
+
+
 def _different(lattice: Lattice, config: ProportionsConfig, exemplar: int, wanted: int) -> int:
     """Return how many different shapes of an exemplar a run finds that wants `wanted`, if all hold together."""
     rng = decision_rng(0, RANDOM_STREAM, "different", exemplar)
@@ -182,18 +202,18 @@ def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
     stable = all(unmet_requirement(required, kit_shape(kit, exemplar.whole)) is None for exemplar in kit.exemplars)
     config = config.model_copy(update={"require": required if stable else Requirements()})
     count, shapes_of = len(kit.exemplars), ProportionShapes(kit)
-    tried = held = different = others = 0
-    shapes: list[tuple[Shape, bool]] = []
-    typical: list[tuple[Shape, bool]] = []
-    resized_rows = 0
+    tried = different = 0
+    shapes: list[tuple[Shape, Kind]] = []
+    typical: list[tuple[Shape, Kind]] = []
+    others, held = Counter[Kind](), Counter[Kind]()
     for number, exemplar in enumerate(kit.exemplars):
         streams = partial(decision_rng, 0, RANDOM_STREAM, "rows", number)
         wanted = -(-MAX_LAYOUTS_TRIED // count)
         layouts = drawn_layouts(shapes_of, exemplar.name, config, rows, wanted, streams, lambda *_: None)
-        others += sum(bool(layout.changes) for layout in layouts)
+        others.update(_kind(layout.changes) for layout in layouts if layout.changes)
         sides = shapes_of.unwarped(exemplar.name, ()).lattice.sides
         texts: list[str] = []
-        made: dict[str, tuple[Shape, bool]] = {}
+        made: dict[str, tuple[Shape, Kind]] = {}
         for draw in range(-(-TRIAL_DRAWS // count)):
             rng = decision_rng(0, RANDOM_STREAM, "proportions", number, draw)
             layout = layouts[draw % len(layouts)]
@@ -203,9 +223,8 @@ def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
             fault = warp_fault(kit, layout.unwarped.assembly, shape) or unmet_requirement(config.require, shape)
             if fault is None:
                 texts.append(proportion_text(proportions))
-                made[texts[-1]] = shape, bool(layout.changes)
-        held += len(made)
-        resized_rows += sum(has_other_rows for _, has_other_rows in made.values())
+                made[texts[-1]] = shape, _kind(layout.changes)
+        held.update(kind for _, kind in made.values())
         shown = len(range(number, max_shapes, count))
         shapes += [made[text] for text, _ in chosen_texts(shapes_of, texts, shown, config.min_difference)]
         typical += list(made.values())[:shown]
@@ -214,13 +233,13 @@ def estimate_resizing(kit: Kit, max_shapes: int) -> ResizeEstimate:
     closed = all(is_closed_box(kit_shape(kit, exemplar.whole)) for exemplar in kit.exemplars)
     found = rows_of_kit(kit) if others else ()
     return ResizeEstimate(
-        success_rate=held / max(tried, 1),
+        success_rate=held.total() / max(tried, 1),
         different=different,
         shapes=shapes,
         typical=typical,
         stable=stable,
         is_closed_box=closed,
-        other_layouts=others,
-        rows_share=resized_rows / max(held, 1),
+        layouts=others,
+        shares={kind: count / held.total() for kind, count in held.items()},
         rows=found,
     )

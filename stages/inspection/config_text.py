@@ -125,13 +125,17 @@ def proportions_section(different: int, stable: bool, why: str, layouts: str, ha
     different: number of different shapes that can be found.
     stable: whether shapes must be stable; `why` is the reason.
     layouts: the yield estimate of new layouts, a sentence.
-    has_rows: whether rows of the exemplars become longer and shorter.
+    has_rows: whether rows of the exemplars become longer and shorter, or fronts are divided.
     """
     more = "raise it for more" if different >= MAX_SAMPLES_REQUESTED else "that differ by proportions.min_difference"
     return [
         "variations:",
         _line(1, "samples_per_kit", 0, f"other layouts: {layouts}"),
-        *(["  rows:", _line(2, "use", True, "resized exemplars get longer and shorter rows")] if has_rows else []),
+        *(
+            ["  rows:", _line(2, "use", True, "resized exemplars get other rows and divided fronts")]
+            if has_rows
+            else []
+        ),
         "proportions:",
         _line(1, "samples_per_kit", min(different, MAX_SAMPLES_REQUESTED), f"the same parts resized; {more}"),
         "  require:",

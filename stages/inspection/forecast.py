@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from stages.autoconfig.resize_fallback import MAX_LAYOUTS_TRIED, ResizeEstimate
+from stages.autoconfig.resize_fallback import MAX_LAYOUTS_TRIED, Kind, ResizeEstimate
 from stages.autoconfig.trial_search import type_counts
 from stages.autoconfig.yield_estimate import MAX_ESTIMATE_GRAPHS, MAX_SAMPLES_REQUESTED, YieldEstimate, rounded_text
 from stages.shape.arrays import FloatArray
@@ -18,7 +17,6 @@ from stages.variations.report.measures import have_new_plans
 from stages.variations.requirements.identity import label_counts
 from stages.variations.search.variant import Variant
 
-Kind = Literal["new plan", "longer or shorter", "other proportions"]
 TITLES: dict[Kind, str] = {
     "new plan": "new plans",
     "longer or shorter": "longer and shorter",
@@ -75,17 +73,15 @@ def forecast(kit: Kit, layouts: YieldEstimate | None, resizing: ResizeEstimate |
 
 
 def _of_resizing(resizing: ResizeEstimate) -> Forecast:
-    """Return the forecast of resized exemplars: a shape with other rows is longer or shorter."""
-    longer = resizing.rows_share if resizing.has_rows else 0.0
-    shares: dict[Kind, float] = {"longer or shorter": longer, "other proportions": 1.0 - longer}
-    numbers: dict[Kind, int] = {
-        "longer or shorter": resizing.other_layouts if longer else 0,
-        "other proportions": resizing.different if longer < 1.0 else 0,
-    }
-    is_bound: dict[Kind, bool] = {
-        "longer or shorter": resizing.other_layouts >= MAX_LAYOUTS_TRIED,
-        "other proportions": resizing.different >= MAX_SAMPLES_REQUESTED,
-    }
+    """Return the forecast of resized exemplars."""
+    shares: dict[Kind, float] = {"other proportions": 1.0}
+    if resizing.has_rows:
+        shares = {kind: resizing.shares[kind] for kind in TITLES if kind in resizing.shares}
+    numbers = {kind: max(1, resizing.layouts.get(kind, 0)) for kind in shares}
+    is_bound = dict.fromkeys(shares, resizing.other_layouts >= MAX_LAYOUTS_TRIED)
+    if "other proportions" in shares:
+        numbers["other proportions"] = resizing.different
+        is_bound["other proportions"] = resizing.different >= MAX_SAMPLES_REQUESTED
     return Forecast(shares, numbers, is_bound, "")
 
 

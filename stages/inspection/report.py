@@ -187,11 +187,7 @@ def inspect_models(
             resizing, resolution, built = fallback.estimate, fallback.resolution, fallback.built
             stated = resolved.config.resolve(resolution.values)
             shapes, typical = (
-                [
-                    ShownShape(shape, "longer or shorter" if other_rows else "other proportions")
-                    for shape, other_rows in drawn
-                ]
-                for drawn in (resizing.shapes, resizing.typical)
+                [ShownShape(shape, kind) for shape, kind in drawn] for drawn in (resizing.shapes, resizing.typical)
             )
     observed = built
     if stated.resolved().hubs or stated.resolved().disconnected == "largest":

@@ -37,15 +37,19 @@ def chosen_texts(
 
 
 def _by_layout(shapes: ProportionShapes, texts: Sequence[str]) -> list[tuple[Unwarped, list[str]]]:
-    """Return the layouts of texts with the texts of each, in order of appearance."""
-    read: dict[bytes, tuple[Unwarped, list[str]]] = {}
-    keys: dict[str, bytes] = {}
+    """Return the layouts of texts with the texts of each, in order of appearance.
+
+    Layouts that look the same are one, unless parts that are off by a tolerance give one of them more intervals.
+    """
+    read: dict[tuple[bytes, tuple[int, ...]], tuple[Unwarped, list[str]]] = {}
+    keys: dict[str, tuple[bytes, tuple[int, ...]]] = {}
     for text in texts:
         proportions = read_proportions(text)
         changes = _changes_key(proportions)
         if changes not in keys:
             unwarped = shapes.unwarped(proportions.exemplar, proportions.changes)
-            keys[changes] = b"" if unwarped.layout is None else unwarped.layout.key
+            intervals = tuple(len(lengths) for lengths in unwarped.lattice.lengths)
+            keys[changes] = b"" if unwarped.layout is None else unwarped.layout.key, intervals
             read.setdefault(keys[changes], (unwarped, []))
         read[keys[changes]][1].append(text)
     return list(read.values())

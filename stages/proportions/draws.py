@@ -15,6 +15,7 @@ from stages.proportions.warp_check import warp_fault
 from stages.rows.changes import Change
 from stages.rows.draws import LayoutDraws
 from stages.rows.settings import RowsConfig
+from stages.rows.slabs import RowChange
 from stages.rows.turns import Turn
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.judge import unmet_requirement
@@ -134,7 +135,7 @@ def _stiff_axes(changes: Sequence[Change]) -> set[int]:
     for change in changes:
         if isinstance(change, Turn):
             stiff |= {0, 1, 2} - {change.axis}
-        elif np.count_nonzero(change.shift) > 1:
+        elif isinstance(change, RowChange) and np.count_nonzero(change.shift) > 1:
             stiff |= set(np.flatnonzero(change.shift).tolist())
     return stiff
 

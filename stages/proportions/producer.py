@@ -20,7 +20,10 @@ def _has_rows(config: Config) -> bool:
 
 
 def _sentence(config: Config) -> str:
-    rows = "Where the exemplars have rows, periods of these may be inserted or removed before. "
+    rows = (
+        "Where the exemplars have rows, periods of these may be inserted or removed before, and fronts such as doors "
+        "may be divided. "
+    )
     return (
         "exemplars are resized: along each axis the lengths between the ends of their parts are multiplied, equal "
         "lengths by equal factors. One map moves all of space, so parts that touch keep touching. "
@@ -29,7 +32,7 @@ def _sentence(config: Config) -> str:
 
 
 def _limits(config: Config) -> Sequence[str]:
-    differ = "sizes and the lengths of rows" if _has_rows(config) else "sizes"
+    differ = "sizes, the lengths of rows and the number of fronts" if _has_rows(config) else "sizes"
     return (
         f"All shapes have the kinds of parts and contacts of an exemplar; only {differ} differ.",
         "Round parts become oval, and slopes change.",

@@ -1,5 +1,5 @@
-"""Changes of a layout: periods of a row along a line, bays between mirrored ends, bays of modules, or another number of
-sectors about an axis; and their JSON.
+"""Changes of a layout: periods of a row along a line, bays between mirrored ends, bays of modules, another number of
+sectors about an axis, or divided fronts; and their JSON.
 """
 
 from __future__ import annotations
@@ -10,14 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from stages.rows.divisions import MAX_PIECES, Division, divided
 from stages.rows.layout import Layout
 from stages.rows.mirrored_bays import with_mirrored_bays
 from stages.rows.modular_bays import with_modular_bays
 from stages.rows.slabs import RowChange, repeat
 from stages.rows.turns import Turn, turned
 
-Change = RowChange | Turn
+Change = RowChange | Turn | Division
 
+AXES = ("x", "y", "z")
 MAX_TIMES = 1000
 """Most periods or sectors that one change may make."""
 
@@ -26,6 +28,8 @@ def changed(layout: Layout, change: Change) -> Layout:
     """Return a changed layout. Raises SlabError for a change that is not valid."""
     if isinstance(change, Turn):
         return turned(layout, change)
+    if isinstance(change, Division):
+        return divided(layout, change)
     if change.is_modular:
         return with_modular_bays(layout, change)
     return with_mirrored_bays(layout, change) if change.is_mirrored else repeat(layout, change)
@@ -35,7 +39,9 @@ def change_json(change: Change) -> dict[str, Any]:
     """Return a change as JSON."""
     if isinstance(change, Turn):
         centre, numbers = change.centre.tolist(), {"sectors": change.sectors, "count": change.count}
-        return {"axis": "xyz"[change.axis], "centre": centre, **numbers}
+        return {"axis": AXES[change.axis], "centre": centre, **numbers}
+    if isinstance(change, Division):
+        return {"fronts": list(change.fronts), "axis": AXES[change.axis], "pieces": change.count}
     return {
         "normal": change.normal.tolist(),
         "shift": change.shift.tolist(),
@@ -59,12 +65,17 @@ def read_changes(text: str) -> list[Change]:
 
 def read_change(stated: Mapping[str, Any]) -> Change:
     """Return a change from its JSON. Raises ValueError, TypeError or KeyError."""
+    if "fronts" in stated:
+        fronts, pieces = tuple(int(part) for part in stated["fronts"]), int(stated["pieces"])
+        if stated["axis"] not in AXES or not fronts or min(fronts) < 0 or not 2 <= pieces <= MAX_PIECES:
+            raise ValueError(f"fronts are divided along x, y or z into 2 to {MAX_PIECES} pieces, unlike {stated}")
+        return Division(fronts, AXES.index(stated["axis"]), pieces)
     if "axis" in stated:
         centre = np.array(stated["centre"], dtype=np.float64).reshape(3)
         sectors, count = int(stated["sectors"]), int(stated["count"])
-        if stated["axis"] not in ("x", "y", "z") or not np.isfinite(centre).all() or not 0 < count <= MAX_TIMES:
+        if stated["axis"] not in AXES or not np.isfinite(centre).all() or not 0 < count <= MAX_TIMES:
             raise ValueError(f"a row about an axis (x, y or z) has 1 to {MAX_TIMES} sectors, unlike {stated}")
-        return Turn("xyz".index(stated["axis"]), centre, sectors, count)
+        return Turn(AXES.index(stated["axis"]), centre, sectors, count)
     normal, shift = (np.array(stated[key], dtype=np.float64).reshape(3) for key in ("normal", "shift"))
     at, times = float(stated["at"]), int(stated["times"])
     numbers = [*normal.tolist(), *shift.tolist(), at]

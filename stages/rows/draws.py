@@ -9,6 +9,7 @@ from contextlib import suppress
 import numpy as np
 
 from stages.rows.changes import Change
+from stages.rows.divisions import Division, divided, find_divisions
 from stages.rows.layout import Layout
 from stages.rows.mirrored_bays import MIRRORED_ENDS, MirroredBay, find_mirrored_bays, with_mirrored_bays
 from stages.rows.modular_bays import ModularBay, find_modular_bays, with_modular_bays
@@ -35,7 +36,7 @@ class LayoutDraws:
 
         is_alone: whether nothing but rows makes layouts: then bays are inserted and removed too, those of modules where
             there are no rows, and rows that are too small to be seen stay as they are
-        up: index of the axis that points up; with it, bays between mirrored ends are inserted too
+        up: index of the axis that points up; with it, bays between mirrored ends are inserted and fronts are divided
         """
         self.exemplar, self.config, self._is_alone = layout, config, is_alone
         self.steps = [*steps_of(layout), *(bays_of(layout) if is_alone else ())]
@@ -48,12 +49,18 @@ class LayoutDraws:
         self.modular_bays: list[ModularBay] = []
         if is_alone and not (self.rows or self.circles):
             self.modular_bays = find_modular_bays(layout, {0, 1, 2} - {bay.axis for bay in self.mirrored_bays})
+        self.divisions: list[list[Division]] = find_divisions(layout, up) if is_alone and up is not None else []
         self._with_modules: dict[tuple[tuple[int, int], ...], tuple[RowChange, Layout] | None] = {}
 
     @property
     def can_change(self) -> bool:
         """Whether anything in the exemplar can become longer or shorter."""
-        return bool(self.rows or self.circles or self.mirrored_bays or self.modular_bays)
+        return bool(self.rows or self.has_bays_or_circles or self.divisions)
+
+    @property
+    def has_bays_or_circles(self) -> bool:
+        """Whether there are circles, bays between mirrored ends, or bays of modules."""
+        return bool(self.circles or self.mirrored_bays or self.modular_bays)
 
     @property
     def rows(self) -> Sequence[Row]:
@@ -63,6 +70,9 @@ class LayoutDraws:
     def draw(self, rng: np.random.Generator) -> tuple[tuple[Change, ...], Layout] | None:
         """Return changes and the layout that they make, or None where no change was possible."""
         layout, changes = self.exemplar, list[Change]()
+        division = self._drawn_division(rng)
+        if division is not None:
+            return self._with_other_rows(divided(layout, division), [division], rng)
         first = self._drawn_bays(rng) or self._drawn_circle(rng)
         if first is None and self.modular_bays:
             return self._drawn_modules(rng)
@@ -73,10 +83,20 @@ class LayoutDraws:
             changes, layout = [change], made
         if not self.rows and (self.circles or self.mirrored_bays):
             return (tuple(changes), layout) if changes else None
+        return self._with_other_rows(layout, changes, rng)
+
+    def _with_other_rows(
+        self, layout: Layout, changes: list[Change], rng: np.random.Generator
+    ) -> tuple[tuple[Change, ...], Layout] | None:
+        """Return a changed exemplar whose rows change too, or None where nothing has changed.
+
+        changes: those that have made `layout`; with a division among them, rows may stay as they are
+        """
         # Along inserted bays a row would change in one bay alone, and leave a blank stretch of wall in another.
         barred = changes[0].normal if changes and isinstance(changes[0], RowChange) else None
         changed_shifts = set[bytes]()
-        for _ in range(int(rng.integers(1, self.config.max_changes + 1))):
+        has_divisions = any(isinstance(change, Division) for change in changes)
+        for _ in range(int(rng.integers(1, self.config.max_changes + 1)) - has_divisions):
             for _ in range(TRIES_PER_CHANGE):
                 changed = self._change(layout, rng, barred, changed_shifts)
                 if changed is not None:
@@ -84,6 +104,13 @@ class LayoutDraws:
                     changes += changed[0]
                     break
         return (tuple(changes), layout) if changes and layout.key != self.exemplar.key else None
+
+    def _drawn_division(self, rng: np.random.Generator) -> Division | None:
+        """Return fronts that are divided, or None where something else is changed."""
+        if not self.divisions or ((self.rows or self.has_bays_or_circles) and rng.random() < 0.5):
+            return None
+        alike = self.divisions[int(rng.integers(len(self.divisions)))]
+        return alike[int(rng.integers(len(alike)))]
 
     def _drawn_modules(self, rng: np.random.Generator) -> tuple[tuple[Change, ...], Layout] | None:
         """Return the exemplar with more or fewer bays of modules along one axis or several, or None."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stages.rows.divisions import Division, find_divisions
 from stages.rows.layout import Layout, layout_of
 from stages.rows.mirrored_bays import MIRRORED_ENDS, MirroredBay, find_mirrored_bays
 from stages.rows.modular_bays import ModularBay, find_modular_bays
@@ -23,11 +24,11 @@ MAX_RATIO_DIFFERENCE = 0.02
 
 @dataclass(frozen=True)
 class KitRow:
-    """A row of an exemplar that can become longer or shorter.
+    """A row of an exemplar that can become longer or shorter, or fronts that can be divided.
 
     exemplar: name of the exemplar
     labels: number of parts of each label in one period, most frequent first; of a bay, the labels of its ends
-    count: parts of the row
+    count: parts of the row; of divided fronts, the largest number of pieces of each
     direction: `along x`, `along y`, `along z`, `along a slope`, or `about x`, `about y` or `about z`
     """
 
@@ -38,12 +39,15 @@ class KitRow:
     is_bay: bool = False
     is_mirrored: bool = False
     is_modular: bool = False
+    is_division: bool = False
 
     @property
     def sentence(self) -> str:
         """What the row is, such as `5 times board, along y`, or `bays between side, along x`."""
         names = [f"{count} {label}" if count > 1 else label for label, count in self.labels[:MAX_LABELS_SHOWN]]
         more = " and more" if len(self.labels) > MAX_LABELS_SHOWN else ""
+        if self.is_division:
+            return f"{names[0]} in up to {self.count} pieces, {self.direction}"
         if self.is_modular:
             return f"bays of {', '.join(label for label, _ in self.labels[:MAX_LABELS_SHOWN])}{more}, {self.direction}"
         if self.is_bay:
@@ -54,7 +58,7 @@ class KitRow:
 
 def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
     """Return the rows of all exemplars of a kit that can be seen: circles, then the longest along each direction, then
-    bays, those between mirrored ends last; bays of modules where these are missing.
+    bays, those between mirrored ends last; bays of modules where these are missing; and fronts that can be divided.
     """
     found: list[KitRow] = []
     for exemplar in kit.exemplars:
@@ -67,14 +71,17 @@ def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
             if is_visible(layout, row.copied, row.count)
         ]
         bays = [_described_bay(kit, exemplar.name, layout, row) for row in along_bays]
-        along_mirrored = find_mirrored_bays(layout, "xyz".index(kit.up))
+        up = "xyz".index(kit.up)
+        along_mirrored = find_mirrored_bays(layout, up)
         mirrored = [_described_mirrored(kit, exemplar.name, layout, bay) for bay in along_mirrored]
         modular: list[KitRow] = []
         if not (circles or rows or bays):
             free = {0, 1, 2} - {bay.axis for bay in along_mirrored}
             longest = _longest(find_modular_bays(layout, free))
             modular = [_described_modules(kit, exemplar.name, layout, bay) for bay in longest]
-        found += dict.fromkeys([*circles, *rows, *bays, *mirrored, *modular])
+        fronts = [_divided(kit, exemplar.name, layout, alike) for alike in find_divisions(layout, up)]
+        divisions = [row for described in fronts for row in described]
+        found += dict.fromkeys([*circles, *rows, *bays, *mirrored, *modular, *divisions])
     return tuple(found)
 
 
@@ -129,6 +136,18 @@ def _described_modules(kit: Kit, exemplar: str, layout: Layout, bay: ModularBay)
     counts = Counter(kit.types[kind].label for kind in layout.types[bay.parts].tolist())
     labels, direction = tuple(counts.most_common()), f"along {'xyz'[bay.axis]}"
     return KitRow(exemplar, labels, bay.count, direction, is_bay=True, is_modular=True)
+
+
+def _divided(kit: Kit, exemplar: str, layout: Layout, alike: Sequence[Division]) -> list[KitRow]:
+    """Return the divisions of fronts of one size, one for each axis."""
+    label = kit.types[layout.types[alike[0].fronts[0]]].label
+    most: dict[int, int] = {}
+    for division in alike:
+        most[division.axis] = max(most.get(division.axis, 0), division.count)
+    return [
+        KitRow(exemplar, ((label, 1),), count, f"along {'xyz'[axis]}", is_division=True)
+        for axis, count in sorted(most.items())
+    ]
 
 
 def _direction(row: Row) -> str:

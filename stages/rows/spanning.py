@@ -217,24 +217,37 @@ def _clipped_and_repeated(span: Span, times: int) -> tuple[LengthenedMesh, Float
 def _posed(
     span: Span, points: FloatArray, faces: np.ndarray, owners: np.ndarray, weights: FloatArray | None = None
 ) -> tuple[LengthenedMesh, FloatArray]:
-    """Return a surface of the used vertices with the origin in the middle of its box, and its pose.
+    return posed(span.mesh, span.pose, points, faces, owners, weights)
 
+
+def posed(
+    mesh: PartMesh,
+    pose: FloatArray,
+    points: FloatArray,
+    faces: np.ndarray,
+    owners: np.ndarray,
+    weights: FloatArray | None = None,
+) -> tuple[LengthenedMesh, FloatArray]:
+    """Return a changed surface of a part, of the used vertices alone, with the origin in the middle of its box, and its
+    pose.
+
+    mesh, pose: of the part before
+    points: vertices in the world, float64 (v, 3)
     owners: the face of the part that each face is, or is a piece of, int64 (f,)
     weights: barycentric coordinates of the corners of such pieces, float64 (f, 3, 3)
     """
-    mesh = span.mesh
     used, index = np.unique(faces, return_inverse=True)
     points, faces = points[used], index.reshape(-1, 3).astype(np.int32)
     centre = np.round((points.min(axis=0) + points.max(axis=0)) / 2, 12)
-    pose = np.eye(4)
-    pose[:3, 3] = centre
+    placed = np.eye(4)
+    placed[:3, 3] = centre
     look = mesh.appearance
     if look is not None:
         look = look.select(owners) if weights is None else look.interpolated(owners, weights)
-        look = look.turned(span.pose[:3, :3])
+        look = look.turned(pose[:3, :3])
     of = mesh.of if isinstance(mesh, LengthenedMesh) else mesh
     colors = mesh.face_colors[owners]
-    return LengthenedMesh(mesh.name, points - centre, faces, colors, of, appearance=look), pose
+    return LengthenedMesh(mesh.name, points - centre, faces, colors, of, appearance=look), placed
 
 
 def _clipped(

@@ -57,6 +57,32 @@ def cabinet(stands_out: float = 0.0) -> tuple[Kit, Layout]:
     return layout(meshes, [*sides, ("top", pose(0.0, 1.025, 0.0)), *inside])
 
 
+CHEST = {"body": box(1.0, 1.0, 0.4), "door": box(0.9, 0.9, 0.04), "knob": box(0.04, 0.04, 0.05)}
+
+
+@cache
+def chest_with_door(doors: int = 1) -> tuple[Kit, Layout]:
+    """A body with doors next to each other at its front, each with a knob near its right edge."""
+    width = 0.9 / doors - 0.02 * (doors - 1)
+    meshes = CHEST | {"door": box(width, 0.9, 0.04)}
+    places = [(number + 0.5) * 0.9 / doors - 0.45 for number in range(doors)]
+    fronts = [("door", pose(x, 0.5, 0.22)) for x in places]
+    knobs = [("knob", pose(x + width / 2 - 0.06, 0.5, 0.265)) for x in places]
+    return layout(meshes, [("body", pose(0.0, 0.5, 0.0)), *fronts, *knobs])
+
+
+@cache
+def chest_with_glass_door() -> tuple[Kit, Layout]:
+    """A body with a framed pane at its front; the pane touches the frame alone."""
+    solid = np.ones((3, 3), dtype=bool)
+    solid[1, 1] = False
+    frame = plate([0.0, 0.1, 0.8, 0.9], [0.0, 0.1, 0.8, 0.9], 0.04, solid)
+    frame.apply_translation([-0.45, -0.45, 0.0])
+    meshes = CHEST | {"frame": frame, "pane": box(0.7, 0.7, 0.02)}
+    parts = [("body", pose(0.0, 0.5, 0.0)), ("frame", pose(0.0, 0.5, 0.22)), ("pane", pose(0.0, 0.5, 0.23))]
+    return layout(meshes, parts)
+
+
 @cache
 def table_of_boxes() -> tuple[Kit, Layout]:
     """A table with two boxes on it, each as long as half of it."""
