@@ -46,6 +46,12 @@ MIN_OTHER_LAYOUTS_FOUND = 2
 """Layouts with other rows from which a dataset has them."""
 MIN_LAYOUTS_INSTEAD = 4
 """Layouts with other rows, of at most MAX_LAYOUTS_TRIED, from which these replace what a search finds."""
+MAX_ALIKE_DISTANCE = 0.15
+"""Median of E (strings §5.3) between the most different layouts of a search up to which these look alike to people."""
+MIN_MODULAR_LAYOUTS = 8
+"""Layouts with other bays of modules, of at most MAX_LAYOUTS_TRIED, from which these replace layouts that look alike.
+Exchange finds no such bays, but it finds rows."""
+ALIKE = "what an exchange finds looks alike"
 HELD_ROWS = "the parts that hold the rows would stay as they are in an exchange"
 MAX_ROWS_SHOWN = 3
 MIN_SUCCESS_RATE = 0.2
@@ -116,12 +122,14 @@ class ResizeFallback:
 def resize_fallback(resolved: ResolvedKit, layouts: YieldEstimate | None, max_shapes: int) -> ResizeFallback | None:
     """Return the fallback with at most `max_shapes` shapes; None if it is not needed or not possible.
 
-    It is needed if `layouts` promises next to no layouts or only similar ones, and where large parts hold rows, which
-    an exchange leaves as they are. It is possible if enough resized exemplars hold together.
+    It is needed if `layouts` promises next to no layouts or only similar ones, where large parts hold rows, which an
+    exchange leaves as they are, and where layouts of a search look alike. It is possible if enough resized exemplars
+    hold together.
     layouts: what a search promises; None where its trial found enough
     """
     is_poor = layouts is not None and not resolved.resolution.is_sufficient and layouts.is_poor
-    if not is_poor and not _holds_rows(resolved):
+    are_held = not is_poor and _holds_rows(resolved)
+    if not (is_poor or are_held or _look_alike(resolved)):
         return None
     for own_kinds in (False, True):
         unvaried = _unvaried(resolved, own_kinds)
@@ -131,15 +139,24 @@ def resize_fallback(resolved: ResolvedKit, layouts: YieldEstimate | None, max_sh
             break
     else:
         return None
-    if not is_poor and estimate.other_layouts < MIN_LAYOUTS_INSTEAD:
+    if are_held and estimate.other_layouts < MIN_LAYOUTS_INSTEAD:
         return None
-    instead = f"of other layouts {layouts.sentence}" if is_poor and layouts else HELD_ROWS
+    has_modules = any(row.is_modular for row in estimate.rows)
+    if not (is_poor or are_held) and (not has_modules or estimate.other_layouts < MIN_MODULAR_LAYOUTS):
+        return None
+    instead = f"of other layouts {layouts.sentence}" if is_poor and layouts else HELD_ROWS if are_held else ALIKE
     reason = f"{estimate.success_rate:.0%} of what is drawn holds together; {instead}"
     stable_reason = "the exemplars are stable" if estimate.stable else "not even the exemplars are stable"
     fallback = ROWS_FALLBACK if estimate.has_rows else PROPORTIONS_FALLBACK
     values = {**unvaried.values, FALLBACK_KEY: fallback, FALLBACK_STABLE_KEY: estimate.stable}
     reasons = {**unvaried.reasons, FALLBACK_KEY: reason, FALLBACK_STABLE_KEY: stable_reason}
     return ResizeFallback(replace(unvaried, values=values, reasons=reasons), built, estimate)
+
+
+def _look_alike(resolved: ResolvedKit) -> bool:
+    """Return whether the layouts of a trial search look alike."""
+    trial, kit = resolved.resolution.trial, resolved.observe(resolved.resolution.values).kit
+    return trial is not None and trial.pair_distance <= MAX_ALIKE_DISTANCE and not (kit.one_surface or kit.by_meaning)
 
 
 def _holds_rows(resolved: ResolvedKit) -> bool:

@@ -6,13 +6,13 @@ alone, such as a handle. Its pieces are stretched copies; what hangs on it is co
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stages.rows.layout import Layout, sorted_edges, with_classes
-from stages.rows.rows import MIN_AREA_SHARE
 from stages.rows.slabs import SlabError
 from stages.rows.spanning import posed
 from stages.shape.arrays import FloatArray
@@ -22,8 +22,8 @@ MIN_COVER = 0.93
 """Smallest share of the face of its box that a front covers with what hangs on it, such as the pane of a glass door."""
 COVER_PIXELS = 64
 """Pixels along each side of that face."""
-MAX_FRONT_SHARE = 0.4
-"""Largest share of a shape's surface that a front has."""
+MIN_FRONT_SHARE, MAX_FRONT_SHARE = 0.01, 0.4
+"""Smallest and largest share of a shape's surface that a front has."""
 MIN_HUNG_SHARE, MAX_HUNG_SHARE = 0.004, 2.0
 """Smallest and largest area of what hangs on a front, as a multiple of the front's own; less are screws in a panel."""
 MIN_HELD_SHARE = 0.5
@@ -74,9 +74,14 @@ class Front:
 def find_divisions(layout: Layout, up: int) -> list[list[Division]]:
     """Return for each set of fronts of one size the divisions of all of them, and of each alone.
 
+    All parts of a type are fronts, or no part of it: walls of a building set are structure, also one with a banner.
+
     up: index of the axis that points up; what lies flat is no front, but a shelf with something on it
     """
     fronts = [front for part in range(len(layout)) if (front := _front(layout, part)) is not None and front.thin != up]
+    counts, of_fronts = Counter(layout.types.tolist()), Counter(int(layout.types[front.part]) for front in fronts)
+    structure = {kind for kind, count in of_fronts.items() if count < counts[kind]}
+    fronts = [front for front in fronts if int(layout.types[front.part]) not in structure]
     found: list[list[Division]] = []
     for peers in _peers(layout, fronts):
         groups = [peers, *([front] for front in peers if len(peers) > 1)]
@@ -119,7 +124,7 @@ def _front(layout: Layout, part: int) -> Front | None:
     long = [axis for axis in range(3) if axis != thin]
     areas = layout.areas
     share = areas[part] / areas.sum()
-    if not MIN_AREA_SHARE <= share <= MAX_FRONT_SHARE or not sides[long].min() > 0:
+    if not MIN_FRONT_SHARE <= share <= MAX_FRONT_SHARE or not sides[long].min() > 0:
         return None
     main, hung = _held_by(layout, part)
     if not len(main) or not MIN_HUNG_SHARE <= areas[hung].sum() / areas[part] <= MAX_HUNG_SHARE:

@@ -281,9 +281,10 @@ class VariationsConfig(StrictModel):
     fallback: Literal["auto", "nothing"] = Field(
         "auto",
         description="What is made of exemplars for which a short search finds almost no other layouts, or only similar "
-        "ones, and of those whose rows are held by parts that most others touch, such as a cabinet. `auto`: for a "
-        "single kit with `auto` keys, the same number of shapes of the same layout in other proportions, by the "
-        "section `proportions`, and with other rows if there are any, if these hold together.",
+        "ones, and of those whose rows are held by parts that most others touch, such as a cabinet; also of models of "
+        "a building set whose layouts look alike, but whose storeys or bays can be inserted. `auto`: for a single kit "
+        "with `auto` keys, the same number of resized shapes, by the section `proportions`, with other rows, bays and "
+        "fronts if there are any, if these hold together.",
     )
     search: SearchConfig = Field(default_factory=SearchConfig, description="How variants are searched for.")
     rows: RowsConfig = Field(

@@ -347,6 +347,11 @@ def casement() -> tuple[Kit, Layout]:
 @cache
 def tower(storeys: int = 4, has_door: bool = False) -> tuple[Kit, Layout]:
     """Storeys of four tiles and four walls under a roof. No wall stands above one with an equal opening."""
+    return layout(*tower_parts(storeys, has_door))
+
+
+def tower_parts(storeys: int = 4, has_door: bool = False) -> tuple[dict[str, trimesh.Trimesh], list[Placed]]:
+    """Return the meshes of `tower` by name, and its parts."""
     xs, ys = [-0.4, -0.2, 0.2, 0.4], [-0.45, -0.2, 0.2, 0.45]
     openings: dict[str, list[int]] = {"wall": [], "window": [1], "vent": [2], "hatch": [0], "door": [0, 1]}
     meshes = {}
@@ -362,7 +367,7 @@ def tower(storeys: int = 4, has_door: bool = False) -> tuple[Kit, Layout]:
             name = ("wall", "window", "vent", "hatch")[(number + storey) % 4]
             is_door = has_door and storey == number == 0
             placed.append(("door" if is_door else name, pose(x, storey + 0.55, z, quarter_turns=number)))
-    return layout(meshes, placed)
+    return meshes, placed
 
 
 @cache

@@ -112,6 +112,16 @@ def test_other_parts_stay_whole(parts: list[tuple[str, np.ndarray]], reason: str
     assert not find_divisions(layout, UP_AXIS), reason
 
 
+def test_walls_of_which_one_holds_a_banner_stay_whole() -> None:
+    meshes = {"floor": box(4.0, 0.1, 1.0), "wall": box(0.9, 0.9, 0.1), "banner": box(0.4, 0.4, 0.02)}
+    walls = [("wall", pose(x, 0.5, 0.0)) for x in (-1.5, -0.5, 0.5, 1.5)]
+    banners = [("banner", pose(x, 0.5, 0.06)) for x in (-1.5, -0.5)]
+    _, layout = models.layout(meshes, [("floor", pose(0.0, 0.0, 0.0)), *walls, *banners])
+    assert not find_divisions(layout, UP_AXIS)
+    _, layout = models.layout(meshes, [("floor", pose(0.0, 0.0, 0.0)), *walls[:2], *banners])
+    assert find_divisions(layout, UP_AXIS)
+
+
 def test_a_table_top_on_its_legs_stays_whole() -> None:
     _, layout = models.table_of_boxes()
     assert not find_divisions(layout, UP_AXIS)
