@@ -6,7 +6,6 @@ alone, such as a handle. Its pieces are stretched copies; what hangs on it is co
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -22,6 +21,10 @@ MIN_COVER = 0.93
 """Smallest share of the face of its box that a front covers with what hangs on it, such as the pane of a glass door."""
 COVER_PIXELS = 64
 """Pixels along each side of that face."""
+MIN_FLAT_SHARE = 0.5
+"""Share of a front's surface that is parallel to that face: the lid of a laptop leans, and a car's bumper is round."""
+MIN_FLAT_COSINE = 0.996
+"""Cosine of the angle of two faces from which they are parallel."""
 MIN_FRONT_SHARE, MAX_FRONT_SHARE = 0.01, 0.4
 """Smallest and largest share of a shape's surface that a front has."""
 MIN_HUNG_SHARE, MAX_HUNG_SHARE = 0.004, 2.0
@@ -74,13 +77,13 @@ class Front:
 def find_divisions(layout: Layout, up: int) -> list[list[Division]]:
     """Return for each set of fronts of one size the divisions of all of them, and of each alone.
 
-    All parts of a type are fronts, or no part of it: walls of a building set are structure, also one with a banner.
+    All parts of a type are fronts or behind one, or no part of it is: walls of a building set are structure, also one
+    with a banner.
 
     up: index of the axis that points up; what lies flat is no front, but a shelf with something on it
     """
     fronts = [front for part in range(len(layout)) if (front := _front(layout, part)) is not None and front.thin != up]
-    counts, of_fronts = Counter(layout.types.tolist()), Counter(int(layout.types[front.part]) for front in fronts)
-    structure = {kind for kind, count in of_fronts.items() if count < counts[kind]}
+    structure = {int(layout.types[part]) for part in range(len(layout)) if not _is_behind_any(layout, part, fronts)}
     fronts = [front for front in fronts if int(layout.types[front.part]) not in structure]
     found: list[list[Division]] = []
     for peers in _peers(layout, fronts):
@@ -95,6 +98,16 @@ def find_divisions(layout: Layout, up: int) -> list[list[Division]]:
         if valid:
             found.append(valid)
     return found
+
+
+def _is_behind_any(layout: Layout, part: int, fronts: Sequence[Front]) -> bool:
+    """Return whether a part is a front, or has the outline of one, such as the back of a drawer in two sheets."""
+    reach = 2.0 * layout.mate_tolerance
+    gaps = (np.abs(layout.boxes[part] - layout.boxes[front.part]).max(axis=0) for front in fronts)
+    return any(
+        front.part == part or (np.delete(gap, front.thin) <= reach).all()
+        for front, gap in zip(fronts, gaps, strict=True)
+    )
 
 
 def divided(layout: Layout, division: Division) -> Layout:
@@ -132,7 +145,7 @@ def _front(layout: Layout, part: int) -> Front | None:
     low, high = layout.boxes[part, 0] - layout.tolerance, layout.boxes[part, 1] + layout.tolerance
     if (layout.boxes[hung, 0] < low)[:, long].any() or (layout.boxes[hung, 1] > high)[:, long].any():
         return None
-    if _cover(layout, part, hung, thin) < MIN_COVER:
+    if _flat_share(layout, part, thin) < MIN_FLAT_SHARE or _cover(layout, part, hung, thin) < MIN_COVER:
         return None
     pieces = [0, 0, 0]
     for axis, other in (long, long[::-1]):
@@ -140,6 +153,14 @@ def _front(layout: Layout, part: int) -> Front | None:
         if len(_holders(layout, part, main, axis)):
             pieces[axis] = int(min(MAX_PIECES, sides[axis] / shortest))
     return Front(part, hung, thin, (pieces[0], pieces[1], pieces[2])) if max(pieces) >= 2 else None
+
+
+def _flat_share(layout: Layout, part: int, axis: int) -> float:
+    """Return the share of a part's surface that lies across an axis."""
+    corners = layout.points[part][layout.meshes[part].faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1)
+    return float(areas[np.abs(normals[:, axis]) >= MIN_FLAT_COSINE * areas].sum() / max(areas.sum(), 1e-300))
 
 
 def _cover(layout: Layout, part: int, hung: np.ndarray, axis: int) -> float:

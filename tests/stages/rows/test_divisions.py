@@ -112,7 +112,16 @@ def test_other_parts_stay_whole(parts: list[tuple[str, np.ndarray]], reason: str
     assert not find_divisions(layout, UP_AXIS), reason
 
 
-def test_walls_of_which_one_holds_a_banner_stay_whole() -> None:
+def test_a_front_that_leans_stays_whole() -> None:
+    tilt = trimesh.transformations.rotation_matrix(0.2, [1, 0, 0])
+    _, layout = models.chest_with_door()
+    poses = layout.poses.copy()
+    poses[1:] = trimesh.transformations.translation_matrix([0.0, 0.0, 0.1]) @ tilt @ poses[1:]
+    leaning = Layout(layout.meshes, poses, layout.types, layout.classes, layout.origins, layout.edges, 0.1, 0.1)
+    assert not find_divisions(leaning, UP_AXIS)
+
+
+def test_walls_stay_whole_if_one_of_them_has_no_banner() -> None:
     meshes = {"floor": box(4.0, 0.1, 1.0), "wall": box(0.9, 0.9, 0.1), "banner": box(0.4, 0.4, 0.02)}
     walls = [("wall", pose(x, 0.5, 0.0)) for x in (-1.5, -0.5, 0.5, 1.5)]
     banners = [("banner", pose(x, 0.5, 0.06)) for x in (-1.5, -0.5)]
