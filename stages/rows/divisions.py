@@ -26,8 +26,8 @@ MIN_FLAT_SHARE = 0.5
 MIN_FLAT_COSINE = 0.996
 """Cosine of the angle of two faces from which they are parallel."""
 MIN_FRONT_SHARE, MAX_FRONT_SHARE = 0.01, 0.4
-"""Smallest and largest share of a shape's surface that a front has."""
-MIN_HUNG_SHARE, MAX_HUNG_SHARE = 0.004, 2.0
+"""Smallest share of a shape's surface that a front has with what hangs on it, and largest that it has alone."""
+MIN_HUNG_SHARE, MAX_HUNG_SHARE = 0.004, 3.0
 """Smallest and largest area of what hangs on a front, as a multiple of the front's own; less are screws in a panel."""
 MIN_HELD_SHARE = 0.5
 """Share of a front's length from which a part next to it holds it along its length."""
@@ -136,23 +136,34 @@ def _front(layout: Layout, part: int) -> Front | None:
     thin = int(sides.argmin())
     long = [axis for axis in range(3) if axis != thin]
     areas = layout.areas
-    share = areas[part] / areas.sum()
-    if not MIN_FRONT_SHARE <= share <= MAX_FRONT_SHARE or not sides[long].min() > 0:
+    if areas[part] > MAX_FRONT_SHARE * areas.sum() or not sides[long].min() > 0:
         return None
     main, hung = _held_by(layout, part)
     if not len(main) or not MIN_HUNG_SHARE <= areas[hung].sum() / areas[part] <= MAX_HUNG_SHARE:
+        return None
+    if areas[part] + areas[hung].sum() < MIN_FRONT_SHARE * areas.sum():
         return None
     low, high = layout.boxes[part, 0] - layout.tolerance, layout.boxes[part, 1] + layout.tolerance
     if (layout.boxes[hung, 0] < low)[:, long].any() or (layout.boxes[hung, 1] > high)[:, long].any():
         return None
     if _flat_share(layout, part, thin) < MIN_FLAT_SHARE or _cover(layout, part, hung, thin) < MIN_COVER:
         return None
+    if not _stands_out(layout, part, hung, thin) and _cover(layout, part, hung[:0], thin) >= MIN_COVER:
+        return None  # what hangs on it is behind it, and it is no frame around a pane
     pieces = [0, 0, 0]
     for axis, other in (long, long[::-1]):
         shortest = max(MIN_SLENDERNESS * sides[other], MIN_THICKNESSES * sides[thin])
         if len(_holders(layout, part, main, axis)):
             pieces[axis] = int(min(MAX_PIECES, sides[axis] / shortest))
     return Front(part, hung, thin, (pieces[0], pieces[1], pieces[2])) if max(pieces) >= 2 else None
+
+
+def _stands_out(layout: Layout, part: int, hung: np.ndarray, axis: int) -> bool:
+    """Return whether some of what hangs on a front is before it or in it, on the side away from the shape's middle."""
+    middle = (layout.boxes[:, 0, axis].min() + layout.boxes[:, 1, axis].max()) / 2
+    sign = 1.0 if layout.boxes[part, :, axis].mean() >= middle else -1.0
+    outer, inner = (sign * layout.boxes[:, :, axis]).max(axis=1), float((sign * layout.boxes[part, :, axis]).min())
+    return bool((outer[hung] > (outer[part] + inner) / 2).any())
 
 
 def _flat_share(layout: Layout, part: int, axis: int) -> float:

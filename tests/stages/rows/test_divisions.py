@@ -100,13 +100,25 @@ def test_doors_of_one_size_are_divided_together_or_alone() -> None:
         ([("door", pose(0.0, 0.5, 0.22)), ("screw", pose(0.0, 0.5, 0.245))], "a screw alone hangs on it"),
         ([("door", pose(0.0, 0.5, 0.26)), ("hinge", pose(-0.4, 0.5, 0.22)), ("knob", pose(0.3, 0.5, 0.305))],
          "a hinge alone holds it"),
+        ([("door", pose(0.0, 0.5, 0.27)), ("ring", pose(0.0, 0.5, 0.225)), ("lamp", pose(0.0, 0.5, 0.24))],
+         "what hangs on it is behind it"),
         ([("disc", pose(0.0, 0.5, 0.22)), ("knob", pose(0.3, 0.5, 0.265))], "it is round"),
         ([("door", pose(0.0, 0.5, 0.22)), ("bar", pose(0.0, 0.5, 0.27))], "a bar reaches beyond it"),
     ],
 )  # fmt: skip
 def test_other_parts_stay_whole(parts: list[tuple[str, np.ndarray]], reason: str) -> None:
     disc = trimesh.creation.cylinder(0.45, 0.04)
-    others = {"hinge": box(0.02, 0.1, 0.04), "bar": box(1.2, 0.05, 0.06), "disc": disc, "screw": box(0.02, 0.02, 0.01)}
+    solid = np.ones((3, 3), dtype=bool)
+    solid[1, 1] = False
+    ring = models.plate([-0.45, -0.4, 0.4, 0.45], [-0.45, -0.4, 0.4, 0.45], 0.05, solid)
+    others = {
+        "ring": ring,
+        "lamp": box(0.2, 0.2, 0.02),
+        "hinge": box(0.02, 0.1, 0.04),
+        "bar": box(1.2, 0.05, 0.06),
+        "disc": disc,
+        "screw": box(0.02, 0.02, 0.01),
+    }
     meshes = models.CHEST | others
     _, layout = models.layout(meshes, [("body", pose(0.0, 0.5, 0.0)), *parts])
     assert not find_divisions(layout, UP_AXIS), reason
