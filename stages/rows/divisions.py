@@ -58,7 +58,7 @@ class Division:
     count: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Front:
     """A part that can be divided.
 
@@ -139,9 +139,10 @@ def _front(layout: Layout, part: int) -> Front | None:
     if areas[part] > MAX_FRONT_SHARE * areas.sum() or not sides[long].min() > 0:
         return None
     main, hung = _held_by(layout, part)
-    if not len(main) or not MIN_HUNG_SHARE <= areas[hung].sum() / areas[part] <= MAX_HUNG_SHARE:
+    hung_area = float(areas[hung].sum())
+    if not len(main) or not MIN_HUNG_SHARE * areas[part] <= hung_area <= MAX_HUNG_SHARE * areas[part]:
         return None
-    if areas[part] + areas[hung].sum() < MIN_FRONT_SHARE * areas.sum():
+    if areas[part] + hung_area < MIN_FRONT_SHARE * areas.sum():
         return None
     low, high = layout.boxes[part, 0] - layout.tolerance, layout.boxes[part, 1] + layout.tolerance
     if (layout.boxes[hung, 0] < low)[:, long].any() or (layout.boxes[hung, 1] > high)[:, long].any():
