@@ -77,7 +77,7 @@ def make_experiment(experiment: Experiment, scale: Scale, folder: Path, workers:
     if experiment.command:
         return [_command_step(step, folder) for step in planned]
     if experiment.files:
-        return [_table_step(step, None, scaled, experiment.files, folder) for step in planned]
+        return [_table_step(step, None, scaled, experiment.files, folder, workers) for step in planned]
     assert experiment.config is not None
     config = write_scaled_config(experiment, experiment.config, scale, folder)
     steps, failed = [], ""
@@ -86,7 +86,7 @@ def make_experiment(experiment: Experiment, scale: Scale, folder: Path, workers:
             steps.append(replace(step, missing=f"needs what {failed} makes, which failed"))
         elif step.table:
             run = load_dataset_run(config, folder, workers)
-            steps.append(_table_step(step, run, scaled, (), folder))
+            steps.append(_table_step(step, run, scaled, (), folder, workers))
         else:
             steps.append(_pipeline_step(step, config, folder))
             failed = step.command if steps[-1].failure else ""
@@ -162,7 +162,12 @@ def _read_json(path: Path) -> dict[str, Any]:
 
 
 def _table_step(
-    step: PaperStep, run: DatasetRun | None, scaled: ScaledExperiment, files: Sequence[Path], folder: Path
+    step: PaperStep,
+    run: DatasetRun | None,
+    scaled: ScaledExperiment,
+    files: Sequence[Path],
+    folder: Path,
+    workers: int,
 ) -> PaperStep:
     table = find_table(step.table)
     options = table_options(step.table, table.options, scaled.options.get(step.table, {}))
@@ -178,7 +183,7 @@ def _table_step(
         compute = partial(table.compute, run, options)
     else:
         assert table.compute_from_files is not None
-        compute = partial(table.compute_from_files, files, options)
+        compute = partial(table.compute_from_files, files, options, workers)
     made = _made(step, inputs, compute, folder)
     if made.result is not None and run is not None:
         write_tables(run, step.table, made.result)

@@ -12,8 +12,8 @@ import pytest
 import typer
 
 from eval.engine.evaluate import find_table, table_options
-from eval.papers.experiments import planned_steps, write_scaled_config
-from eval.papers.paper import PAPERS, SCALES, Paper, ScaledExperiment, load_paper
+from eval.papers.experiments import make_experiment, planned_steps, write_scaled_config
+from eval.papers.paper import PAPERS, SCALES, Experiment, Paper, ScaledExperiment, load_paper
 from eval.papers.results_page import RESULTS_PAGE, result_cells, results_html, results_page, without_marks
 from pipeline.cli import command_line
 from pipeline.config import load_config
@@ -136,3 +136,14 @@ def test_every_experiment_can_be_planned_at_every_scale(paper: Paper, scale: str
             config = load_config(write_scaled_config(experiment, experiment.config, scale, tmp_path), sections)
             for stage in stages.values():
                 stage.check(config)
+
+
+def test_a_table_about_files_is_made_and_kept(tmp_path: Path) -> None:
+    files = (Path("datasets/exemplars/rows/dresser.glb"),)
+    experiment = Experiment(name="files", files=files, tables=("physical",), scales={"minutes": ScaledExperiment()})
+    (step,) = make_experiment(experiment, "minutes", tmp_path, 1)
+    assert not step.problem
+    assert step.result is not None
+    assert step.result.tables
+    (kept,) = make_experiment(experiment, "minutes", tmp_path, 1)
+    assert kept.seconds == step.seconds
