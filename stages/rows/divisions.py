@@ -1,7 +1,8 @@
-"""Divisions: a front, such as a door, a drawer or a cushion, becomes several next to each other in its place.
+"""Divisions: a front, such as a door or a drawer, becomes several next to each other in its place.
 
-A front nearly fills its box, and is held along its length by something larger. It holds nothing but what hangs on it
-alone, such as a handle. Its pieces are stretched copies; what hangs on it is copied with each and keeps its size.
+A front nearly fills the face of its box, and another part holds it along its length. It holds nothing but what hangs on
+it alone, such as a handle. Its pieces are stretched copies. What hangs on it is copied with them; what is small keeps
+its size.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stages.rows.layout import Layout, sorted_edges, with_classes
+from stages.rows.layout import Layout, sorted_edges, with_classes, with_translates
 from stages.rows.slabs import SlabError
 from stages.rows.spanning import posed
 from stages.shape.arrays import FloatArray
@@ -245,27 +246,12 @@ def _divided(layout: Layout, front: Front, axis: int, count: int) -> Layout:
         mesh = layout.meshes[part]
         meshes[part], poses[part] = posed(mesh, layout.poses[part], points, mesh.faces, np.arange(len(mesh.faces)))
         changed.add(part)
-    step = np.zeros(3)
-    step[axis] = pitch
-    copies = []
-    for number in range(1, count):
-        moved = poses[parts].copy()
-        moved[:, :3, 3] += number * step
-        copies.append(moved)
-    kept = np.concatenate([np.arange(len(layout)), np.tile(np.array(parts, dtype=np.int64), count - 1)])
-    made = replace(
-        layout,
-        meshes=tuple(meshes[part] for part in kept.tolist()),
-        poses=np.concatenate([poses, *copies]),
-        types=layout.types[kept],
-        origins=layout.origins[kept],
-        edges=layout.edges,
-    )
-    made = replace(made, edges=_edges(layout, made, front, axis, count))
     keys = [(kind, 0) for kind in layout.classes.tolist()]
     for part in changed:
         keys[part] = keys[part][0], count * 3 + axis
-    return with_classes(made, [keys[part] for part in kept.tolist()])
+    first = with_classes(replace(layout, meshes=tuple(meshes), poses=poses), keys)
+    made = with_translates(first, np.array(parts), poses[parts], pitch * np.eye(3)[axis], count - 1)
+    return replace(made, edges=_edges(layout, made, front, axis, count))
 
 
 def _mapped(along: FloatArray, low: float, high: float, length: float) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Random layouts of an exemplar: a few rows are made longer or shorter, one after another."""
+"""Random layouts of an exemplar: fronts are divided, and a few rows are made longer or shorter, one after another."""
 
 from __future__ import annotations
 
@@ -26,6 +26,8 @@ MAX_SIDE_FACTOR = 3.0
 """Maximum side of the box around a layout, as a multiple of that of its exemplar, before its size is restored."""
 MAX_LAYOUTS_REMEMBERED = 400
 TRIES_PER_CHANGE = 6
+DIVIDED_SHARE = 0.5
+"""Share of the layouts with divided fronts, where other changes are possible too."""
 
 
 class LayoutDraws:
@@ -54,7 +56,7 @@ class LayoutDraws:
 
     @property
     def can_change(self) -> bool:
-        """Whether anything in the exemplar can become longer or shorter."""
+        """Whether any change of the exemplar is possible."""
         return bool(self.rows or self.has_bays_or_circles or self.divisions)
 
     @property
@@ -107,7 +109,7 @@ class LayoutDraws:
 
     def _drawn_division(self, rng: np.random.Generator) -> Division | None:
         """Return fronts that are divided, or None where something else is changed."""
-        if not self.divisions or ((self.rows or self.has_bays_or_circles) and rng.random() < 0.5):
+        if not self.divisions or ((self.rows or self.has_bays_or_circles) and rng.random() >= DIVIDED_SHARE):
             return None
         alike = self.divisions[int(rng.integers(len(self.divisions)))]
         return alike[int(rng.integers(len(alike)))]

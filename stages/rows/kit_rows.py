@@ -79,9 +79,9 @@ def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
             free = {0, 1, 2} - {bay.axis for bay in along_mirrored}
             longest = _longest(find_modular_bays(layout, free))
             modular = [_described_modules(kit, exemplar.name, layout, bay) for bay in longest]
-        fronts = [_divided(kit, exemplar.name, layout, alike) for alike in find_divisions(layout, up)]
-        divisions = [row for described in fronts for row in described]
-        found += dict.fromkeys([*circles, *rows, *bays, *mirrored, *modular, *divisions])
+        found += dict.fromkeys([*circles, *rows, *bays, *mirrored, *modular])
+        for alike in find_divisions(layout, up):
+            found += _described_divisions(kit, exemplar.name, layout, alike)
     return tuple(found)
 
 
@@ -138,7 +138,7 @@ def _described_modules(kit: Kit, exemplar: str, layout: Layout, bay: ModularBay)
     return KitRow(exemplar, labels, bay.count, direction, is_bay=True, is_modular=True)
 
 
-def _divided(kit: Kit, exemplar: str, layout: Layout, alike: Sequence[Division]) -> list[KitRow]:
+def _described_divisions(kit: Kit, exemplar: str, layout: Layout, alike: Sequence[Division]) -> list[KitRow]:
     """Return the divisions of fronts of one size, one for each axis."""
     label = kit.types[layout.types[alike[0].fronts[0]]].label
     most: dict[int, int] = {}

@@ -257,6 +257,26 @@ def _classes(kit: Kit, whole: Assembly) -> np.ndarray:
     return np.array(classes, dtype=np.int64)
 
 
+def with_translates(layout: Layout, parts: np.ndarray, poses: FloatArray, step: FloatArray, times: int) -> Layout:
+    """Return a layout with `times` copies of some parts after its own, each one step further, without their contacts.
+
+    parts: int64 (k,)
+    poses: from where the copies are moved, float64 (k, 4, 4)
+    step: float64 (3,)
+    """
+    kept = np.concatenate([np.arange(len(layout)), np.tile(parts, times)])
+    copies = np.tile(poses, (times, 1, 1))
+    copies[:, :3, 3] += np.repeat(np.arange(1, times + 1), len(parts))[:, None] * step
+    return replace(
+        layout,
+        meshes=tuple(layout.meshes[part] for part in kept.tolist()),
+        poses=np.concatenate([layout.poses, copies]),
+        types=layout.types[kept],
+        classes=layout.classes[kept],
+        origins=layout.origins[kept],
+    )
+
+
 def sorted_edges(pairs: Sequence[tuple[int, int]] | np.ndarray) -> IntArray:
     """Return distinct pairs i < j in lexicographic order, int32 (m, 2)."""
     edges = np.sort(np.array(pairs, dtype=np.int64).reshape(-1, 2), axis=1)

@@ -15,7 +15,8 @@ class RowsConfig(StrictModel):
     use: Literal["auto"] | bool = Field(
         "auto",
         description="Whether exemplars get longer and shorter rows. `auto`: in a search by `share`, and of resized "
-        "exemplars where a short search finds almost no other layouts (see `fallback`); both only if there are rows.",
+        "exemplars where a short search finds almost no other layouts (see `fallback`); both only if there are rows. "
+        "Fronts of resized exemplars, such as doors, are then divided too.",
     )
     share: float = Field(
         0.25,

@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from stages.rows.layout import Layout, sorted_edges, with_classes
+from stages.rows.layout import Layout, sorted_edges, with_classes, with_translates
 from stages.rows.spanning import Span
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import relative_poses
@@ -493,22 +493,8 @@ def with_copies(slab: Slab, copied: np.ndarray, times: int, edges: IntArray) -> 
     """
     layout = slab.layout
     meshes, poses = _moved(slab, times)
-    copies = []
-    for number in range(1, times + 1):
-        shifted = layout.poses[copied].copy()
-        shifted[:, :3, 3] += number * slab.shift
-        copies.append(shifted)
-    kept = np.concatenate([np.arange(len(layout)), np.tile(copied, times)])
-    grown = replace(
-        layout,
-        meshes=tuple(meshes[part] for part in kept.tolist()),
-        poses=np.concatenate([poses, *copies]),
-        types=layout.types[kept],
-        origins=layout.origins[kept],
-        edges=edges,
-    )
-    keys = _class_keys(slab, times)
-    return with_classes(grown, [keys[part] for part in kept.tolist()])
+    moved = with_classes(replace(layout, meshes=tuple(meshes), poses=poses), _class_keys(slab, times))
+    return replace(with_translates(moved, copied, layout.poses[copied], slab.shift, times), edges=edges)
 
 
 def removed(slab: Slab) -> Layout:
