@@ -6,6 +6,10 @@ without comments, docstrings and formatting. The file name of an entry also depe
 and fields of named tuples), on Python, Numba and the CPU. So each file has one possible content, and concurrent
 processes cannot mix their entries.
 
+A wrapper through which Python calls a kernel takes a fifth of the time of its compilation, and most kernels are called
+by kernels alone. So a kernel that another one calls is compiled without a wrapper. If Python calls it later, it is
+compiled again with one, as an entry of its own.
+
 A process that compiles a kernel holds a lock next to its entry. Others that need the kernel wait, then load it. A
 process that holds one lock waits only for kernels that the locked one calls. Calls between kernels have no circles, so
 waits have none either. MAX_WAIT_SECONDS ends what this leaves: a stopped process, kernels that call one another.
@@ -34,6 +38,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from pipeline.code import SourceTree, absolute_name, code_words, is_prose, read_note, write_note
 from pipeline.compilation_note import note_compilation, note_end_of_compilation
 from pipeline.kernel_folder import DAY_SECONDS, kernel_folder
+from pipeline.quick_compilation import quicken
 
 MAX_WAIT_SECONDS = 600.0
 """A process that has waited this long for another's kernel compiles it by itself."""
@@ -67,10 +72,11 @@ class KernelLocator(caching._CacheLocator):  # type: ignore[misc]
 # Entries ------------------------------------------------------------------------------------------------------------
 
 
-def _entry(store: caching.FunctionCache, signature: Any, codegen: Any) -> caching.IndexDataCacheFile:
-    """Return the index and data files for one signature on one CPU."""
+def _entry(store: caching.FunctionCache, signature: Any, codegen: Any, is_wrapped: bool) -> caching.IndexDataCacheFile:
+    """Return the index and data files for one signature on one CPU, with or without a wrapper for Python."""
     arguments, _ = sigutils.normalize_signature(signature)
-    words = repr((numba.__version__, codegen.magic_tuple(), [_type_words(argument) for argument in arguments]))
+    kinds = [_type_words(argument) for argument in arguments]
+    words = repr((numba.__version__, codegen.magic_tuple(), kinds, is_wrapped))
     base = f"{store._impl.filename_base}.{hashlib.sha256(words.encode()).hexdigest()[:16]}"
     return caching.IndexDataCacheFile(store.cache_path, base, store._impl.locator.get_source_stamp())
 
@@ -90,19 +96,27 @@ def _type_words(argument: Any) -> Any:
 def _load(store: caching.FunctionCache, signature: Any, context: Any) -> Any:
     if not isinstance(store._impl.locator, KernelLocator):
         return _numba_load(store, signature, context)
-    store._cache_file = _entry(store, signature, context.codegen())
-    index = Path(store._cache_file._index_path)
-    compiled = _load_entry(store, signature, context, index)
+    if not _compilations or not _compilations[-1].is_for_python:
+        # A caller in a kernel uses an entry of either kind, and waits for one without a wrapper.
+        compiled = _load_entry(store, signature, context, is_wrapped=True)
+        return compiled or _load_or_lock(store, signature, context, is_wrapped=False)
+    return _load_or_lock(store, signature, context, is_wrapped=True)
+
+
+def _load_or_lock(store: caching.FunctionCache, signature: Any, context: Any, is_wrapped: bool) -> Any:
+    compiled = _load_entry(store, signature, context, is_wrapped)
     if compiled is None and _compilations:
         note_compilation(len(_saved))
-        lock = _lock(index)
+        lock = _lock(Path(store._cache_file._index_path))
         if lock is not None:
-            _compilations[-1].append(lock)
-            compiled = _load_entry(store, signature, context, index)
+            _compilations[-1].locks.append(lock)
+            compiled = _load_entry(store, signature, context, is_wrapped)
     return compiled
 
 
-def _load_entry(store: caching.FunctionCache, signature: Any, context: Any, index: Path) -> Any:
+def _load_entry(store: caching.FunctionCache, signature: Any, context: Any, is_wrapped: bool) -> Any:
+    store._cache_file = _entry(store, signature, context.codegen(), is_wrapped)
+    index = Path(store._cache_file._index_path)
     try:
         compiled = _numba_load(store, signature, context)
         if compiled is not None and time.time() - index.stat().st_mtime > DAY_SECONDS:
@@ -116,7 +130,7 @@ def _load_entry(store: caching.FunctionCache, signature: Any, context: Any, inde
 
 def _save(store: caching.FunctionCache, signature: Any, compiled: Any) -> None:
     if isinstance(store._impl.locator, KernelLocator):
-        store._cache_file = _entry(store, signature, compiled.codegen)
+        store._cache_file = _entry(store, signature, compiled.codegen, _is_wrapped(compiled))
         with suppress(OSError):  # a full disk: the kernel works without an entry
             _numba_save(store, signature, compiled)
         _saved.append(store._cache_file._index_path)
@@ -147,18 +161,40 @@ class _Lock(NamedTuple):
         os.close(self.descriptor)
 
 
-_compilations: list[list[_Lock]] = []
-"""Locks of each call of `Dispatcher.compile` in progress, callers before callees; guarded by Numba's compiler lock."""
+class _Compilation(NamedTuple):
+    """A call of `Dispatcher.compile` in progress."""
+
+    is_for_python: bool
+    """Whether Python calls the kernel, not another kernel."""
+    locks: list[_Lock]
+
+
+_compilations: list[_Compilation] = []
+"""Callers before callees; guarded by Numba's compiler lock."""
 
 _saved: list[str] = []
 """Entries of kernels that this process has compiled."""
 
 
+def compile_for_kernels(kernel: dispatcher.Dispatcher, arguments: tuple[types.Type, ...]) -> None:
+    """Compile a kernel that only kernels call."""
+    _compile_for(kernel, arguments, is_for_python=False)
+
+
 def _compile(kernel: dispatcher.Dispatcher, signature: Any) -> Any:
-    # A wrapper for callers in C takes a tenth of the time of compilation, and kernels have no such callers.
-    kernel.targetoptions["no_cfunc_wrapper"] = True
     with global_compiler_lock:
-        _compilations.append([])
+        return _compile_for(kernel, signature, is_for_python=not _compilations)
+
+
+def _compile_for(kernel: dispatcher.Dispatcher, signature: Any, is_for_python: bool) -> Any:
+    with global_compiler_lock:
+        # A wrapper for callers in C takes a tenth of the time of compilation, and kernels have no such callers.
+        kernel.targetoptions["no_cfunc_wrapper"] = True
+        kernel.targetoptions["no_cpython_wrapper"] = not is_for_python
+        arguments = tuple(sigutils.normalize_signature(signature)[0])
+        if is_for_python and arguments in kernel.overloads and not _is_wrapped(kernel.overloads[arguments]):
+            del kernel.overloads[arguments]
+        _compilations.append(_Compilation(is_for_python, []))
         collects = gc.isenabled()
         gc.disable()  # a kernel leaves little garbage, and looking for it takes a tenth of the time
         try:
@@ -166,10 +202,22 @@ def _compile(kernel: dispatcher.Dispatcher, signature: Any) -> Any:
         finally:
             if collects:
                 gc.enable()
-            for lock in _compilations.pop():
+            for lock in _compilations.pop().locks:
                 lock.release()
             if not _compilations:
                 note_end_of_compilation(len(_saved))
+
+
+def _add_overload(kernel: dispatcher.Dispatcher, compiled: Any) -> None:
+    """Give compiled code to Python's calls if it has a wrapper, else to callers in kernels alone."""
+    if _is_wrapped(compiled):
+        _numba_add_overload(kernel, compiled)
+    else:
+        kernel.overloads[tuple(compiled.signature.args)] = compiled
+
+
+def _is_wrapped(compiled: Any) -> bool:
+    return bool(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cpython_wrapper_name))
 
 
 def _lock(index: Path) -> _Lock | None:
@@ -178,7 +226,7 @@ def _lock(index: Path) -> _Lock | None:
     So it is in a folder that cannot be written or locked, in a kernel that calls itself, and after MAX_WAIT_SECONDS.
     """
     path = index.with_name(f".{index.name}.lock")
-    if any(lock.path == path for locks in _compilations for lock in locks):
+    if any(lock.path == path for compilation in _compilations for lock in compilation.locks):
         return None
     until = time.monotonic() + MAX_WAIT_SECONDS
     with suppress(OSError):
@@ -215,13 +263,18 @@ def _is_current(lock: _Lock) -> bool:
         return False
 
 
-_numba_compile = dispatcher.Dispatcher.compile
-dispatcher.Dispatcher.compile = _compile
+_numba_compile, _numba_add_overload = dispatcher.Dispatcher.compile, dispatcher.Dispatcher.add_overload
+dispatcher.Dispatcher.compile, dispatcher.Dispatcher.add_overload = _compile, _add_overload
+quicken()
 
 
-def is_cached(kernel: dispatcher.Dispatcher, arguments: tuple[types.Type, ...]) -> bool:
-    """Whether a kernel of the project is compiled for these types of arguments."""
-    return Path(_entry(kernel._cache, arguments, kernel.targetctx.codegen())._index_path).is_file()
+def is_cached(kernel: dispatcher.Dispatcher, arguments: tuple[types.Type, ...], is_for_python: bool) -> bool:
+    """Whether a kernel of the project is compiled for these types of arguments and for Python, or for other kernels."""
+    codegen = kernel.targetctx.codegen()
+    return any(
+        Path(_entry(kernel._cache, arguments, codegen, is_wrapped)._index_path).is_file()
+        for is_wrapped in ((True,) if is_for_python else (True, False))
+    )
 
 
 # Keys ---------------------------------------------------------------------------------------------------------------

@@ -36,12 +36,14 @@ class ListedKernel:
     arguments: types, as `argument_words` writes them
     calls: indices of the kernels that it calls, in the list
     seconds: CPU time of its own compilation when it was recorded
+    is_for_python: whether Python calls it, not other kernels alone
     """
 
     name: str
     arguments: list[Any]
     calls: list[int]
     seconds: float
+    is_for_python: bool
 
 
 @dataclass(frozen=True)
@@ -73,8 +75,9 @@ class KernelList:
         return sorted(reached)
 
     def names(self, indices: list[int]) -> dict[str, str]:
-        """Return names of kernels with the types of their arguments, for a digest."""
-        return {json.dumps([kernel.name, kernel.arguments]): "" for kernel in map(self.kernels.__getitem__, indices)}
+        """Return names of kernels with the types of their arguments and their callers, for a digest."""
+        kernels = [self.kernels[index] for index in indices]
+        return {json.dumps([kernel.name, kernel.arguments, kernel.is_for_python]): "" for kernel in kernels}
 
     @cached_property
     def seconds(self) -> list[float]:
@@ -171,15 +174,22 @@ def are_compiled(kernels: list[ListedKernel]) -> list[bool]:
     """Return whether each kernel is in the cache; one that no longer exists needs no compilation."""
     from pipeline.kernel_cache import is_cached
 
-    return [found is None or is_cached(*found) for found in map(_found, kernels)]
+    found = zip(map(_found, kernels), kernels, strict=True)
+    return [item is None or is_cached(*item, kernel.is_for_python) for item, kernel in found]
 
 
 def compile_kernel(kernel: ListedKernel) -> None:
     """Compile a kernel into the cache; what cannot be compiled is left to its first use."""
+    from pipeline.kernel_cache import compile_for_kernels
+
     found = _found(kernel)
     if found is not None:
+        dispatcher, arguments = found
         with suppress(Exception):
-            found[0].compile(found[1])
+            if kernel.is_for_python:
+                dispatcher.compile(arguments)
+            else:
+                compile_for_kernels(dispatcher, arguments)
 
 
 def _found(kernel: ListedKernel) -> tuple[Any, tuple[Any, ...]] | None:

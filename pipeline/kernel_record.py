@@ -1,7 +1,7 @@
 """The record of the kernels that a run uses, from which `make kernels` makes the list.
 
 With `SHAPEMILL_RECORD_KERNELS` in its environment, every worker appends a line to that file for each kernel that it
-compiles or loads from the cache: `{"stage", "kernel", "calls", "seconds"}`.
+compiles or loads from the cache: `{"stage", "kernel", "calls", "seconds", "is_for_python"}`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ _frames: list[list[str]] = []
 _nested_seconds = [0.0]
 """Seconds of the kernels called by each of these, after those of all kernels that nothing calls."""
 
-_recorded: set[str] = set()
+_recorded: set[tuple[str, bool]] = set()
+"""Kernels with whether Python called them."""
 
 
 def record_kernels(file: Path) -> None:
@@ -35,7 +36,8 @@ def record_kernels(file: Path) -> None:
         if words is None:
             return compile_now(kernel, signature)
         key = json.dumps(words)
-        if _frames:
+        is_for_python = not _frames
+        if not is_for_python:
             _frames[-1].append(key)
         _frames.append([])
         _nested_seconds.append(0.0)
@@ -46,9 +48,15 @@ def record_kernels(file: Path) -> None:
             seconds = time.process_time() - start
             calls, nested = _frames.pop(), _nested_seconds.pop()
             _nested_seconds[-1] += seconds
-        if key not in _recorded and stage_of_note():
-            _recorded.add(key)
-            line = {"stage": stage_of_note(), "kernel": words, "calls": calls, "seconds": seconds - nested}
+        if (key, is_for_python) not in _recorded and stage_of_note():
+            _recorded.add((key, is_for_python))
+            line = {
+                "stage": stage_of_note(),
+                "kernel": words,
+                "calls": calls,
+                "seconds": seconds - nested,
+                "is_for_python": is_for_python,
+            }
             with open(file, "a", encoding="utf-8") as stream:
                 stream.write(json.dumps(line) + "\n")
         return compiled

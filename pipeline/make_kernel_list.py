@@ -23,9 +23,12 @@ def merged(lines: list[dict[str, Any]], producer: str, before: KernelList) -> Ke
     calls: dict[str, list[str]] = {}
     seconds: dict[str, float] = {}
     used: dict[str, dict[str, set[str]]] = {}
+    for_python = set[str]()
     keys = [json.dumps([kernel.name, kernel.arguments]) for kernel in before.kernels]
     for key, kernel in zip(keys, before.kernels, strict=True):
         calls[key], seconds[key] = [keys[index] for index in kernel.calls], kernel.seconds
+        if kernel.is_for_python:
+            for_python.add(key)
     for name, stages in before.used.items():
         if name != producer:
             used[name] = {stage: {keys[index] for index in indices} for stage, indices in stages.items()}
@@ -33,6 +36,8 @@ def merged(lines: list[dict[str, Any]], producer: str, before: KernelList) -> Ke
     for line in lines:
         key = json.dumps(line["kernel"])
         fresh.setdefault(line["stage"], set()).add(key)
+        if line["is_for_python"]:
+            for_python.add(key)
         if line["seconds"] >= seconds.get(key, 0.0) or line["calls"]:
             calls[key], seconds[key] = line["calls"], round(line["seconds"], 1)
     reached = {key for stages in used.values() for wanted in stages.values() for key in wanted}
@@ -47,7 +52,8 @@ def merged(lines: list[dict[str, Any]], producer: str, before: KernelList) -> Ke
     kernels = []
     for key in order:
         name, arguments = json.loads(key)
-        kernels.append(ListedKernel(name, arguments, sorted(index_of[callee] for callee in graph[key]), seconds[key]))
+        calls_of = sorted(index_of[callee] for callee in graph[key])
+        kernels.append(ListedKernel(name, arguments, calls_of, seconds[key], key in for_python))
     indices = {
         name: {stage: sorted(index_of[key] for key in wanted) for stage, wanted in stages.items()}
         for name, stages in sorted(used.items())
@@ -57,7 +63,8 @@ def merged(lines: list[dict[str, Any]], producer: str, before: KernelList) -> Ke
 
 def write_list(listed: KernelList, file: Path) -> None:
     """Write a list, a line for each kernel and each stage."""
-    kernels = [json.dumps([k.name, k.arguments, k.calls, k.seconds], separators=(",", ":")) for k in listed.kernels]
+    fields = [[k.name, k.arguments, k.calls, k.seconds, k.is_for_python] for k in listed.kernels]
+    kernels = [json.dumps(kernel, separators=(",", ":")) for kernel in fields]
     used = [
         f"{json.dumps(name)}: {{\n"
         + ",\n".join(f"{json.dumps(stage)}: {json.dumps(indices)}" for stage, indices in stages.items())

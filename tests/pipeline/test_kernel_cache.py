@@ -134,6 +134,23 @@ def test_concurrent_processes_and_corrupted_entries_do_no_harm(checkout: Checkou
     assert checkout.run() == "31 8 7 compiled"
 
 
+def test_python_can_call_a_kernel_that_a_kernel_called_before(checkout: Checkout) -> None:
+    """The first call compiles it without a wrapper for Python, and a call without one would end the process."""
+    use = "import stages\nfrom shop.main import *\nprint(area(Ring(2, 12)), sum(area.stats.cache_misses.values()))"
+    (checkout.folder / "shop/use.py").write_text(use, encoding="utf-8")
+
+    def used() -> str:
+        return checkout.start("use").communicate()[0].splitlines()[1]
+
+    assert used() == "30 2", "once for its caller, once for Python"
+    assert used() == "30 0"
+    indices = list(checkout.cache.rglob("*.area-*.nbi"))
+    assert len(indices) == 2
+    checkout.edit("main.py", "print(total(Ring(2, 12))", "area(Ring(2, 12))\nprint(total(Ring(2, 12))")
+    checkout.edit("area.py", "ring.outer - ring.inner", "ring.outer + ring.inner")
+    assert used() == "42 1", "where Python comes first, its entry is enough"
+
+
 SLOW_KERNEL = """
 import os, time
 import numba
@@ -161,16 +178,20 @@ def inner(number):
 @numba.njit(cache=True)
 def outer(number):
     return inner(number) * 2
+
+@numba.njit(cache=True)
+def other(number):
+    return inner(number) * 3
 """
 
 USE_OF_SLOW_KERNEL = """
 import os, stages
 from pathlib import Path
 from pipeline.compilation_note import compilation_noted_in
-from shop.slow import inner, outer
+from shop.slow import inner, other, outer
 
 with compilation_noted_in(Path(__file__).with_name(f"note-{os.getpid()}")):
-    kernels = (inner, outer) if "INNER" in os.environ else (outer, inner)
+    kernels = (other, outer) if "OTHER" in os.environ else (outer, other)
     print(*(kernel(20) for kernel in kernels), sum(inner.stats.cache_misses.values()))
 """
 
@@ -204,18 +225,18 @@ def test_kernel_that_processes_need_at_the_same_time_is_compiled_once(
     slow: Checkout, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     together = [slow.start("use") for _ in range(2)]
-    monkeypatch.setenv("INNER", "1")
+    monkeypatch.setenv("OTHER", "1")
     together.append(slow.start("use"))
     while notes(slow) < 3 and any(process.poll() is None for process in together):
         time.sleep(0.01)
     assert notes(slow) == 3, "the waiting processes note it, too"
     (slow.folder / "shop/go").touch()
     answers = sorted(process.communicate(timeout=60)[0] for process in together)
-    assert [answer.split()[:2] for answer in answers] == [["21", "42"], ["42", "21"], ["42", "21"]]
+    assert [answer.split()[:2] for answer in answers] == [["42", "63"], ["42", "63"], ["63", "42"]]
     assert sorted(int(answer.split()[2]) for answer in answers) == [0, 0, 1]
     assert len(begun(slow)) == 1
     assert notes(slow) == len(locks(slow)) == 0
-    assert len(list(slow.cache.rglob("*.nb[ci]"))) == 4
+    assert len(list(slow.cache.rglob("*.nb[ci]"))) == 6
 
 
 def test_process_that_waits_for_a_killed_one_compiles_by_itself(slow: Checkout) -> None:
@@ -226,7 +247,7 @@ def test_process_that_waits_for_a_killed_one_compiles_by_itself(slow: Checkout) 
         time.sleep(0.01)
     first.kill()
     (slow.folder / "shop/go").touch()
-    assert second.communicate(timeout=60)[0].split() == ["42", "21", "1"]
+    assert second.communicate(timeout=60)[0].split() == ["42", "63", "1"]
     assert begun(slow, 2) == [first.pid, second.pid]
     assert not locks(slow)
     first.communicate()
@@ -243,7 +264,7 @@ def test_process_whose_compilation_fails_does_not_keep_others_waiting(
     while notes(slow) < 2 and second.poll() is None:
         time.sleep(0.01)
     (slow.folder / "shop/go").touch()
-    assert second.communicate(timeout=60)[0].split() == ["42", "21", "1"]
+    assert second.communicate(timeout=60)[0].split() == ["42", "63", "1"]
     assert first.wait(timeout=60) == 1
     assert not locks(slow)
 
@@ -252,8 +273,8 @@ def test_kernels_are_compiled_where_nothing_can_be_locked(slow: Checkout) -> Non
     (slow.folder / "shop/go").touch()
     no_locks = "import errno, fcntl\ndef flock(*_): raise OSError(errno.ENOLCK, 'no locks')\nfcntl.flock = flock\n"
     (slow.folder / "shop/use.py").write_text(no_locks + USE_OF_SLOW_KERNEL, encoding="utf-8")
-    assert slow.start("use").communicate(timeout=60)[0].split() == ["42", "21", "1"]
-    assert slow.start("use").communicate(timeout=60)[0].split() == ["42", "21", "0"]
+    assert slow.start("use").communicate(timeout=60)[0].split() == ["42", "63", "1"]
+    assert slow.start("use").communicate(timeout=60)[0].split() == ["42", "63", "0"]
 
 
 def test_wait_for_a_lock_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

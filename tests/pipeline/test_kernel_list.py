@@ -23,7 +23,8 @@ from tests.pipeline.test_kernel_cache import Checkout
 
 
 def listed(*kernels: tuple[list[int], float]) -> KernelList:
-    return KernelList([ListedKernel(f"shop:k{i}", [], calls, cost) for i, (calls, cost) in enumerate(kernels)], {})
+    rows = enumerate(kernels)
+    return KernelList([ListedKernel(f"shop:k{i}", [], calls, cost, True) for i, (calls, cost) in rows], {})
 
 
 def test_callees_come_first_and_of_those_that_can_be_compiled_what_most_waits_for() -> None:
@@ -111,11 +112,11 @@ def test_listed_kernels_are_compiled_ahead_and_stale_entries_are_skipped(
     monkeypatch.syspath_prepend(str(shop.folder))
     kernels = KernelList(
         [
-            ListedKernel("shop.area:area", [RING], [], 0.1),
-            ListedKernel("shop.total:total", [RING], [0], 0.1),
-            ListedKernel("shop.total:removed", [RING], [], 0.1),
-            ListedKernel("shop.total:double", [["tuple", "shop.records:Removed", "int64"]], [], 0.1),
-            ListedKernel("shop.area:width", ["unicode_type"], [], 0.1),  # cannot be compiled
+            ListedKernel("shop.area:area", [RING], [], 0.1, False),
+            ListedKernel("shop.total:total", [RING], [0], 0.1, True),
+            ListedKernel("shop.total:removed", [RING], [], 0.1, True),
+            ListedKernel("shop.total:double", [["tuple", "shop.records:Removed", "int64"]], [], 0.1, True),
+            ListedKernel("shop.area:width", ["unicode_type"], [], 0.1, True),  # cannot be compiled
         ],
         {},
     )
@@ -129,8 +130,12 @@ def test_listed_kernels_are_compiled_ahead_and_stale_entries_are_skipped(
 def test_set_up_compiles_the_listed_kernels_callees_first(tmp_path: Path) -> None:
     shop = Checkout(tmp_path / "a", tmp_path / "cache")
     area, total = [f"shop.{name}:{name}" for name in ("area", "total")]
-    kernels = [ListedKernel(area, [RING], [], 0.1), ListedKernel(total, [RING], [0], 0.1)]
-    write_list(KernelList([*kernels, ListedKernel("shop.area:gone", [RING], [], 0.1)], {}), tmp_path / "list.json")
+    kernels = [
+        ListedKernel(area, [RING], [], 0.1, False),
+        ListedKernel(total, [RING], [0], 0.1, True),
+        ListedKernel("shop.area:gone", [RING], [], 0.1, True),
+    ]
+    write_list(KernelList(kernels, {}), tmp_path / "list.json")
     code = "import sys, pathlib, pipeline.compile_kernels as c; c.main(pathlib.Path(sys.argv[1]))"
     command = [sys.executable, "-c", code, str(tmp_path / "list.json")]
     env = shop.environment | {"NUMBA_CACHE_LOCATOR_CLASSES": "pipeline.kernel_cache.KernelLocator"}
@@ -157,14 +162,23 @@ def test_note_of_a_complete_cache_is_for_one_code_and_one_processor(
 
 def test_record_becomes_a_list_that_keeps_other_producers(tmp_path: Path) -> None:
     before = KernelList(
-        [ListedKernel("shop.area:area", [RING], [], 0.3), ListedKernel("shop.total:old", ["int64"], [0], 2.0)],
+        [
+            ListedKernel("shop.area:area", [RING], [], 0.3, False),
+            ListedKernel("shop.total:old", ["int64"], [0], 2.0, True),
+        ],
         {"programs": {"points": [1]}, "variations": {"points": [1]}},
     )
     total, area = ["shop.total:total", [RING]], ["shop.area:area", [RING]]
     lines = [
-        {"stage": "exemplars", "kernel": area, "calls": [], "seconds": 0.1},
-        {"stage": "exemplars", "kernel": total, "calls": [json.dumps(area), json.dumps(area)], "seconds": 1.26},
-        {"stage": "points", "kernel": total, "calls": [], "seconds": 0.01},  # loaded from the cache
+        {"stage": "exemplars", "kernel": area, "calls": [], "seconds": 0.1, "is_for_python": False},
+        {
+            "stage": "exemplars",
+            "kernel": total,
+            "calls": [json.dumps(area), json.dumps(area)],
+            "seconds": 1.26,
+            "is_for_python": False,
+        },
+        {"stage": "points", "kernel": total, "calls": [], "seconds": 0.01, "is_for_python": True},  # from the cache
     ]
     after = merged(lines, "variations", before)
     write_list(after, tmp_path / "kernels.json")
@@ -172,7 +186,8 @@ def test_record_becomes_a_list_that_keeps_other_producers(tmp_path: Path) -> Non
     names = [kernel.name.partition(":")[2] for kernel in after.kernels]
     assert names[0] == "area"
     at = names.index("total")
-    assert after.kernels[at] == ListedKernel("shop.total:total", [RING], [0], 1.3)
+    assert after.kernels[at] == ListedKernel("shop.total:total", [RING], [0], 1.3, True)
+    assert not after.kernels[0].is_for_python
     assert after.used == {
         "programs": {"points": [names.index("old")]},
         "variations": {"exemplars": [0, at], "points": [at]},
