@@ -51,7 +51,9 @@ class LayoutDraws:
         self.modular_bays: list[ModularBay] = []
         if is_alone and not (self.rows or self.circles):
             self.modular_bays = find_modular_bays(layout, {0, 1, 2} - {bay.axis for bay in self.mirrored_bays})
-        self.divisions: list[list[Division]] = find_divisions(layout, up) if is_alone and up is not None else []
+        self.divisions: list[list[Division]] = []
+        if is_alone and up is not None and config.divide_fronts:
+            self.divisions = find_divisions(layout, up)
         self._with_modules: dict[tuple[tuple[int, int], ...], tuple[RowChange, Layout] | None] = {}
 
     @property

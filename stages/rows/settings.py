@@ -16,7 +16,12 @@ class RowsConfig(StrictModel):
         "auto",
         description="Whether exemplars get longer and shorter rows. `auto`: in a search by `share`, and of resized "
         "exemplars where a short search finds almost no other layouts (see `fallback`); both only if there are rows. "
-        "Fronts of resized exemplars, such as doors, are then divided too.",
+        "Fronts of resized exemplars, such as doors, are then divided too (see `divide_fronts`).",
+    )
+    divide_fronts: bool = Field(
+        True,
+        description="Whether doors, drawers and other fronts of resized exemplars are divided into several, where rows "
+        "are changed.",
     )
     share: float = Field(
         0.25,

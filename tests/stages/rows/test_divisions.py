@@ -196,6 +196,7 @@ def test_draws_divide_fronts_where_nothing_else_can_change() -> None:
     draws = LayoutDraws(layout, RowsConfig(), is_alone=True, up=UP_AXIS)
     assert draws.can_change
     assert not LayoutDraws(layout, RowsConfig(), up=UP_AXIS).can_change, "a search exchanges parts instead"
+    assert not LayoutDraws(layout, RowsConfig(divide_fronts=False), is_alone=True, up=UP_AXIS).can_change
     drawn = [draws.draw(np.random.default_rng(seed)) for seed in range(24)]
     made = {counts(kit, one[1])["door"] for one in drawn if one is not None}
     assert made == {2, 3, 4}
