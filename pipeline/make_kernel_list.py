@@ -24,9 +24,11 @@ def merged(lines: list[dict[str, Any]], producer: str, before: KernelList) -> Ke
     seconds: dict[str, float] = {}
     used: dict[str, dict[str, set[str]]] = {}
     for_python = set[str]()
+    recorded = {json.dumps(line["kernel"]) for line in lines}
     keys = [json.dumps([kernel.name, kernel.arguments]) for kernel in before.kernels]
     for key, kernel in zip(keys, before.kernels, strict=True):
-        calls[key], seconds[key] = [keys[index] for index in kernel.calls], kernel.seconds
+        calls[key] = [keys[index] for index in kernel.calls]
+        seconds[key] = 0.0 if key in recorded else kernel.seconds
         if kernel.is_for_python:
             for_python.add(key)
     for name, stages in before.used.items():

@@ -20,8 +20,8 @@ class RowsConfig(StrictModel):
     )
     divide_fronts: bool = Field(
         True,
-        description="Whether doors, drawers and other fronts of resized exemplars are divided into several, where rows "
-        "are changed.",
+        description="Whether doors, drawers and other fronts of resized exemplars are divided into several. Without "
+        "`use` they never are. `make inspect` forecasts shapes as if this were true.",
     )
     share: float = Field(
         0.25,

@@ -61,7 +61,7 @@ def test_killed_run_goes_on_to_the_same_bytes_and_leaves_no_worker(tmp_path: Pat
         os.kill(max(workers), signal.SIGSTOP)
         run.send_signal(signal.SIGKILL)
     assert len(workers) >= 2
-    wait_until(lambda: not alive(workers))  # one that was just starting sees it after its imports
+    wait_until(lambda: not alive(workers), seconds=10)
     assert 0 < len(list(flour.glob("records/*.json"))) < 6
     result = run_toy_stages(config, out)["flour"]
     assert 0 < result.made < 6

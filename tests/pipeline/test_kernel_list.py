@@ -187,7 +187,7 @@ def test_record_becomes_a_list_that_keeps_other_producers(tmp_path: Path) -> Non
     assert names[0] == "area"
     at = names.index("total")
     assert after.kernels[at] == ListedKernel("shop.total:total", [RING], [0], 1.3, True)
-    assert not after.kernels[0].is_for_python
+    assert after.kernels[0] == ListedKernel("shop.area:area", [RING], [], 0.1, False), "its time is the latest"
     assert after.used == {
         "programs": {"points": [names.index("old")]},
         "variations": {"exemplars": [0, at], "points": [at]},
