@@ -1,5 +1,5 @@
 """Changes of a layout: periods of a row along a line, bays between mirrored ends, bays of modules, another number of
-sectors about an axis, or divided fronts; and their JSON.
+sectors about an axis, another number of parts in graded rows, or divided fronts; and their JSON.
 """
 
 from __future__ import annotations
@@ -11,17 +11,18 @@ from typing import Any
 import numpy as np
 
 from stages.rows.divisions import MAX_PIECES, Division, divided
+from stages.rows.graded_rows import Respacing, respaced
 from stages.rows.layout import Layout
 from stages.rows.mirrored_bays import with_mirrored_bays
 from stages.rows.modular_bays import with_modular_bays
 from stages.rows.slabs import RowChange, repeat
 from stages.rows.turns import Turn, turned
 
-Change = RowChange | Turn | Division
+Change = RowChange | Turn | Division | Respacing
 
 AXES = ("x", "y", "z")
 MAX_TIMES = 1000
-"""Most periods or sectors that one change may make."""
+"""Most periods, sectors or parts that one change may make."""
 
 
 def changed(layout: Layout, change: Change) -> Layout:
@@ -30,6 +31,8 @@ def changed(layout: Layout, change: Change) -> Layout:
         return turned(layout, change)
     if isinstance(change, Division):
         return divided(layout, change)
+    if isinstance(change, Respacing):
+        return respaced(layout, change)
     if change.is_modular:
         return with_modular_bays(layout, change)
     return with_mirrored_bays(layout, change) if change.is_mirrored else repeat(layout, change)
@@ -42,6 +45,8 @@ def change_json(change: Change) -> dict[str, Any]:
         return {"axis": AXES[change.axis], "centre": centre, **numbers}
     if isinstance(change, Division):
         return {"fronts": list(change.fronts), "axis": AXES[change.axis], "pieces": change.count}
+    if isinstance(change, Respacing):
+        return {"graded_rows": [list(parts) for parts in change.rows], "count": change.count}
     return {
         "normal": change.normal.tolist(),
         "shift": change.shift.tolist(),
@@ -70,6 +75,12 @@ def read_change(stated: Mapping[str, Any]) -> Change:
         if stated["axis"] not in AXES or not fronts or min(fronts) < 0 or not 2 <= pieces <= MAX_PIECES:
             raise ValueError(f"fronts are divided along x, y or z into 2 to {MAX_PIECES} pieces, unlike {stated}")
         return Division(fronts, AXES.index(stated["axis"]), pieces)
+    if "graded_rows" in stated:
+        rows = tuple(tuple(int(part) for part in parts) for parts in stated["graded_rows"])
+        count = int(stated["count"])
+        if not rows or min(min(parts, default=-1) for parts in rows) < 0 or not 0 < count <= MAX_TIMES:
+            raise ValueError(f"a graded row has numbers of parts, and gets 1 to {MAX_TIMES} parts, unlike {stated}")
+        return Respacing(rows, count)
     if "axis" in stated:
         centre = np.array(stated["centre"], dtype=np.float64).reshape(3)
         sectors, count = int(stated["sectors"]), int(stated["count"])

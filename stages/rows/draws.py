@@ -1,4 +1,6 @@
-"""Random layouts of an exemplar: fronts are divided, and a few rows are made longer or shorter, one after another."""
+"""Random layouts of an exemplar: fronts are divided, graded rows get more or fewer parts, and a few other rows are made
+longer or shorter, one after another.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +12,7 @@ import numpy as np
 
 from stages.rows.changes import Change
 from stages.rows.divisions import Division, divided, find_divisions
+from stages.rows.graded_rows import GradedRow, Respacing, find_graded_rows, renumbered, respaced
 from stages.rows.layout import Layout
 from stages.rows.mirrored_bays import MIRRORED_ENDS, MirroredBay, find_mirrored_bays, with_mirrored_bays
 from stages.rows.modular_bays import ModularBay, find_modular_bays, with_modular_bays
@@ -17,8 +20,8 @@ from stages.rows.rows import TOO_SMALL, Row, find_rows, is_visible
 from stages.rows.settings import RowsConfig
 from stages.rows.slabs import RowChange, SlabError, repeat
 from stages.rows.steps import bays_of, longest_row, steps_of
-from stages.rows.turns import MIN_SECTORS, Turn, find_circles, turned
-from stages.shape.arrays import FloatArray
+from stages.rows.turns import MIN_SECTORS, Circle, Turn, find_circles, turned
+from stages.shape.arrays import BoolArray, FloatArray
 
 MAX_PARTS_FACTOR = 4.0
 """Maximum number of parts of a layout, as a multiple of that of its exemplar."""
@@ -28,6 +31,21 @@ MAX_LAYOUTS_REMEMBERED = 400
 TRIES_PER_CHANGE = 6
 DIVIDED_SHARE = 0.5
 """Share of the layouts with divided fronts, where other changes are possible too."""
+RESPACED_SHARE = 0.5
+"""Share of the layouts with more or fewer parts in graded rows, where other changes are possible too."""
+
+
+def repeated_parts(
+    layout: Layout, rows: Sequence[Row], circles: Sequence[Circle], divisions: Sequence[Sequence[Division]]
+) -> BoolArray:
+    """Return which parts rows along a line or about an axis repeat, or are fronts that are divided, bool (n,)."""
+    kinds = [kind for row in rows if not row.is_bay for kind in row.copied]
+    repeated: BoolArray = np.isin(layout.types, kinds)
+    for circle in circles:
+        repeated[circle.orbits] = True
+    for alike in divisions:
+        repeated[[part for division in alike for part in division.fronts]] = True
+    return repeated
 
 
 class LayoutDraws:
@@ -54,11 +72,21 @@ class LayoutDraws:
         self.divisions: list[list[Division]] = []
         if is_alone and up is not None and config.divide_fronts:
             self.divisions = find_divisions(layout, up)
+        self.graded_rows: list[list[GradedRow]] = []
+        if is_alone and not self.modular_bays:
+            repeated = repeated_parts(layout, self.rows, self.circles, self.divisions)
+            self.graded_rows = find_graded_rows(layout, repeated)
         self._with_modules: dict[tuple[tuple[int, int], ...], tuple[RowChange, Layout] | None] = {}
+        self._with_respacings: dict[tuple[Respacing, ...], Layout | None] = {}
 
     @property
     def can_change(self) -> bool:
         """Whether any change of the exemplar is possible."""
+        return bool(self._has_others or self.graded_rows)
+
+    @property
+    def _has_others(self) -> bool:
+        """Whether a change of something else than graded rows is possible."""
         return bool(self.rows or self.has_bays_or_circles or self.divisions)
 
     @property
@@ -74,6 +102,10 @@ class LayoutDraws:
     def draw(self, rng: np.random.Generator) -> tuple[tuple[Change, ...], Layout] | None:
         """Return changes and the layout that they make, or None where no change was possible."""
         layout, changes = self.exemplar, list[Change]()
+        if self.graded_rows and (not self._has_others or rng.random() < RESPACED_SHARE):
+            changes, layout = self._drawn_respacings(rng)
+            if changes or not self._has_others:
+                return self._with_other_rows(layout, changes, rng) if changes else None
         division = self._drawn_division(rng)
         if division is not None:
             return self._with_other_rows(divided(layout, division), [division], rng)
@@ -94,13 +126,14 @@ class LayoutDraws:
     ) -> tuple[tuple[Change, ...], Layout] | None:
         """Return a changed exemplar whose rows change too, or None where nothing has changed.
 
-        changes: those that have made `layout`; with a division among them, rows may stay as they are
+        changes: those that have made `layout`; with divisions or graded rows among them, other rows may stay as they
+            are
         """
         # Along inserted bays a row would change in one bay alone, and leave a blank stretch of wall in another.
         barred = changes[0].normal if changes and isinstance(changes[0], RowChange) else None
         changed_shifts = set[bytes]()
-        has_divisions = any(isinstance(change, Division) for change in changes)
-        for _ in range(int(rng.integers(1, self.config.max_changes + 1)) - has_divisions):
+        is_new = any(isinstance(change, Division | Respacing) for change in changes)
+        for _ in range(int(rng.integers(1, self.config.max_changes + 1)) - is_new if self.rows else 0):
             for _ in range(TRIES_PER_CHANGE):
                 changed = self._change(layout, rng, barred, changed_shifts)
                 if changed is not None:
@@ -108,6 +141,37 @@ class LayoutDraws:
                     changes += changed[0]
                     break
         return (tuple(changes), layout) if changes and layout.key != self.exemplar.key else None
+
+    def _drawn_respacings(self, rng: np.random.Generator) -> tuple[list[Change], Layout]:
+        """Return changes of some graded rows of the exemplar, and the layout with them; only valid draws are in it."""
+        layout, changes = self.exemplar, list[Respacing]()
+        for number in rng.permutation(len(self.graded_rows))[: int(rng.integers(1, self.config.max_changes + 1))]:
+            rows = [row.parts for row in self.graded_rows[number]]
+            for change in changes:
+                removed = [part for parts in change.rows for part in parts]
+                rows = [renumbered(parts, removed) for parts in rows]
+            least, most = self._limits_of(len(rows[0]))
+            for _ in range(TRIES_PER_CHANGE):
+                count = int(rng.integers(least, most + 1))
+                if count != len(rows[0]):
+                    made = self._respaced(layout, (*changes, Respacing(tuple(rows), count)))
+                    if made is not None:
+                        changes.append(Respacing(tuple(rows), count))
+                        layout = made
+                        break
+        return [*changes], layout
+
+    def _respaced(self, layout: Layout, changes: tuple[Respacing, ...]) -> Layout | None:
+        """Return a layout with the last of some changes, or None where it is not valid; the others have made it."""
+        if changes not in self._with_respacings:
+            if len(self._with_respacings) >= MAX_LAYOUTS_REMEMBERED:
+                self._with_respacings.clear()
+            self._with_respacings[changes] = None
+            with suppress(SlabError):
+                made = respaced(layout, changes[-1])
+                if self._is_within_limits(made):
+                    self._with_respacings[changes] = made
+        return self._with_respacings[changes]
 
     def _drawn_division(self, rng: np.random.Generator) -> Division | None:
         """Return fronts that are divided, or None where something else is changed."""

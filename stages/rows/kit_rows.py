@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.rows.divisions import Division, find_divisions
+from stages.rows.draws import repeated_parts
+from stages.rows.graded_rows import GradedRow, find_graded_rows
 from stages.rows.layout import Layout, layout_of
 from stages.rows.mirrored_bays import MIRRORED_ENDS, MirroredBay, find_mirrored_bays
 from stages.rows.modular_bays import ModularBay, find_modular_bays
@@ -58,13 +60,15 @@ class KitRow:
 
 def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
     """Return the rows of all exemplars of a kit that can be seen: circles, then the longest along each direction, then
-    bays, those between mirrored ends last; bays of modules where these are missing; and fronts that can be divided.
+    bays, those between mirrored ends last; bays of modules where these are missing; graded rows; and fronts that can be
+    divided.
     """
     found: list[KitRow] = []
     for exemplar in kit.exemplars:
         layout = layout_of(kit, exemplar)
-        circles = [_turning(kit, exemplar.name, layout, circle) for circle in find_circles(layout)]
-        rows = [_described(kit, exemplar.name, row) for row in _main_rows(layout)]
+        turning, along_lines = find_circles(layout), _visible_rows(layout)
+        circles = [_turning(kit, exemplar.name, layout, circle) for circle in turning]
+        rows = [_described(kit, exemplar.name, row) for row in _main_rows(along_lines)]
         along_bays = [
             row
             for row in find_rows(layout, bays_of(layout), may_stretch=True)
@@ -79,16 +83,23 @@ def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
             free = {0, 1, 2} - {bay.axis for bay in along_mirrored}
             longest = _longest(find_modular_bays(layout, free))
             modular = [_described_modules(kit, exemplar.name, layout, bay) for bay in longest]
-        found += dict.fromkeys([*circles, *rows, *bays, *mirrored, *modular])
-        for alike in find_divisions(layout, up):
+        divisions = find_divisions(layout, up)
+        repeated = repeated_parts(layout, along_lines, turning, divisions)
+        graded = [] if modular else find_graded_rows(layout, repeated)
+        respaced = [_described_graded(kit, exemplar.name, layout, peers) for peers in graded]
+        found += dict.fromkeys([*circles, *rows, *bays, *mirrored, *modular, *respaced])
+        for alike in divisions:
             found += _described_divisions(kit, exemplar.name, layout, alike)
     return tuple(found)
 
 
-def _main_rows(layout: Layout) -> list[Row]:
-    """Return one visible row for each step, that with most places, longest first; without steps of several periods."""
-    visible = [row for row in find_rows(layout, may_stretch=True) if is_visible(layout, row.copied, row.count)]
-    order = sorted(visible, key=lambda row: (-row.count, -len(row.insertions), row.copied))
+def _visible_rows(layout: Layout) -> list[Row]:
+    return [row for row in find_rows(layout, may_stretch=True) if is_visible(layout, row.copied, row.count)]
+
+
+def _main_rows(rows: Sequence[Row]) -> list[Row]:
+    """Return of some rows one for each step, that with most places, longest first; without steps of several periods."""
+    order = sorted(rows, key=lambda row: (-row.count, -len(row.insertions), row.copied))
     main: list[Row] = []
     for row in order:
         ratios = [np.linalg.norm(row.shift) / np.linalg.norm(other.shift) for other in main if _same_way(row, other)]
@@ -136,6 +147,14 @@ def _described_modules(kit: Kit, exemplar: str, layout: Layout, bay: ModularBay)
     counts = Counter(kit.types[kind].label for kind in layout.types[bay.parts].tolist())
     labels, direction = tuple(counts.most_common()), f"along {'xyz'[bay.axis]}"
     return KitRow(exemplar, labels, bay.count, direction, is_bay=True, is_modular=True)
+
+
+def _described_graded(kit: Kit, exemplar: str, layout: Layout, peers: Sequence[GradedRow]) -> KitRow:
+    counts = Counter(kit.types[layout.types[row.parts[0]]].label for row in peers)
+    row = peers[0]
+    return KitRow(
+        exemplar, tuple((label, 1) for label, _ in counts.most_common()), len(row.parts), f"along {'xyz'[row.axis]}"
+    )
 
 
 def _described_divisions(kit: Kit, exemplar: str, layout: Layout, alike: Sequence[Division]) -> list[KitRow]:
