@@ -99,9 +99,7 @@ class ResizeEstimate:
         if self.has_rows:
             count = "dozens of" if self.other_layouts >= MAX_LAYOUTS_TRIED else f"about {self.other_layouts}"
             named = "; ".join(row.sentence for row in self.rows[:MAX_ROWS_SHOWN])
-            has_divisions = [row.is_division for row in self.rows]
-            rows, fronts = "longer and shorter rows" * (not all(has_divisions)), "divided fronts" * any(has_divisions)
-            what = " and ".join(filter(None, (rows, fronts)))
+            what = " and ".join(dict.fromkeys(row.change for row in self.rows))
             return f"{count} layouts with {what} ({named}), in hundreds of proportions"
         count = "hundreds" if self.different >= MAX_SAMPLES_REQUESTED else f"about {rounded_text(self.different)}"
         sentence = f"{count} of the same layout in other proportions"

@@ -1,5 +1,5 @@
 """Changes of a layout: periods of a row along a line, bays between mirrored ends, bays of modules, another number of
-sectors about an axis, another number of parts in graded rows, or divided fronts; and their JSON.
+sectors about an axis, another number of parts in graded rows or of scattered parts, or divided fronts; and their JSON.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ from stages.rows.graded_rows import Respacing, respaced
 from stages.rows.layout import Layout
 from stages.rows.mirrored_bays import with_mirrored_bays
 from stages.rows.modular_bays import with_modular_bays
+from stages.rows.scattered import FULL_TURN_DEGREES, Copy, Scattering, rescattered
 from stages.rows.slabs import RowChange, repeat
 from stages.rows.turns import Turn, turned
 
-Change = RowChange | Turn | Division | Respacing
+Change = RowChange | Turn | Division | Respacing | Scattering
 
 AXES = ("x", "y", "z")
 MAX_TIMES = 1000
@@ -33,6 +34,8 @@ def changed(layout: Layout, change: Change) -> Layout:
         return divided(layout, change)
     if isinstance(change, Respacing):
         return respaced(layout, change)
+    if isinstance(change, Scattering):
+        return rescattered(layout, change)
     if change.is_modular:
         return with_modular_bays(layout, change)
     return with_mirrored_bays(layout, change) if change.is_mirrored else repeat(layout, change)
@@ -47,6 +50,9 @@ def change_json(change: Change) -> dict[str, Any]:
         return {"fronts": list(change.fronts), "axis": AXES[change.axis], "pieces": change.count}
     if isinstance(change, Respacing):
         return {"graded_rows": [list(parts) for parts in change.rows], "count": change.count}
+    if isinstance(change, Scattering):
+        changes = {"removed": list(change.removed), "copies": [list(copy) for copy in change.copies]}
+        return {"scattered": list(change.parts), "axis": AXES[change.up], **changes}
     return {
         "normal": change.normal.tolist(),
         "shift": change.shift.tolist(),
@@ -81,6 +87,8 @@ def read_change(stated: Mapping[str, Any]) -> Change:
         if not rows or min(min(parts, default=-1) for parts in rows) < 0 or not 0 < count <= MAX_TIMES:
             raise ValueError(f"a graded row has numbers of parts, and gets 1 to {MAX_TIMES} parts, unlike {stated}")
         return Respacing(rows, count)
+    if "scattered" in stated:
+        return _read_scattering(stated)
     if "axis" in stated:
         centre = np.array(stated["centre"], dtype=np.float64).reshape(3)
         sectors, count = int(stated["sectors"]), int(stated["count"])
@@ -96,3 +104,16 @@ def read_change(stated: Mapping[str, Any]) -> Change:
         )
     kinds = {key: bool(stated.get(key, False)) for key in ("is_bay", "is_mirrored", "is_modular")}
     return RowChange(normal, shift, at, times, **kinds)
+
+
+def _read_scattering(stated: Mapping[str, Any]) -> Scattering:
+    """Return another number of scattered parts from its JSON. Raises ValueError, TypeError or KeyError."""
+    parts, removed = (tuple(int(part) for part in stated[key]) for key in ("scattered", "removed"))
+    copies = tuple(Copy(int(part), int(degrees)) for part, degrees in stated["copies"])
+    are_turns = all(0 < copy.degrees < FULL_TURN_DEGREES for copy in copies)
+    if stated["axis"] not in AXES or min(parts, default=-1) < 0 or not are_turns or len(copies) > MAX_TIMES:
+        raise ValueError(
+            f"scattered parts have numbers, and up to {MAX_TIMES} copies, turned about x, y or z by 1 to "
+            f"{FULL_TURN_DEGREES - 1} degrees, unlike {stated}"
+        )
+    return Scattering(parts, AXES.index(stated["axis"]), removed, copies)

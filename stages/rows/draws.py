@@ -1,5 +1,5 @@
-"""Random layouts of an exemplar: fronts are divided, graded rows get more or fewer parts, and a few other rows are made
-longer or shorter, one after another.
+"""Random layouts of an exemplar: fronts are divided, parts in graded rows and scattered ones become more or fewer, and
+a few other rows are made longer or shorter, one after another.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from stages.rows.layout import Layout
 from stages.rows.mirrored_bays import MIRRORED_ENDS, MirroredBay, find_mirrored_bays, with_mirrored_bays
 from stages.rows.modular_bays import ModularBay, find_modular_bays, with_modular_bays
 from stages.rows.rows import TOO_SMALL, Row, find_rows, is_visible
+from stages.rows.scattered import ScatteredParts, Scattering, find_scattered_parts
 from stages.rows.settings import RowsConfig
 from stages.rows.slabs import RowChange, SlabError, repeat
 from stages.rows.steps import bays_of, longest_row, steps_of
@@ -33,6 +34,8 @@ DIVIDED_SHARE = 0.5
 """Share of the layouts with divided fronts, where other changes are possible too."""
 RESPACED_SHARE = 0.5
 """Share of the layouts with more or fewer parts in graded rows, where other changes are possible too."""
+SCATTERED_SHARE = 0.5
+"""Share of the layouts with more or fewer scattered parts, where other changes are possible too."""
 
 
 def repeated_parts(
@@ -46,6 +49,14 @@ def repeated_parts(
     for alike in divisions:
         repeated[[part for division in alike for part in division.fronts]] = True
     return repeated
+
+
+def without_graded(repeated: BoolArray, graded: Sequence[Sequence[GradedRow]]) -> BoolArray:
+    """Return which parts are repeated or in a graded row, bool (n,)."""
+    changed = repeated.copy()
+    for peers in graded:
+        changed[[part for row in peers for part in row.parts]] = True
+    return changed
 
 
 class LayoutDraws:
@@ -73,20 +84,23 @@ class LayoutDraws:
         if is_alone and up is not None and config.divide_fronts:
             self.divisions = find_divisions(layout, up)
         self.graded_rows: list[list[GradedRow]] = []
+        self.scattered: list[ScatteredParts] = []
         if is_alone and not self.modular_bays:
             repeated = repeated_parts(layout, self.rows, self.circles, self.divisions)
             self.graded_rows = find_graded_rows(layout, repeated)
+            if up is not None:
+                self.scattered = find_scattered_parts(layout, up, without_graded(repeated, self.graded_rows))
         self._with_modules: dict[tuple[tuple[int, int], ...], tuple[RowChange, Layout] | None] = {}
         self._with_respacings: dict[tuple[Respacing, ...], Layout | None] = {}
 
     @property
     def can_change(self) -> bool:
         """Whether any change of the exemplar is possible."""
-        return bool(self._has_others or self.graded_rows)
+        return bool(self._has_others or self.graded_rows or self.scattered)
 
     @property
     def _has_others(self) -> bool:
-        """Whether a change of something else than graded rows is possible."""
+        """Whether a change of something else than graded rows and scattered parts is possible."""
         return bool(self.rows or self.has_bays_or_circles or self.divisions)
 
     @property
@@ -102,6 +116,10 @@ class LayoutDraws:
     def draw(self, rng: np.random.Generator) -> tuple[tuple[Change, ...], Layout] | None:
         """Return changes and the layout that they make, or None where no change was possible."""
         layout, changes = self.exemplar, list[Change]()
+        if self.scattered and (not (self._has_others or self.graded_rows) or rng.random() < SCATTERED_SHARE):
+            changes, layout = self._drawn_scattering(rng)
+            if changes or not (self._has_others or self.graded_rows):
+                return self._with_other_rows(layout, changes, rng) if changes else None
         if self.graded_rows and (not self._has_others or rng.random() < RESPACED_SHARE):
             changes, layout = self._drawn_respacings(rng)
             if changes or not self._has_others:
@@ -126,13 +144,13 @@ class LayoutDraws:
     ) -> tuple[tuple[Change, ...], Layout] | None:
         """Return a changed exemplar whose rows change too, or None where nothing has changed.
 
-        changes: those that have made `layout`; with divisions or graded rows among them, other rows may stay as they
-            are
+        changes: those that have made `layout`; with divisions, graded rows or scattered parts among them, other rows
+            may stay as they are
         """
         # Along inserted bays a row would change in one bay alone, and leave a blank stretch of wall in another.
         barred = changes[0].normal if changes and isinstance(changes[0], RowChange) else None
         changed_shifts = set[bytes]()
-        is_new = any(isinstance(change, Division | Respacing) for change in changes)
+        is_new = any(isinstance(change, Division | Respacing | Scattering) for change in changes)
         for _ in range(int(rng.integers(1, self.config.max_changes + 1)) - is_new if self.rows else 0):
             for _ in range(TRIES_PER_CHANGE):
                 changed = self._change(layout, rng, barred, changed_shifts)
@@ -160,6 +178,15 @@ class LayoutDraws:
                         layout = made
                         break
         return [*changes], layout
+
+    def _drawn_scattering(self, rng: np.random.Generator) -> tuple[list[Change], Layout]:
+        """Return a change of some scattered parts of the exemplar, and the layout with it; none if it is not valid."""
+        scattered = self.scattered[int(rng.integers(len(self.scattered)))]
+        least, most = self._limits_of(len(scattered.members))
+        made = scattered.drawn(int(rng.integers(least, most + 1)), rng)
+        if made is None or made[0].count < least or not self._is_within_limits(made[1]):
+            return [], self.exemplar
+        return [made[0]], made[1]
 
     def _respaced(self, layout: Layout, changes: tuple[Respacing, ...]) -> Layout | None:
         """Return a layout with the last of some changes, or None where it is not valid; the others have made it."""

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.rows.divisions import Division, find_divisions
-from stages.rows.draws import repeated_parts
+from stages.rows.draws import repeated_parts, without_graded
 from stages.rows.graded_rows import GradedRow, find_graded_rows
 from stages.rows.layout import Layout, layout_of
 from stages.rows.mirrored_bays import MIRRORED_ENDS, MirroredBay, find_mirrored_bays
 from stages.rows.modular_bays import ModularBay, find_modular_bays
 from stages.rows.rows import Row, find_rows, is_visible
+from stages.rows.scattered import ScatteredParts, find_scattered_parts
 from stages.rows.steps import bay_ends, bays_of
 from stages.rows.turns import Circle, find_circles
 from stages.shape.kit import Kit
@@ -30,7 +31,7 @@ class KitRow:
 
     exemplar: name of the exemplar
     labels: number of parts of each label in one period, most frequent first; of a bay, the labels of its ends
-    count: parts of the row; of divided fronts, the largest number of pieces of each
+    count: parts of the row, or scattered parts; of divided fronts, the largest number of pieces of each
     direction: `along x`, `along y`, `along z`, `along a slope`, or `about x`, `about y` or `about z`
     """
 
@@ -42,6 +43,14 @@ class KitRow:
     is_mirrored: bool = False
     is_modular: bool = False
     is_division: bool = False
+    is_scattered: bool = False
+
+    @property
+    def change(self) -> str:
+        """What layouts have instead, such as `divided fronts`."""
+        if self.is_division:
+            return "divided fronts"
+        return "more and fewer scattered parts" if self.is_scattered else "longer and shorter rows"
 
     @property
     def sentence(self) -> str:
@@ -50,6 +59,8 @@ class KitRow:
         more = " and more" if len(self.labels) > MAX_LABELS_SHOWN else ""
         if self.is_division:
             return f"{names[0]} in up to {self.count} pieces, {self.direction}"
+        if self.is_scattered:
+            return f"{self.count} scattered {', '.join(names)}{more}"
         if self.is_modular:
             return f"bays of {', '.join(label for label, _ in self.labels[:MAX_LABELS_SHOWN])}{more}, {self.direction}"
         if self.is_bay:
@@ -60,8 +71,8 @@ class KitRow:
 
 def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
     """Return the rows of all exemplars of a kit that can be seen: circles, then the longest along each direction, then
-    bays, those between mirrored ends last; bays of modules where these are missing; graded rows; and fronts that can be
-    divided.
+    bays, those between mirrored ends last; bays of modules where these are missing; graded rows; scattered parts; and
+    fronts that can be divided.
     """
     found: list[KitRow] = []
     for exemplar in kit.exemplars:
@@ -87,7 +98,10 @@ def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
         repeated = repeated_parts(layout, along_lines, turning, divisions)
         graded = [] if modular else find_graded_rows(layout, repeated)
         respaced = [_described_graded(kit, exemplar.name, layout, peers) for peers in graded]
-        found += dict.fromkeys([*circles, *rows, *bays, *mirrored, *modular, *respaced])
+        changed = without_graded(repeated, graded)
+        loose = [] if modular else find_scattered_parts(layout, up, changed)
+        scattered = [_described_scattered(kit, exemplar.name, layout, parts) for parts in loose]
+        found += dict.fromkeys([*circles, *rows, *bays, *mirrored, *modular, *respaced, *scattered])
         for alike in divisions:
             found += _described_divisions(kit, exemplar.name, layout, alike)
     return tuple(found)
@@ -155,6 +169,12 @@ def _described_graded(kit: Kit, exemplar: str, layout: Layout, peers: Sequence[G
     return KitRow(
         exemplar, tuple((label, 1) for label, _ in counts.most_common()), len(row.parts), f"along {'xyz'[row.axis]}"
     )
+
+
+def _described_scattered(kit: Kit, exemplar: str, layout: Layout, scattered: ScatteredParts) -> KitRow:
+    counts = Counter(kit.types[layout.types[part]].label for part in scattered.parts)
+    labels, direction = tuple((label, 1) for label, _ in counts.most_common()), f"about {'xyz'[scattered.up]}"
+    return KitRow(exemplar, labels, len(scattered.members), direction, is_scattered=True)
 
 
 def _described_divisions(kit: Kit, exemplar: str, layout: Layout, alike: Sequence[Division]) -> list[KitRow]:

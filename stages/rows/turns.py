@@ -98,7 +98,9 @@ def turned(layout: Layout, turn: Turn) -> Layout:
         elif (i in orbit_of and j not in in_orbits) or (j in orbit_of and i not in in_orbits):
             part, other = (i, j) if i in orbit_of else (j, i)
             edges += [(copy(orbit_of[part], sector), index_of[other]) for sector in range(turn.count)]
-    rotations = [_rotation(turn.axis, circle.centre, 2 * np.pi * sector / turn.count) for sector in range(turn.count)]
+    rotations = [
+        rotation_about(turn.axis, circle.centre, 2 * np.pi * sector / turn.count) for sector in range(turn.count)
+    ]
     poses = [layout.poses[kept], *(rotation @ layout.poses[sources] for rotation in rotations)]
     chosen = np.concatenate([kept, np.tile(np.array(sources, dtype=np.int64), turn.count)])
     changed = replace(
@@ -156,7 +158,7 @@ def _are_turned_copies(layout: Layout, axis: int, orbit: np.ndarray) -> bool:
         return False
     symmetries, first = mesh.symmetries[:, :3, :3], layout.poses[orbit[0], :3, :3]
     for sector, part in enumerate(orbit.tolist()):
-        rotation = _rotation(axis, np.zeros(3), 2 * np.pi * sector / len(orbit))[:3, :3]
+        rotation = rotation_about(axis, np.zeros(3), 2 * np.pi * sector / len(orbit))[:3, :3]
         gaps = np.abs(rotation @ first @ symmetries - layout.poses[part, :3, :3]).max(axis=(1, 2))
         if gaps.min() > MAX_ROTATION_DIFFERENCE:
             return False
@@ -204,7 +206,7 @@ def _is_same(layout: Layout, circle: Circle, turn: Turn) -> bool:
     return bool(circle.axis == turn.axis and circle.sectors == turn.sectors and near)
 
 
-def _rotation(axis: int, centre: FloatArray, angle: float) -> FloatArray:
+def rotation_about(axis: int, centre: FloatArray, angle: float) -> FloatArray:
     """Return the rotation by an angle, in radians, about a line along an axis, float64 (4, 4)."""
     one, other = [index for index in range(3) if index != axis]
     rotation = np.eye(4)
