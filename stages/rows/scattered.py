@@ -10,7 +10,7 @@ from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,10 @@ from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.pose import relative_poses
 from stages.shape.stretch import STRETCHED_DEPTH
 
+if TYPE_CHECKING:
+    from stages.shape.geometry.contact import ContactTest
+    from stages.shape.geometry.penetration import PenetrationTest
+
 MIN_SCATTERED = 3
 MAX_PARTS_COMPARED = 1000
 """Parts among which scattered ones are looked for."""
@@ -30,6 +34,8 @@ MIN_THICKNESS_SHARE = 0.1
 """Sizes below this share of a part's largest count as this share: thin leaves are alike."""
 MIN_SCATTERED_SHARE, MAX_MEMBER_SHARE = 0.02, 0.25
 """Smallest share of the surface of a shape that scattered parts have together, and largest of one of them."""
+MIN_LENGTH_SHARE = 0.06
+"""Smallest diagonal of the box around a scattered part, as a share of the shape's: nobody counts the leaves of a bush."""
 MAX_REGULAR_SHARE = 0.5
 """Share of parts that are turned alike, or mirror images of others, up to which all are scattered: legs are not."""
 MIN_ALIGNED_COSINE = 0.998
@@ -119,15 +125,12 @@ class ScatteredParts:
     @cached_property
     def deepest(self) -> float:
         """How deep a member overlaps another part, at most, in units."""
-        from stages.shape.geometry.penetration import PenetrationTest
-
         layout, is_member = self.layout, np.zeros(len(self.layout), dtype=np.int64)
         for number, member in enumerate(self.members, start=1):
             is_member[list(member)] = number
         pairs = layout.edges[is_member[layout.edges[:, 0]] != is_member[layout.edges[:, 1]]]
-        test = PenetrationTest(layout.meshes)
-        poses = relative_poses(layout.poses, pairs)
-        return max((test.depth(i, j, pose) for (i, j), pose in zip(pairs.tolist(), poses, strict=True)), default=0.0)
+        posed = zip(pairs.tolist(), relative_poses(layout.poses, pairs), strict=True)
+        return max((self._penetration.depth(i, j, pose) for (i, j), pose in posed), default=0.0)
 
     def placed(self, copy: Copy) -> Layout:
         """Return the parts of a copy, with the contacts among them."""
@@ -177,7 +180,7 @@ class ScatteredParts:
             return "a copy of a scattered part would reach beyond what holds it"
         may_overlap = np.zeros(len(self.layout), dtype=np.bool_)
         may_overlap[self.holders] = may_overlap[[part for member in self.members for part in member]] = True
-        found = _cross_contacts(self.layout, placed, np.where(may_overlap, self.deepest, 0.0))
+        found = self._cross_contacts(self.layout, placed, np.where(may_overlap, self.deepest, 0.0))
         is_held = any(contact.part == holder and contact.other == 0 for contact in found)
         return found if is_held else "a copy of a scattered part would not be held"
 
@@ -186,11 +189,51 @@ class ScatteredParts:
         if (first, second) not in self._between:
             placed = self.placed(first)
             allowed = np.full(len(placed), self.deepest)
-            self._between[first, second] = _cross_contacts(placed, self.placed(second), allowed)
+            self._between[first, second] = self._cross_contacts(placed, self.placed(second), allowed)
         found = self._between[first, second]
         if first == second or any(contact.is_too_deep for contact in found):
             raise SlabError("two copies of scattered parts would overlap")
         return [(contact.part, contact.other) for contact in found]
+
+    def _cross_contacts(self, first: Layout, second: Layout, deepest: FloatArray) -> list[CrossContact]:
+        """Return the contacts between two layouts of parts of this one.
+
+        deepest: how deep each part of the first may overlap others, in units, float64 (n,); little is always allowed
+        """
+        from stages.shape.geometry.penetration import depth_bound
+
+        tolerance = self.layout.tolerance
+        is_near = (first.boxes[:, None, 0] <= second.boxes[None, :, 1] + tolerance).all(axis=2)
+        is_near &= (second.boxes[None, :, 0] <= first.boxes[:, None, 1] + tolerance).all(axis=2)
+        pairs = np.argwhere(is_near)
+        poses = relative_poses(np.concatenate([first.poses, second.poses]), pairs + np.array([0, len(first)]))
+        found: list[CrossContact] = []
+        for (i, j), pose in zip(pairs.tolist(), poses, strict=True):
+            one, other = self._mesh_numbers[id(first.meshes[i])], self._mesh_numbers[id(second.meshes[j])]
+            if not self._contact.touches(one, other, pose):
+                continue
+            little = tolerance + STRETCHED_DEPTH * min(first.meshes[i].diagonal, second.meshes[j].diagonal)
+            allowed = max(little, float(deepest[i]))
+            is_deep = depth_bound(first.boxes[i], second.boxes[j]) > allowed
+            found.append(CrossContact(i, j, is_deep and self._penetration.depth(one, other, pose) > allowed))
+        return found
+
+    @cached_property
+    def _mesh_numbers(self) -> dict[int, int]:
+        """A part with each surface, by the identity of the surface."""
+        return {id(mesh): part for part, mesh in enumerate(self.layout.meshes)}
+
+    @cached_property
+    def _contact(self) -> ContactTest:
+        from stages.shape.geometry.contact import ContactTest
+
+        return ContactTest(self.layout.meshes, self.layout.tolerance)
+
+    @cached_property
+    def _penetration(self) -> PenetrationTest:
+        from stages.shape.geometry.penetration import PenetrationTest
+
+        return PenetrationTest(self.layout.meshes)
 
     @cached_property
     def _member_of(self) -> dict[int, tuple[int, ...]]:
@@ -346,40 +389,13 @@ def _with_copies(scattered: ScatteredParts, change: Scattering) -> Layout:
     return with_classes(made, keys)
 
 
-def _cross_contacts(first: Layout, second: Layout, deepest: FloatArray) -> list[CrossContact]:
-    """Return the contacts between two layouts.
-
-    deepest: how deep each part of the first may overlap others, in units, float64 (n,); little is always allowed
-    """
-    from stages.shape.geometry.contact import ContactTest
-    from stages.shape.geometry.penetration import PenetrationTest, depth_bound
-
-    is_near = (first.boxes[:, None, 0] <= second.boxes[None, :, 1] + first.tolerance).all(axis=2)
-    is_near &= (second.boxes[None, :, 0] <= first.boxes[:, None, 1] + first.tolerance).all(axis=2)
-    pairs = np.argwhere(is_near)
-    if not len(pairs):
-        return []
-    meshes, poses = (*first.meshes, *second.meshes), np.concatenate([first.poses, second.poses])
-    contact, penetration = ContactTest(meshes, first.tolerance), PenetrationTest(meshes)
-    posed = pairs + np.array([0, len(first)])
-    found: list[CrossContact] = []
-    for (i, j), (_, other), pose in zip(pairs.tolist(), posed.tolist(), relative_poses(poses, posed), strict=True):
-        if not contact.touches(i, other, pose):
-            continue
-        little = first.tolerance + STRETCHED_DEPTH * min(meshes[i].diagonal, meshes[other].diagonal)
-        allowed = max(little, float(deepest[i]))
-        is_deep = depth_bound(first.boxes[i], second.boxes[j]) > allowed
-        found.append(CrossContact(i, j, is_deep and penetration.depth(i, other, pose) > allowed))
-    return found
-
-
 def _beyond(sides: FloatArray, boxes: FloatArray) -> float:
     """Return how far some boxes, float64 (k, 2, 2), reach beyond the sides (2, 2) of another one, in units."""
     return max(float((sides[0] - boxes[:, 0]).max()), float((boxes[:, 1] - sides[1]).max()), 0.0)
 
 
 def _members(layout: Layout, parts: np.ndarray) -> list[tuple[int, ...]]:
-    """Return of some parts those that are small and can be left out, each followed by what hangs on it alone.
+    """Return of some parts those that can be seen and left out, each followed by what hangs on it alone.
 
     parts: int64 (k,) ascending
     """
@@ -389,7 +405,9 @@ def _members(layout: Layout, parts: np.ndarray) -> list[tuple[int, ...]]:
     areas, core = layout.areas, int(layout.areas.argmax())
     i, j = layout.edges[:, 0], layout.edges[:, 1]
     members: list[tuple[int, ...]] = []
-    for part in parts.tolist():
+    lengths = np.linalg.norm(layout.boxes[:, 1] - layout.boxes[:, 0], axis=1)
+    is_long = lengths >= MIN_LENGTH_SHARE * float(np.linalg.norm(layout.extent))
+    for part in parts[is_long[parts]].tolist():
         kept = (i != part) & (j != part)
         graph = coo_matrix((np.ones(int(kept.sum())), (i[kept], j[kept])), shape=(len(layout), len(layout)))
         pieces = connected_components(graph, directed=False)[1]
@@ -423,10 +441,12 @@ def _scattered_parts(layout: Layout, members: Sequence[tuple[int, ...]], up: int
 
 
 def _without_burdened(layout: Layout, members: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
-    """Return those of some members that no smaller part touches, but what hangs on them and other members.
+    """Return those of some members on which nothing lies but what hangs on them, and other members.
 
-    Such a part may lie on them, as the spines of a cactus do that touch each other.
+    A part lies on a member that it touches if it is further from the largest part: fruits lie in a bowl next to each
+    other, spines of a cactus lie on its columns, also where they touch several.
     """
+    levels = _levels(layout)
     left = list(members)
     while True:
         inner = {part for member in left for part in member}
@@ -434,7 +454,7 @@ def _without_burdened(layout: Layout, members: Sequence[tuple[int, ...]]) -> lis
             member
             for member in left
             if all(
-                other in inner or layout.areas[other] >= layout.areas[member[0]]
+                other in inner or levels[other] <= levels[member[0]]
                 for part in member
                 for other in layout.neighbours[part].tolist()
             )
@@ -442,6 +462,17 @@ def _without_burdened(layout: Layout, members: Sequence[tuple[int, ...]]) -> lis
         if len(free) == len(left):
             return free
         left = free
+
+
+def _levels(layout: Layout) -> np.ndarray:
+    """Return the smallest number of contacts that lead from each part to that with the largest area, int64 (n,)."""
+    levels = np.full(len(layout), len(layout), dtype=np.int64)
+    level, reached = 0, np.array([int(layout.areas.argmax())])
+    while len(reached):
+        levels[reached] = level
+        touched = np.unique(np.concatenate([layout.neighbours[part] for part in reached.tolist()]))
+        level, reached = level + 1, touched[levels[touched] > level]
+    return levels
 
 
 def _stand(scattered: ScatteredParts) -> bool:

@@ -187,6 +187,15 @@ def test_legs_and_knobs_are_not_scattered(make: object) -> None:
     assert not find_scattered_parts(layout, UP_AXIS, free(layout))
 
 
+@pytest.mark.parametrize(("length", "is_found"), [(0.24, True), (0.1, False)])
+def test_small_stones_are_not_counted(length: float, is_found: bool) -> None:
+    meshes = {"plate": plate(), "stone": box(length, STONE_HEIGHT / 2, length / 2)}
+    parts: list[Placed] = [("plate", np.eye(4))]
+    parts += [("stone", placed(*place, PLATE_TOP + STONE_HEIGHT / 4)) for place in PLACES]
+    _, layout = models.layout(meshes, parts)
+    assert bool(find_scattered_parts(layout, UP_AXIS, free(layout))) == is_found
+
+
 def test_two_stones_are_too_few_and_parts_of_rows_are_left_to_them() -> None:
     _, layout = stones()
     repeated = free(layout)
