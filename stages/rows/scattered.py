@@ -35,7 +35,7 @@ MIN_THICKNESS_SHARE = 0.1
 MIN_SCATTERED_SHARE, MAX_MEMBER_SHARE = 0.02, 0.25
 """Smallest share of the surface of a shape that scattered parts have together, and largest of one of them."""
 MIN_LENGTH_SHARE = 0.06
-"""Smallest diagonal of the box around a scattered part, as a share of the shape's: nobody counts the leaves of a bush."""
+"""Smallest diagonal of the box around a scattered part, as a share of the shape's: nobody counts leaves of a bush."""
 MAX_REGULAR_SHARE = 0.5
 """Share of parts that are turned alike, or mirror images of others, up to which all are scattered: legs are not."""
 MIN_ALIGNED_COSINE = 0.998
@@ -326,8 +326,9 @@ def find_scattered_parts(layout: Layout, up: int, changes_already: BoolArray) ->
 
 def rescattered(layout: Layout, change: Scattering) -> Layout:
     """Return a layout with another number of scattered parts. Raises SlabError where that is not valid."""
-    parts = np.array(change.parts)
-    if parts.max() >= len(layout) or not {*change.removed, *(copy.part for copy in change.copies)} <= {*change.parts}:
+    parts, named = np.array(change.parts), {*change.removed, *(copy.part for copy in change.copies)}
+    are_distinct = all(len(set(numbers)) == len(numbers) for numbers in (change.parts, change.removed))
+    if parts.max() >= len(layout) or not are_distinct or not named <= {*change.parts}:
         raise SlabError("there are no such scattered parts")
     scattered = _scattered_parts(layout, _members(layout, parts), change.up)
     if scattered is None or scattered.parts != change.parts:
@@ -420,7 +421,7 @@ def _members(layout: Layout, parts: np.ndarray) -> list[tuple[int, ...]]:
 def _scattered_parts(layout: Layout, members: Sequence[tuple[int, ...]], up: int) -> ScatteredParts | None:
     """Return like parts as scattered ones, or None if they make none.
 
-    Left out are those that hang on others of them, and those that smaller other parts touch.
+    Left out are those that hang on others of them, and those on which anything else lies.
     """
     hung = {part for member in members for part in member[1:]}
     members = _without_burdened(layout, [member for member in members if member[0] not in hung])

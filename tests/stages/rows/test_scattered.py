@@ -274,6 +274,8 @@ def test_its_json_says_what_is_changed_and_makes_it_again() -> None:
         Scattering((1, 2), UP_AXIS, (1,)),
         Scattering((1, 2, 3, 99), UP_AXIS, (1,)),
         Scattering((1, 2, 3), UP_AXIS, (4,)),
+        Scattering((1, 1, 2, 3), UP_AXIS, (1,)),
+        Scattering((1, 2, 3, 4), UP_AXIS, (1, 1)),
         Scattering((1, 2, 3), UP_AXIS, (), (Copy(4, 30),)),
         Scattering((1, 2, 3, 4), UP_AXIS, (), (Copy(1, 120), Copy(1, 120))),
     ],
