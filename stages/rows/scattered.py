@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from stages.rows.layout import Layout, sorted_edges, with_classes
+from stages.rows.likeness import have_like_sizes, principal_axes
 from stages.rows.slabs import SlabError
 from stages.rows.turns import rotation_about
 from stages.shape.arrays import BoolArray, FloatArray
@@ -28,14 +29,12 @@ if TYPE_CHECKING:
 MIN_SCATTERED = 3
 MAX_PARTS_COMPARED = 1000
 """Parts among which scattered ones are looked for."""
-MAX_SIZE_RATIO = 1.5
-"""Largest ratio of the sizes of two scattered parts, along each of their principal axes."""
-MIN_THICKNESS_SHARE = 0.1
-"""Sizes below this share of a part's largest count as this share: thin leaves are alike."""
 MIN_SCATTERED_SHARE, MAX_MEMBER_SHARE = 0.02, 0.25
 """Smallest share of the surface of a shape that scattered parts have together, and largest of one of them."""
-MIN_LENGTH_SHARE = 0.06
-"""Smallest diagonal of the box around a scattered part, as a share of the shape's: nobody counts leaves of a bush."""
+MIN_LENGTH_SHARE, MAX_LENGTH_SHARE = 0.06, 0.45
+"""Smallest and largest diagonal of the box around a scattered part, as shares of the shape's: leaves of a bush are not
+counted, and seats of a sofa do not lie about.
+"""
 MAX_REGULAR_SHARE = 0.5
 """Share of parts that are turned alike, or mirror images of others, up to which all are scattered: legs are not."""
 MIN_ALIGNED_COSINE = 0.998
@@ -306,8 +305,8 @@ def find_scattered_parts(layout: Layout, up: int, changes_already: BoolArray) ->
     clusters: list[list[tuple[int, ...]]] = []
     sizes: list[FloatArray] = []
     for member in _members(layout, np.flatnonzero(~changes_already)):
-        size = _principal(layout, member[0])[0]
-        alike = (number for number in range(len(clusters)) if _are_like(sizes[number], size))
+        size = principal_axes(layout.points[member[0]])[0]
+        alike = (number for number in range(len(clusters)) if have_like_sizes(sizes[number], size))
         number = next(alike, len(clusters))
         if number == len(clusters):
             clusters.append([])
@@ -407,8 +406,9 @@ def _members(layout: Layout, parts: np.ndarray) -> list[tuple[int, ...]]:
     i, j = layout.edges[:, 0], layout.edges[:, 1]
     members: list[tuple[int, ...]] = []
     lengths = np.linalg.norm(layout.boxes[:, 1] - layout.boxes[:, 0], axis=1)
-    is_long = lengths >= MIN_LENGTH_SHARE * float(np.linalg.norm(layout.extent))
-    for part in parts[is_long[parts]].tolist():
+    shares = lengths / float(np.linalg.norm(layout.extent))
+    fits = (shares >= MIN_LENGTH_SHARE) & (shares <= MAX_LENGTH_SHARE)
+    for part in parts[fits[parts]].tolist():
         kept = (i != part) & (j != part)
         graph = coo_matrix((np.ones(int(kept.sum())), (i[kept], j[kept])), shape=(len(layout), len(layout)))
         pieces = connected_components(graph, directed=False)[1]
@@ -432,8 +432,8 @@ def _scattered_parts(layout: Layout, members: Sequence[tuple[int, ...]], up: int
     scattered = ScatteredParts(layout, tuple(members), np.setdiff1d(touched, inner), up)
     if not len(scattered.holders) or not scattered.is_held.any():
         return None
-    sizes = [_principal(layout, member[0])[0] for member in members]
-    if not all(_are_like(sizes[0], size) for size in sizes[1:]):
+    sizes = [principal_axes(layout.points[member[0]])[0] for member in members]
+    if not all(have_like_sizes(sizes[0], size) for size in sizes[1:]):
         return None
     most = MAX_REGULAR_SHARE * len(members)
     if _mirrored(layout, members, up).sum() > most:
@@ -491,7 +491,7 @@ def _stand(scattered: ScatteredParts) -> bool:
 def _aligned(layout: Layout, members: Sequence[tuple[int, ...]]) -> BoolArray:
     """Return which members are turned as another one is, bool (n,); round ones whose turn nobody sees are."""
     found = np.zeros(len(members), dtype=np.bool_)
-    principal = [_principal(layout, member[0]) for member in members]
+    principal = [principal_axes(layout.points[member[0]]) for member in members]
     for i, (size, axes) in enumerate(principal):
         low, middle, high = size
         is_distinct = np.array([middle - low, min(middle - low, high - middle), high - middle])
@@ -533,15 +533,3 @@ def _box(layout: Layout, member: Sequence[int]) -> FloatArray:
 
 def _area(layout: Layout, members: Sequence[tuple[int, ...]]) -> float:
     return float(sum(layout.areas[list(member)].sum() for member in members))
-
-
-def _principal(layout: Layout, part: int) -> tuple[FloatArray, FloatArray]:
-    """Return the sizes of a part along its principal axes, float64 (3,) ascending, and the axes as columns (3, 3)."""
-    values, axes = np.linalg.eigh(np.cov(layout.points[part].T))
-    return np.sqrt(np.maximum(values, 0.0)), axes
-
-
-def _are_like(first: FloatArray, second: FloatArray) -> bool:
-    """Return whether two parts have like sizes along their principal axes."""
-    one, other = (np.maximum(size, MIN_THICKNESS_SHARE * size[-1]) for size in (first, second))
-    return bool((np.maximum(one / other, other / one) <= MAX_SIZE_RATIO).all())

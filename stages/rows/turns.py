@@ -4,18 +4,23 @@ angle between them; where the new number divides the old one, parts stay where t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stages.rows.layout import MAX_ROTATION_DIFFERENCE, Layout, sorted_edges, with_classes
+from stages.rows.likeness import have_like_sizes, principal_axes
 from stages.rows.slabs import SlabError
 from stages.rows.steps import ROUNDING_DECIMALS
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartType
 
 MIN_SECTORS = 3
+MAX_LIKE_GAP = 0.25
+"""Largest distance of the middle of a part from where the like part of another sector leads to, as a share of the
+diagonal of its box.
+"""
 MIN_RADIUS_TOLERANCES = 10.0
 """Smallest radius of a circle, in tolerances of mates."""
 
@@ -41,7 +46,8 @@ class Circle:
     """Parts at equal angles about an axis.
 
     axis, centre: as for `Turn`
-    orbits: part of each orbit in each sector, int64 (orbits, sectors); an orbit is a part and what it turns into
+    orbits: part of each orbit in each sector, int64 (orbits, sectors); an orbit is a part and what it turns into, or
+        like parts that hang on such an orbit, such as the shades of a chandelier
     """
 
     axis: int
@@ -70,6 +76,8 @@ def find_circles(layout: Layout) -> list[Circle]:
         centre = orbits[0][0]
         aligned = np.stack([_aligned(layout, axis, centre, orbits[0][1], orbit) for _, orbit in orbits])
         circle = Circle(axis, np.round(centre, ROUNDING_DECIMALS), aligned)
+        if not _is_free(layout, circle):
+            circle = _with_like_parts(layout, circle)
         if _is_free(layout, circle):
             circles.append(circle)
     return circles
@@ -178,6 +186,43 @@ def _angle(layout: Layout, axis: int, centre: FloatArray, part: int) -> float:
     across = [other for other in range(3) if other != axis]
     arm = layout.anchors[part, across] - centre[across]
     return float(np.arctan2(arm[1], arm[0]))
+
+
+def _with_like_parts(layout: Layout, circle: Circle) -> Circle:
+    """Return a circle with orbits of like parts too, each in contact with the same orbits and with one sector alone."""
+    sizes = {part: principal_axes(layout.points[part])[0] for part in range(len(layout))}
+    while (orbit := _like_orbit(layout, circle, sizes)) is not None:
+        circle = replace(circle, orbits=np.vstack([circle.orbits, orbit]))
+    return circle
+
+
+def _like_orbit(layout: Layout, circle: Circle, sizes: Mapping[int, FloatArray]) -> np.ndarray | None:
+    """Return like parts that touch a circle, one for each sector, int64 (sectors,), or None if there are no more."""
+    place_of = {part: place for place, part in np.ndenumerate(circle.orbits)}
+    touching: dict[tuple[int, ...], list[list[int]]] = {}
+    for part, touched in enumerate(layout.neighbours):
+        places = [place_of[other] for other in touched.tolist() if other in place_of]
+        if part not in place_of and len({sector for _, sector in places}) == 1:
+            orbits = tuple(sorted(orbit for orbit, _ in places))
+            touching.setdefault(orbits, [[] for _ in range(circle.sectors)])[places[0][1]].append(part)
+    middles = layout.boxes.mean(axis=1)
+    reach = MAX_LIKE_GAP * np.linalg.norm(layout.boxes[:, 1] - layout.boxes[:, 0], axis=1)
+    for sectors in touching.values():
+        for first in sectors[0]:
+            orbit = [first]
+            for sector in range(1, circle.sectors):
+                rotation = rotation_about(circle.axis, circle.centre, 2 * np.pi * sector / circle.sectors)
+                gaps = np.linalg.norm(
+                    middles[sectors[sector]] - (rotation[:3, :3] @ middles[first] + rotation[:3, 3]), axis=1
+                )
+                orbit += [
+                    part
+                    for part, gap in zip(sectors[sector], gaps.tolist(), strict=True)
+                    if gap == gaps.min() and gap <= reach[part] and have_like_sizes(sizes[first], sizes[part])
+                ][:1]
+            if len(orbit) == circle.sectors:
+                return np.array(orbit)
+    return None
 
 
 def _is_free(layout: Layout, circle: Circle) -> bool:

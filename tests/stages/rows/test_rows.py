@@ -250,6 +250,25 @@ def test_groups_of_parts_about_an_axis_change_their_number() -> None:
     assert turned(other, again.turn(3)).key == layout.key
 
 
+def test_like_parts_about_an_axis_go_with_what_they_hang_on() -> None:
+    kit, layout = models.chandelier()
+    (circle,) = find_circles(layout)
+    assert (circle.axis, circle.sectors, len(circle.orbits)) == (1, 5, 3)
+    labels = [[kit.types[layout.types[part]].label for part in orbit] for orbit in circle.orbits.tolist()]
+    shades = next(orbit for orbit in labels if orbit[0].startswith("shade"))
+    assert sorted(shades) == [f"shade{number}" for number in range(5)]
+    for count in (3, 8):
+        other = turned(layout, circle.turn(count))
+        assert counts(kit, other) == {"plate": 1, "arm": count, "socket": count, shades[0]: count}
+        check(kit, other)
+
+
+@pytest.mark.parametrize("widths", [(0.2, 0.21, 0.4), (0.2, 0.21, 0.1)])
+def test_unlike_parts_about_an_axis_bar_the_circle(widths: tuple[float, ...]) -> None:
+    _, layout = models.chandelier(widths)
+    assert not find_circles(layout)
+
+
 def test_rows_are_described() -> None:
     kit, layout = models.shelf()
     assert rows_of_kit(kit)[0].sentence == "5 times board, along y"
