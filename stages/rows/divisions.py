@@ -30,6 +30,12 @@ MIN_FRONT_SHARE, MAX_FRONT_SHARE = 0.01, 0.4
 """Smallest share of a shape's surface that a front has with what hangs on it, and largest that it has alone."""
 MIN_HUNG_SHARE, MAX_HUNG_SHARE = 0.004, 3.0
 """Smallest and largest area of what hangs on a front, as a multiple of the front's own; less are screws in a panel."""
+MIN_LARGE_SHARE = 0.3
+"""Share of both long sides of a front from which what hangs on it is large: it would be squeezed with the front."""
+MAX_CORNER_DISTANCE = 0.15
+"""Largest distance of a large part from each corner of its box, both in a unit square: the window of a washing machine
+is round, and stays so.
+"""
 MIN_HELD_SHARE = 0.5
 """Share of a front's length from which a part next to it holds it along its length."""
 GAP_SHARE = 0.04
@@ -148,6 +154,8 @@ def _front(layout: Layout, part: int) -> Front | None:
     low, high = layout.boxes[part, 0] - layout.tolerance, layout.boxes[part, 1] + layout.tolerance
     if (layout.boxes[hung, 0] < low)[:, long].any() or (layout.boxes[hung, 1] > high)[:, long].any():
         return None
+    if any(_is_round(layout, other, long) for other in _large(layout, part, hung, long)):
+        return None
     if _flat_share(layout, part, thin) < MIN_FLAT_SHARE or _cover(layout, part, hung, thin) < MIN_COVER:
         return None
     if not _stands_out(layout, part, hung, thin) and _cover(layout, part, hung[:0], thin) >= MIN_COVER:
@@ -158,6 +166,25 @@ def _front(layout: Layout, part: int) -> Front | None:
         if len(_holders(layout, part, main, axis)):
             pieces[axis] = int(min(MAX_PIECES, sides[axis] / shortest))
     return Front(part, hung, thin, (pieces[0], pieces[1], pieces[2])) if max(pieces) >= 2 else None
+
+
+def _large(layout: Layout, part: int, hung: np.ndarray, long: Sequence[int]) -> list[int]:
+    """Return what hangs on a front and takes much of both its long sides.
+
+    long: indices of the axes along these
+    """
+    sides = (layout.boxes[:, 1] - layout.boxes[:, 0])[:, long]
+    large: list[int] = hung[(sides[hung] >= MIN_LARGE_SHARE * sides[part]).all(axis=1)].tolist()
+    return large
+
+
+def _is_round(layout: Layout, part: int, long: Sequence[int]) -> bool:
+    """Return whether a part does not reach into the corners of its box, seen across two axes."""
+    points = layout.points[part][:, long]
+    unit = (points - points.min(axis=0)) / np.maximum(np.ptp(points, axis=0), layout.tolerance)
+    corners = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]])
+    nearest = np.linalg.norm(unit[:, None] - corners[None], axis=2).min(axis=0)
+    return bool((nearest > MAX_CORNER_DISTANCE).any())
 
 
 def _stands_out(layout: Layout, part: int, hung: np.ndarray, axis: int) -> bool:

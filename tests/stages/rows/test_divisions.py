@@ -139,6 +139,16 @@ def test_a_lid_stays_whole_if_it_leans(angle: float) -> None:
     assert bool(find_divisions(layout, UP_AXIS)) == (angle == 0.0)
 
 
+@pytest.mark.parametrize(("sides", "is_front"), [(4, True), (48, False)])
+def test_a_door_with_a_round_window_stays_whole(sides: int, is_front: bool) -> None:
+    """Its window would be squeezed; a square one of the same size may be."""
+    window = trimesh.creation.cylinder(0.3, 0.03, sections=sides)
+    window.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 4, [0, 0, 1]))
+    parts = [("body", pose(0.0, 0.5, 0.0)), ("door", pose(0.0, 0.5, 0.22)), ("window", pose(0.0, 0.5, 0.255))]
+    _, layout = models.layout(models.CHEST | {"window": window}, parts)
+    assert bool(find_divisions(layout, UP_AXIS)) == is_front
+
+
 def test_walls_stay_whole_if_one_of_them_has_no_banner() -> None:
     meshes = {"floor": box(4.0, 0.1, 1.0), "wall": box(0.9, 0.9, 0.1), "banner": box(0.4, 0.4, 0.02)}
     walls = [("wall", pose(x, 0.5, 0.0)) for x in (-1.5, -0.5, 0.5, 1.5)]
