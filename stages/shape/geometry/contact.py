@@ -6,6 +6,7 @@ Two parts are in contact if their triangle meshes intersect or come within the c
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -21,6 +22,10 @@ LINE_SHARE = 0.01
 """A contact narrower than this share of the smaller part's diagonal is a line."""
 LINE_TOLERANCES = 4.0
 """A contact narrower than this many tolerances is a line, however small the parts are."""
+PAIRS_LOOKED_AT = tuple(2**power for power in range(12, 21, 2))
+"""Pairs of near triangles that are looked at before all: of dense meshes within each other there are millions."""
+ROUNDING_MARGIN = 1.0001
+"""Factor by which a bound is exceeded where rounding must not decide."""
 
 Mesh = tuple[FloatArray, FloatArray, np.ndarray]
 
@@ -56,11 +61,20 @@ class ContactTest:
         points: FloatArray = self._patches(a, b, pose)[0]
         return points
 
-    def _patches(self, a: int, b: int, pose: FloatArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
-        """Return points, areas and crossings of `contact_patches`, all empty without contact."""
-        from stages.shape.geometry.mesh_pairs import contact_patches, near_pairs
+    def _patches(
+        self, a: int, b: int, pose: FloatArray, most: int | None = None
+    ) -> tuple[FloatArray, FloatArray, np.ndarray]:
+        """Return points, areas and crossings of `contact_patches`, all empty without contact.
 
-        pairs = near_pairs(self.types[a].box_tree, self.types[b].box_tree, pose, self.tolerance)
+        most: maximum number of pairs of triangles, the first ones; None: all
+        """
+        from stages.shape.geometry.mesh_pairs import contact_patches, first_pairs, near_pairs
+
+        trees = self.types[a].box_tree, self.types[b].box_tree
+        if most is None:
+            pairs = near_pairs(*trees, pose, self.tolerance)
+        else:
+            pairs = first_pairs(*trees, pose, self.tolerance, most)
         patches: tuple[FloatArray, FloatArray, np.ndarray] = contact_patches(
             self.types[a].box_tree[0], self.types[b].box_tree[0], pairs, pose, self.tolerance
         )
@@ -73,7 +87,16 @@ class ContactTest:
         lies near the other. Its extents along its principal axes decide, so the pose of the parts in the world does not
         matter.
         """
-        points, areas, crossing = self._patches(a, b, pose)
+        smaller = min(self.diagonals[a], self.diagonals[b])
+        narrow = max(LINE_SHARE * smaller, LINE_TOLERANCES * self.tolerance)
+        for most in (*PAIRS_LOOKED_AT, None):
+            points, areas, crossing = self._patches(a, b, pose, most)
+            if len(crossing) != most:
+                break
+            longest = smaller + 2 * self.tolerance
+            has_area = crossing.any() or areas.sum() > ROUNDING_MARGIN * LINE_TOLERANCES * self.tolerance * longest
+            if has_area and is_surely_wide(points, POINT_SHARE * smaller, narrow):
+                return "face"
         if len(crossing) == 0:
             return None
         if len(points) < 3:
@@ -81,10 +104,8 @@ class ContactTest:
         centred = points - points.mean(axis=0)
         _, axes = np.linalg.eigh(centred.T @ centred)
         length, width, _ = np.sort(np.ptp(centred @ axes, axis=0))[::-1]
-        smaller = min(self.diagonals[a], self.diagonals[b])
         if length < POINT_SHARE * smaller:
             return "point"
-        narrow = max(LINE_SHARE * smaller, LINE_TOLERANCES * self.tolerance)
         if width < narrow:
             return "line"
         # Two or more lines side by side are wide too: a face has area of its own, or the parts pass into each other.
@@ -101,6 +122,25 @@ class ContactTest:
             self.touches(int(types[i]), int(types[j]), pose) for (i, j), pose in zip(pairs.tolist(), moved, strict=True)
         ]
         return pairs[np.array(touching, dtype=bool)] if len(pairs) else pairs
+
+
+def is_surely_wide(points: FloatArray, length: float, width: float) -> bool:
+    """Return whether all points that include some (q, 3) have at least a length and a width along any axes.
+
+    A triangle of these points is looked at. Along three axes at right angles, the largest extent is at least its
+    longest side by the root of 3. Were the second largest below `width`, the points would be in a prism that is as wide
+    in both directions, and the triangle would be no higher than the prism's diagonal.
+    """
+    first = points[0]
+    second = points[int(np.linalg.norm(points - first, axis=1).argmax())]
+    heights = np.linalg.norm(np.cross(points - first, second - first), axis=1)
+    third = points[int(heights.argmax())]
+    longest = max(
+        float(np.linalg.norm(one - other)) for one, other in ((first, second), (first, third), (second, third))
+    )
+    height = float(heights.max()) / max(longest, 1e-300)
+    is_long = longest >= ROUNDING_MARGIN * math.sqrt(3.0) * length
+    return is_long and height >= ROUNDING_MARGIN * math.sqrt(2.0) * width
 
 
 def world_boxes(part_types: Sequence[PartMesh], types: np.ndarray, poses: FloatArray) -> FloatArray:

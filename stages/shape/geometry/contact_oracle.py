@@ -134,8 +134,7 @@ class ContactOracle:
 
     def _ask_geometry(self, a: int, b: int, pose: FloatArray) -> int:
         self.geometry_queries += 1
-        touching = self.contact.touches(a, b, pose)
-        if touching:
+        if self.contact.touches(a, b, pose):
             label = int(self.dockings.label(a, b, pose[None])[0])
             back = int(self.dockings.label(b, a, invert(pose)[None])[0])
             # Seen from the smaller part a turn moves the larger one farther: within tolerance from one side alone.
@@ -145,12 +144,13 @@ class ContactOracle:
             if fit is not None:
                 allowed = self.kit.grammar.dockings[fit[0] // 2].depth + self.contact.tolerance
                 return FORBIDDEN_CONTACT if self._is_deeper(a, b, pose, allowed) else fit[0] * LABEL_BASE + fit[1]
-            # Telling the kind of a contact is slow.
-            if self._every_kind or self.contact.kind(a, b, pose) in self.kit.contact_kinds:
+            # Telling the kind of a contact is slow, most of all where large meshes pass through each other.
+            if self._every_kind or self._nested(a, b, pose, apart=False):
                 return FORBIDDEN_CONTACT
-        elif self.contact.touches(a, b, pose, BORDERLINE_TOLERANCES * self.contact.tolerance):
+            return FORBIDDEN_CONTACT if self.contact.kind(a, b, pose) in self.kit.contact_kinds else NO_CONTACT
+        if self.contact.touches(a, b, pose, BORDERLINE_TOLERANCES * self.contact.tolerance):
             return FORBIDDEN_CONTACT
-        return FORBIDDEN_CONTACT if self._nested(a, b, pose, not touching) else NO_CONTACT
+        return FORBIDDEN_CONTACT if self._nested(a, b, pose, apart=True) else NO_CONTACT
 
     def _nested(self, a: int, b: int, pose: FloatArray, apart: bool) -> bool:
         """Return whether a part lies in the other deeper than any of their types did in the exemplars.

@@ -231,8 +231,10 @@ def _bounds_apart(corners, u, tri, reach):
 
 
 @numba.njit(cache=True)
-def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, stop_at_first, pairs):
-    """Return the number of triangle pairs within tolerance. Their indices go to `pairs` as far as it has rows."""
+def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, most, pairs):
+    """Return the number of triangle pairs within tolerance, up to `most`. Their indices go to `pairs` as far as it has
+    rows.
+    """
     r = np.ascontiguousarray(pose[:3, :3])
     ar = np.abs(r) + 1e-12
     t = pose[:3, 3].copy()
@@ -266,7 +268,7 @@ def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, stop_at_first, pairs):
                             pairs[count, 0] = u
                             pairs[count, 1] = v
                         count += 1
-                        if stop_at_first:
+                        if count >= most:
                             return count
         elif leaf_b or (not leaf_a and ba[i, 3] + ba[i, 4] + ba[i, 5] > bb[j, 3] + bb[j, 4] + bb[j, 5]):
             for child in range(2):
@@ -280,21 +282,28 @@ def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, stop_at_first, pairs):
 
 
 _NO_PAIRS = np.empty((0, 2), dtype=np.int64)
+_ALL_PAIRS = 2**62
 
 
 def first_contact(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> bool:
     """Return whether mesh `b`, moved by `pose` (4, 4) into coordinates of mesh `a`, comes within `tolerance` of it."""
-    return bool(_walk(*a, *b, pose, tolerance, True, _NO_PAIRS))
+    return bool(_walk(*a, *b, pose, tolerance, 1, _NO_PAIRS))
+
+
+def first_pairs(a: Tree, b: Tree, pose: FloatArray, tolerance: float, most: int) -> np.ndarray:
+    """Return the first pairs of triangles within `tolerance`, at most `most`, int64 (p, 2), as of `near_pairs`."""
+    pairs = np.empty((most, 2), dtype=np.int64)
+    return pairs[: _walk(*a, *b, pose, tolerance, most, pairs)]
 
 
 def near_pairs(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> np.ndarray:
     """Return all pairs of triangles within `tolerance`, int64 (p, 2), in tree order of `a` and `b`."""
     # a surface and itself: each triangle and the dozen around it; only what is written takes memory
     pairs = np.empty((max(4096, 16 * min(len(a[0]), len(b[0]))), 2), dtype=np.int64)
-    count = _walk(*a, *b, pose, tolerance, False, pairs)
+    count = _walk(*a, *b, pose, tolerance, _ALL_PAIRS, pairs)
     if count > len(pairs):
         pairs = np.empty((count, 2), dtype=np.int64)
-        _walk(*a, *b, pose, tolerance, False, pairs)
+        _walk(*a, *b, pose, tolerance, _ALL_PAIRS, pairs)
     return pairs[:count]
 
 

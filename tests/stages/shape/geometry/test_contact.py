@@ -2,12 +2,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from stages.shape.arrays import FloatArray
-from stages.shape.geometry.contact import ContactTest, overlapping_boxes, world_boxes
+from stages.shape.geometry import contact
+from stages.shape.geometry.contact import (
+    ContactTest,
+    overlapping_boxes,
+    world_boxes,
+)
+from stages.shape.geometry.mesh_pairs import first_pairs, near_pairs
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import ContactKind
 from tests.stages.shape.geometry.bodies import (
@@ -47,6 +54,54 @@ def kind_of(one: Body, other: Body, pose: FloatArray, tolerance: float = CONTACT
 
 
 TURNS = {"upright": np.eye(3)} | {axis: turned(axis, 30.0) for axis in "xyz"}
+
+
+def finely_divided(body: Body, times: int) -> Body:
+    """The same surface in 4**times as many triangles."""
+    vertices, faces = body
+    for _ in range(times):
+        vertices, faces = trimesh.remesh.subdivide(vertices, faces)
+    return vertices, faces
+
+
+class TestDenseMeshes:
+    """Of dense meshes only some pairs of triangles are looked at where these decide."""
+
+    @pytest.mark.parametrize(
+        ("pose", "kind"),
+        [
+            (placed(1, 0.1, 0.2), "face"),
+            (placed(0.5, 0.3, 0.1), "line"),
+            (placed(1, 0.997, 0), "line"),
+            (placed(1, 0.999, 0.999), "point"),
+            (placed(1.1, 0, 0), None),
+        ],
+    )
+    def test_they_have_the_kind_that_all_pairs_give(
+        self, pose: FloatArray, kind: ContactKind | None, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """With a tolerance of several triangles each of these has hundreds of others near it."""
+        tolerance, dense = 4e-3, part(finely_divided(box(), 7))
+        test = ContactTest([dense], tolerance)
+        pairs = near_pairs(dense.box_tree, dense.box_tree, pose, tolerance)
+        first = first_pairs(dense.box_tree, dense.box_tree, pose, tolerance, 1000)
+        np.testing.assert_array_equal(first, pairs[:1000])
+        assert (len(pairs) > contact.PAIRS_LOOKED_AT[0]) == (kind in ("face", "line"))
+        assert test.kind(0, 0, pose) == kind
+        monkeypatch.setattr(contact, "PAIRS_LOOKED_AT", ())
+        assert test.kind(0, 0, pose) == kind
+
+    @given(st.integers(0, 2**32 - 1), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+    @settings(max_examples=200, deadline=None)
+    def test_points_are_surely_wide_only_if_their_extents_are(self, seed: int, width: float, length: float) -> None:
+        rng = np.random.default_rng(seed)
+        every = rng.normal(size=(40, 3)) * np.sort(rng.exponential(size=3))
+        some = every[rng.permutation(40)[:8]]
+        if contact.is_surely_wide(some, length, width):
+            axes = random_rotation(rng)[:3, :3]
+            extents = np.sort(np.ptp(every @ axes, axis=0))
+            assert extents[2] >= length
+            assert extents[1] >= width
 
 
 class TestBoxes:
