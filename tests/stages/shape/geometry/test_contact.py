@@ -91,6 +91,10 @@ class TestDenseMeshes:
         monkeypatch.setattr(contact, "PAIRS_LOOKED_AT", ())
         assert test.kind(0, 0, pose) == kind
 
+    @pytest.mark.parametrize("count", [0, 1, 2])
+    def test_fewer_than_three_points_are_not_surely_wide(self, count: int) -> None:
+        assert not contact.is_surely_wide(np.eye(3)[:count], 0.0, 0.0)
+
     @given(st.integers(0, 2**32 - 1), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
     @settings(max_examples=200, deadline=None)
     def test_points_are_surely_wide_only_if_their_extents_are(self, seed: int, width: float, length: float) -> None:
