@@ -15,7 +15,7 @@ from stages.rows.graded_rows import Respacing, respaced
 from stages.rows.layout import Layout
 from stages.rows.mirrored_bays import with_mirrored_bays
 from stages.rows.modular_bays import with_modular_bays
-from stages.rows.scattered import FULL_TURN_DEGREES, Copy, Scattering, rescattered
+from stages.rows.scattered import FULL_TURN_DEGREES, Scattering, TurnedCopy, rescattered
 from stages.rows.slabs import RowChange, repeat
 from stages.rows.turns import Turn, turned
 
@@ -109,7 +109,7 @@ def read_change(stated: Mapping[str, Any]) -> Change:
 def _read_scattering(stated: Mapping[str, Any]) -> Scattering:
     """Return another number of scattered parts from its JSON. Raises ValueError, TypeError or KeyError."""
     parts, removed = (tuple(int(part) for part in stated[key]) for key in ("scattered", "removed"))
-    copies = tuple(Copy(int(part), int(degrees)) for part, degrees in stated["copies"])
+    copies = tuple(TurnedCopy(int(part), int(degrees)) for part, degrees in stated["copies"])
     are_turns = all(0 < copy.degrees < FULL_TURN_DEGREES for copy in copies)
     if stated["axis"] not in AXES or min(parts, default=-1) < 0 or not are_turns or len(copies) > MAX_TIMES:
         raise ValueError(

@@ -33,8 +33,8 @@ MIN_HUNG_SHARE, MAX_HUNG_SHARE = 0.004, 3.0
 MIN_LARGE_SHARE = 0.3
 """Share of both long sides of a front from which what hangs on it is large: it would be squeezed with the front."""
 MAX_CORNER_DISTANCE = 0.15
-"""Largest distance of a large part from each corner of its box, both in a unit square: the window of a washing machine
-is round, and stays so.
+"""Largest distance of a large part from a corner of its box, both in a unit square: the window of a washing machine is
+round, and stays so.
 """
 MIN_HELD_SHARE = 0.5
 """Share of a front's length from which a part next to it holds it along its length."""
@@ -179,12 +179,12 @@ def _large(layout: Layout, part: int, hung: np.ndarray, long: Sequence[int]) -> 
 
 
 def _is_round(layout: Layout, part: int, long: Sequence[int]) -> bool:
-    """Return whether a part does not reach into the corners of its box, seen across two axes."""
+    """Return whether a part reaches into no corner of its box, seen across two axes; half a pane reaches into three."""
     points = layout.points[part][:, long]
     unit = (points - points.min(axis=0)) / np.maximum(np.ptp(points, axis=0), layout.tolerance)
     corners = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]])
     nearest = np.linalg.norm(unit[:, None] - corners[None], axis=2).min(axis=0)
-    return bool((nearest > MAX_CORNER_DISTANCE).any())
+    return bool((nearest > MAX_CORNER_DISTANCE).all())
 
 
 def _stands_out(layout: Layout, part: int, hung: np.ndarray, axis: int) -> bool:

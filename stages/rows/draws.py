@@ -51,7 +51,7 @@ def repeated_parts(
     return repeated
 
 
-def without_graded(repeated: BoolArray, graded: Sequence[Sequence[GradedRow]]) -> BoolArray:
+def repeated_or_graded(repeated: BoolArray, graded: Sequence[Sequence[GradedRow]]) -> BoolArray:
     """Return which parts are repeated or in a graded row, bool (n,)."""
     changed = repeated.copy()
     for peers in graded:
@@ -89,7 +89,7 @@ class LayoutDraws:
             repeated = repeated_parts(layout, self.rows, self.circles, self.divisions)
             self.graded_rows = find_graded_rows(layout, repeated)
             if up is not None:
-                self.scattered = find_scattered_parts(layout, up, without_graded(repeated, self.graded_rows))
+                self.scattered = find_scattered_parts(layout, up, repeated_or_graded(repeated, self.graded_rows))
         self._with_modules: dict[tuple[tuple[int, int], ...], tuple[RowChange, Layout] | None] = {}
         self._with_respacings: dict[tuple[Respacing, ...], Layout | None] = {}
 

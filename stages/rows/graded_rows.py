@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from stages.rows.layout import Layout, sorted_edges, with_classes
+from stages.rows.likeness import MAX_PARTS_COMPARED
 from stages.rows.slabs import SlabError
 from stages.rows.spanning import posed
 from stages.shape.arrays import BoolArray, FloatArray
@@ -22,8 +23,6 @@ from stages.shape.geometry.pose import relative_poses
 from stages.shape.stretch import STRETCHED_DEPTH
 
 MIN_GRADED_ROW = 3
-MAX_PARTS_COMPARED = 1000
-"""Parts among which rows are looked for; all pairs of them are compared."""
 NEAREST_PARTS = 6
 """Nearest parts of like size to which a first step from a part is tried."""
 MAX_STEP_CHANGE = 0.2

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.rows.divisions import Division, find_divisions
-from stages.rows.draws import repeated_parts, without_graded
+from stages.rows.draws import repeated_or_graded, repeated_parts
 from stages.rows.graded_rows import GradedRow, find_graded_rows
 from stages.rows.layout import Layout, layout_of
 from stages.rows.mirrored_bays import MIRRORED_ENDS, MirroredBay, find_mirrored_bays
@@ -98,7 +98,7 @@ def rows_of_kit(kit: Kit) -> tuple[KitRow, ...]:
         repeated = repeated_parts(layout, along_lines, turning, divisions)
         graded = [] if modular else find_graded_rows(layout, repeated)
         respaced = [_described_graded(kit, exemplar.name, layout, peers) for peers in graded]
-        changed = without_graded(repeated, graded)
+        changed = repeated_or_graded(repeated, graded)
         loose = [] if modular else find_scattered_parts(layout, up, changed)
         scattered = [_described_scattered(kit, exemplar.name, layout, parts) for parts in loose]
         found += dict.fromkeys([*circles, *rows, *bays, *mirrored, *modular, *respaced, *scattered])

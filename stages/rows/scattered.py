@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from stages.rows.layout import Layout, sorted_edges, with_classes
-from stages.rows.likeness import have_like_sizes, principal_axes
+from stages.rows.likeness import MAX_PARTS_COMPARED, have_like_shapes, have_like_sizes, principal_axes
 from stages.rows.slabs import SlabError
 from stages.rows.turns import rotation_about
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.shape.geometry.pose import relative_poses
+from stages.shape.geometry.pose import relative_poses, transform_points
 from stages.shape.stretch import STRETCHED_DEPTH
 
 if TYPE_CHECKING:
@@ -27,13 +27,15 @@ if TYPE_CHECKING:
     from stages.shape.geometry.penetration import PenetrationTest
 
 MIN_SCATTERED = 3
-MAX_PARTS_COMPARED = 1000
-"""Parts among which scattered ones are looked for."""
 MIN_SCATTERED_SHARE, MAX_MEMBER_SHARE = 0.02, 0.25
 """Smallest share of the surface of a shape that scattered parts have together, and largest of one of them."""
 MIN_LENGTH_SHARE, MAX_LENGTH_SHARE = 0.06, 0.45
 """Smallest and largest diagonal of the box around a scattered part, as shares of the shape's: leaves of a bush are not
 counted, and seats of a sofa do not lie about.
+"""
+MIN_INLAID_SHARE = 0.7
+"""Share of both larger extents of a part along which its holder touches it, from which it lies in the surface of that:
+without a panel a football has a hole.
 """
 MAX_REGULAR_SHARE = 0.5
 """Share of parts that are turned alike, or mirror images of others, up to which all are scattered: legs are not."""
@@ -52,7 +54,7 @@ TURN_STEP_DEGREES, MIN_TURN_STEPS = 15, 2
 TRIES_PER_COPY = 8
 
 
-class Copy(NamedTuple):
+class TurnedCopy(NamedTuple):
     """A scattered part that is added.
 
     part: the old one
@@ -84,7 +86,7 @@ class Scattering:
     parts: tuple[int, ...]
     up: int
     removed: tuple[int, ...] = ()
-    copies: tuple[Copy, ...] = ()
+    copies: tuple[TurnedCopy, ...] = ()
 
     @property
     def count(self) -> int:
@@ -131,7 +133,7 @@ class ScatteredParts:
         posed = zip(pairs.tolist(), relative_poses(layout.poses, pairs), strict=True)
         return max((self._penetration.depth(i, j, pose) for (i, j), pose in posed), default=0.0)
 
-    def placed(self, copy: Copy) -> Layout:
+    def placed(self, copy: TurnedCopy) -> Layout:
         """Return the parts of a copy, with the contacts among them."""
         if copy not in self._placed:
             layout, member = self.layout, np.array(self._member_of[copy.part])
@@ -150,7 +152,7 @@ class ScatteredParts:
             )
         return self._placed[copy]
 
-    def contacts(self, copy: Copy, removed: Collection[int] = ()) -> list[tuple[int, int]]:
+    def contacts(self, copy: TurnedCopy, removed: Collection[int] = ()) -> list[tuple[int, int]]:
         """Return the contacts of a copy with the layout, each a part of the layout and one of the copy.
 
         removed: scattered parts that will be left out, and may be overlapped
@@ -167,7 +169,7 @@ class ScatteredParts:
             raise SlabError("a copy of a scattered part would overlap another part")
         return [(contact.part, contact.other) for contact in found]
 
-    def _found_contacts(self, copy: Copy) -> list[CrossContact] | str:
+    def _found_contacts(self, copy: TurnedCopy) -> list[CrossContact] | str:
         """Return the contacts of a copy with the layout, or why it has no place."""
         holder, placed = self.holder(copy.part), self.placed(copy)
         if holder < 0:
@@ -183,7 +185,7 @@ class ScatteredParts:
         is_held = any(contact.part == holder and contact.other == 0 for contact in found)
         return found if is_held else "a copy of a scattered part would not be held"
 
-    def contacts_between(self, first: Copy, second: Copy) -> list[tuple[int, int]]:
+    def contacts_between(self, first: TurnedCopy, second: TurnedCopy) -> list[tuple[int, int]]:
         """Return the contacts of two copies, each a part of either. Raises SlabError where they overlap too deep."""
         if (first, second) not in self._between:
             placed = self.placed(first)
@@ -209,7 +211,7 @@ class ScatteredParts:
         found: list[CrossContact] = []
         for (i, j), pose in zip(pairs.tolist(), poses, strict=True):
             one, other = self._mesh_numbers[id(first.meshes[i])], self._mesh_numbers[id(second.meshes[j])]
-            if not self._contact.touches(one, other, pose):
+            if not self.contact_test.touches(one, other, pose):
                 continue
             little = tolerance + STRETCHED_DEPTH * min(first.meshes[i].diagonal, second.meshes[j].diagonal)
             allowed = max(little, float(deepest[i]))
@@ -223,7 +225,8 @@ class ScatteredParts:
         return {id(mesh): part for part, mesh in enumerate(self.layout.meshes)}
 
     @cached_property
-    def _contact(self) -> ContactTest:
+    def contact_test(self) -> ContactTest:
+        """The test of contacts of the parts of the layout, by their numbers."""
         from stages.shape.geometry.contact import ContactTest
 
         return ContactTest(self.layout.meshes, self.layout.tolerance)
@@ -239,15 +242,15 @@ class ScatteredParts:
         return {member[0]: member for member in self.members}
 
     @cached_property
-    def _placed(self) -> dict[Copy, Layout]:
+    def _placed(self) -> dict[TurnedCopy, Layout]:
         return {}
 
     @cached_property
-    def _contacts(self) -> dict[Copy, list[CrossContact] | str]:
+    def _contacts(self) -> dict[TurnedCopy, list[CrossContact] | str]:
         return {}
 
     @cached_property
-    def _between(self) -> dict[tuple[Copy, Copy], list[CrossContact]]:
+    def _between(self) -> dict[tuple[TurnedCopy, TurnedCopy], list[CrossContact]]:
         return {}
 
     def drawn(self, count: int, rng: np.random.Generator) -> tuple[Scattering, Layout] | None:
@@ -261,11 +264,11 @@ class ScatteredParts:
         stay = int(rng.integers(-(-most // 2), most + 1))
         order = rng.permutation(len(parts))
         removed = self._removable(parts[order[np.argsort(self.is_held[order], kind="stable")]], len(parts) - stay)
-        held, copies = parts[self.is_held].tolist(), list[Copy]()
+        held, copies = parts[self.is_held].tolist(), list[TurnedCopy]()
         for _ in range(count - len(parts) + len(removed)):
             for _ in range(TRIES_PER_COPY):
                 steps = int(rng.integers(MIN_TURN_STEPS, FULL_TURN_DEGREES // TURN_STEP_DEGREES - MIN_TURN_STEPS + 1))
-                copy = Copy(held[int(rng.integers(len(held)))], TURN_STEP_DEGREES * steps)
+                copy = TurnedCopy(held[int(rng.integers(len(held)))], TURN_STEP_DEGREES * steps)
                 if self._fits(copy, copies, removed):
                     copies.append(copy)
                     break
@@ -284,7 +287,7 @@ class ScatteredParts:
                     removed.append(part)
         return removed
 
-    def _fits(self, copy: Copy, others: Sequence[Copy], removed: Collection[int]) -> bool:
+    def _fits(self, copy: TurnedCopy, others: Sequence[TurnedCopy], removed: Collection[int]) -> bool:
         try:
             self.contacts(copy, removed)
             for other in others:
@@ -315,12 +318,25 @@ def find_scattered_parts(layout: Layout, up: int, changes_already: BoolArray) ->
     found: list[ScatteredParts] = []
     taken: set[int] = set()
     for cluster in sorted(clusters, key=lambda cluster: -_area(layout, cluster)):
-        if taken.isdisjoint(part for member in cluster for part in member):
-            scattered = _scattered_parts(layout, cluster, up)
-            if scattered is not None:
+        for group in (cluster, *_alike_groups(layout, cluster)):
+            scattered = _scattered_parts(layout, group, up)
+            inner = set() if scattered is None else {part for member in scattered.members for part in member}
+            if scattered is not None and taken.isdisjoint(inner):
                 found.append(scattered)
-                taken.update(part for member in cluster for part in member)
+                taken |= inner
     return found
+
+
+def _alike_groups(layout: Layout, cluster: Sequence[tuple[int, ...]]) -> list[list[tuple[int, ...]]]:
+    """Return the groups of members of one shape, such as the leaves of one kind, the first member's first."""
+    groups: list[list[tuple[int, ...]]] = []
+    for member in cluster:
+        group = next((group for group in groups if _are_alike(layout, group[0][0], member[0])), None)
+        if group is None:
+            groups.append([member])
+        else:
+            group.append(member)
+    return groups
 
 
 def rescattered(layout: Layout, change: Scattering) -> Layout:
@@ -438,7 +454,14 @@ def _scattered_parts(layout: Layout, members: Sequence[tuple[int, ...]], up: int
     most = MAX_REGULAR_SHARE * len(members)
     if _mirrored(layout, members, up).sum() > most:
         return None
-    return scattered if _stand(scattered) or _aligned(layout, members).sum() <= most else None
+    if _stand(scattered):
+        return scattered
+    if any(_is_inlaid(scattered, part) for part in scattered.parts):
+        return None
+    first, *others = (member[0] for member in members)
+    if _aligned(layout, members).sum() > most or not all(_are_alike(layout, first, other) for other in others):
+        return None
+    return scattered
 
 
 def _without_burdened(layout: Layout, members: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
@@ -476,6 +499,27 @@ def _levels(layout: Layout) -> np.ndarray:
     return levels
 
 
+def _are_alike(layout: Layout, first: int, second: int) -> bool:
+    """Return whether two parts are congruent or have like shapes: the hands of a figure are no leaves."""
+    return layout.meshes[first] is layout.meshes[second] or have_like_shapes(
+        layout.points[first], layout.points[second]
+    )
+
+
+def _is_inlaid(scattered: ScatteredParts, part: int) -> bool:
+    """Return whether the holder of a part touches it along most of its length and width."""
+    layout, holder = scattered.layout, scattered.holder(part)
+    if holder < 0:
+        return False
+    (pose,) = relative_poses(layout.poses, np.array([[holder, part]]))
+    touching = transform_points(layout.poses[holder], scattered.contact_test.area(holder, part, pose))
+    if not len(touching):
+        return False
+    axes = principal_axes(layout.points[part])[1][:, 1:]
+    extents = np.ptp(layout.points[part] @ axes, axis=0)
+    return bool((np.ptp(touching @ axes, axis=0) >= MIN_INLAID_SHARE * extents).all())
+
+
 def _stand(scattered: ScatteredParts) -> bool:
     """Return whether each part stands on one of its holders."""
     layout, up = scattered.layout, scattered.up
@@ -490,21 +534,19 @@ def _stand(scattered: ScatteredParts) -> bool:
 
 def _aligned(layout: Layout, members: Sequence[tuple[int, ...]]) -> BoolArray:
     """Return which members are turned as another one is, bool (n,); round ones whose turn nobody sees are."""
-    found = np.zeros(len(members), dtype=np.bool_)
-    principal = [principal_axes(layout.points[member[0]]) for member in members]
-    for i, (size, axes) in enumerate(principal):
-        low, middle, high = size
-        is_distinct = np.array([middle - low, min(middle - low, high - middle), high - middle])
-        is_distinct = is_distinct > MIN_AXIS_DIFFERENCE * high
-        for j, (_, others) in enumerate(principal):
-            first, second = members[i][0], members[j][0]
-            if i == j:
-                continue
-            if layout.meshes[first] is layout.meshes[second]:
-                found[i] |= layout.classes[first] == layout.classes[second]
-            else:
-                cosines = np.abs((axes * others).sum(axis=0))
-                found[i] |= bool((cosines[is_distinct] >= MIN_ALIGNED_COSINE).all())
+    parts = [member[0] for member in members]
+    principal = [principal_axes(layout.points[part]) for part in parts]
+    low, middle, high = np.array([sizes for sizes, _ in principal]).T
+    gaps = np.stack([middle - low, np.minimum(middle - low, high - middle), high - middle], axis=1)
+    is_distinct = gaps > MIN_AXIS_DIFFERENCE * high[:, None]
+    axes = np.stack([columns for _, columns in principal])
+    is_parallel = np.abs(np.einsum("iak,jak->ijk", axes, axes)) >= MIN_ALIGNED_COSINE
+    meshes, classes = np.array([id(layout.meshes[part]) for part in parts]), layout.classes[parts]
+    is_aligned = np.where(
+        meshes[:, None] == meshes, classes[:, None] == classes, (is_parallel | ~is_distinct[:, None]).all(axis=2)
+    )
+    np.fill_diagonal(is_aligned, val=False)
+    found: BoolArray = is_aligned.any(axis=1)
     return found
 
 

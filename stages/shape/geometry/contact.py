@@ -24,7 +24,6 @@ LINE_TOLERANCES = 4.0
 """A contact narrower than this many tolerances is a line, however small the parts are."""
 PAIRS_LOOKED_AT = tuple(2**power for power in range(12, 21, 2))
 """Pairs of near triangles that are looked at before all: of dense meshes within each other there are millions."""
-CORNER_COUNT = 3
 ROUNDING_MARGIN = 1.0001
 """Factor by which a bound is exceeded where rounding must not decide."""
 
@@ -100,7 +99,7 @@ class ContactTest:
                 return "face"
         if len(crossing) == 0:
             return None
-        if len(points) < CORNER_COUNT:
+        if len(points) < 3:
             return "point"
         centred = points - points.mean(axis=0)
         _, axes = np.linalg.eigh(centred.T @ centred)
@@ -132,7 +131,7 @@ def is_surely_wide(points: FloatArray, length: float, width: float) -> bool:
     longest side by the root of 3. Were the second largest below `width`, the points would be in a prism that is as wide
     in both directions, and the triangle would be no higher than the prism's diagonal.
     """
-    if len(points) < CORNER_COUNT:
+    if len(points) < 3:
         return False
     first = points[0]
     second = points[int(np.linalg.norm(points - first, axis=1).argmax())]

@@ -144,7 +144,7 @@ class ContactOracle:
             if fit is not None:
                 allowed = self.kit.grammar.dockings[fit[0] // 2].depth + self.contact.tolerance
                 return FORBIDDEN_CONTACT if self._is_deeper(a, b, pose, allowed) else fit[0] * LABEL_BASE + fit[1]
-            # Telling the kind of a contact is slow, most of all where large meshes pass through each other.
+            # The kind of a contact takes long to find, most of all where large meshes pass through each other.
             if self._every_kind or self._nested(a, b, pose, apart=False):
                 return FORBIDDEN_CONTACT
             return FORBIDDEN_CONTACT if self.contact.kind(a, b, pose) in self.kit.contact_kinds else NO_CONTACT

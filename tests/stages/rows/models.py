@@ -266,14 +266,17 @@ def fan(blades: int = 3) -> tuple[Kit, Layout]:
 
 
 @cache
-def chandelier(widths: tuple[float, ...] = (0.2, 0.21, 0.19, 0.205, 0.195)) -> tuple[Kit, Layout]:
-    """Arms on a round plate, each with a shade of another width on a socket."""
+def chandelier(widths: tuple[float, ...] = (0.2, 0.21, 0.19, 0.205, 0.195), aside: float = 0.0) -> tuple[Kit, Layout]:
+    """Arms on a round plate, each with a shade of another width on a socket.
+
+    aside: how far the last shade is moved along its arm
+    """
     meshes = {"plate": round_plate(0.3), "arm": box(1.0, 0.05, 0.1), "socket": box(0.1, 0.05, 0.06)}
     held: list[Placed] = []
     for number, (turn, width) in enumerate(zip(turns_about_y(len(widths)), widths, strict=True)):
         meshes[f"shade{number}"] = box(width, 0.3, 0.8 * width)
         held += [(name, turn @ pose(x, y, 0.0)) for name, x, y in (("arm", 0.75, 0.0), ("socket", 1.1, 0.05))]
-        held.append((f"shade{number}", turn @ pose(1.1, 0.225, 0.0)))
+        held.append((f"shade{number}", turn @ pose(1.1 + aside * (number == len(widths) - 1), 0.225, 0.0)))
     return layout(meshes, [("plate", pose(0.0, 0.0, 0.0)), *held])
 
 

@@ -18,9 +18,9 @@ from stages.rows.layout import Layout
 from stages.rows.rows import find_rows
 from stages.rows.settings import RowsConfig
 from stages.rows.slabs import SlabError
-from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Kit
 from tests.stages.rows import models
+from tests.stages.rows.soundness import assert_sound
 from tests.toy_kits.chains_and_rings import box, pose
 
 UP_AXIS = 1
@@ -108,11 +108,7 @@ def test_bars_reach_from_the_rail_into_the_arch_at_equal_gaps(count: int) -> Non
     np.testing.assert_allclose(bars[:, 1, 0] - bars[:, 0, 0], BAR_WIDTH, atol=1e-9)
     np.testing.assert_allclose(bars[:, 0, 1], 0.3, atol=1e-9)
     np.testing.assert_allclose(bars[:, 1, 1], arch(middles) + 0.02, atol=2e-3)
-    shape = made.shape(kit)
-    found = ContactTest(shape.meshes, kit.contact_tolerance).contacts(shape.assembly.types, shape.assembly.poses)
-    np.testing.assert_array_equal(found, made.edges)
-    assert warp_fault(kit, made.assembly(), shape) is None
-    assert made.pieces().max() == 0
+    assert_sound(kit, made)
 
 
 def test_posts_that_stand_where_the_next_bar_would_bound_the_row() -> None:

@@ -12,7 +12,6 @@ import pytest
 
 from stages.api import read_kit
 from stages.proportions.text import ProportionError, Proportions, ProportionShapes, proportion_text, read_proportions
-from stages.proportions.warp_check import warp_fault
 from stages.rows.changes import change_json, changed, read_change
 from stages.rows.draws import LayoutDraws
 from stages.rows.kit_rows import rows_of_kit
@@ -21,9 +20,9 @@ from stages.rows.mirrored_bays import find_mirrored_bays, with_mirrored_bays
 from stages.rows.rows import BARE_PLACE, find_rows
 from stages.rows.settings import RowsConfig
 from stages.rows.slabs import RowChange, SlabError
-from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Kit
 from tests.stages.rows import models
+from tests.stages.rows.soundness import assert_sound
 from tests.toy_kits.chains_and_rings import ROAD, box, kit_of, pose, ring
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -53,11 +52,7 @@ def test_every_contact_is_one_of_the_meshes_and_every_part_is_held(name: str, ti
     kit, layout = MODELS[name]()
     (bay,) = find_mirrored_bays(layout, UP_AXIS)
     longer = with_mirrored_bays(layout, bay.insertion(times))
-    shape = longer.shape(kit)
-    found = ContactTest(shape.meshes, kit.contact_tolerance).contacts(shape.assembly.types, shape.assembly.poses)
-    np.testing.assert_array_equal(found, longer.edges)
-    assert warp_fault(kit, longer.assembly(), shape) is None
-    assert longer.pieces().max() == 0
+    assert_sound(kit, longer)
     np.testing.assert_allclose(longer.extent[0], layout.extent[0] + times * (bay.end - bay.start))
 
 

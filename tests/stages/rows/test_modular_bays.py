@@ -10,7 +10,6 @@ import pytest
 import trimesh
 
 from stages.proportions.text import ProportionError, Proportions, ProportionShapes, proportion_text, read_proportions
-from stages.proportions.warp_check import warp_fault
 from stages.rows.changes import change_json, changed, read_change
 from stages.rows.draws import LayoutDraws
 from stages.rows.kit_rows import rows_of_kit
@@ -18,9 +17,9 @@ from stages.rows.layout import Layout, layout_of
 from stages.rows.modular_bays import ModularBay, find_modular_bays, with_modular_bays
 from stages.rows.settings import RowsConfig
 from stages.rows.slabs import RowChange, SlabError
-from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Kit
 from tests.stages.rows import models
+from tests.stages.rows.soundness import assert_sound
 from tests.toy_kits.chains_and_rings import ROAD, box, kit_of, pose, ring
 
 UP_AXIS = 1
@@ -42,15 +41,6 @@ def counts(kit: Kit, layout: Layout) -> Counter[str]:
     return Counter(kit.types[kind].label for kind in layout.types.tolist())
 
 
-def check(kit: Kit, layout: Layout) -> None:
-    """Check that the contacts of a layout are those of its meshes, and that it is in one piece."""
-    shape = layout.shape(kit)
-    found = ContactTest(shape.meshes, kit.contact_tolerance).contacts(shape.assembly.types, shape.assembly.poses)
-    np.testing.assert_array_equal(found, layout.edges)
-    assert warp_fault(kit, layout.assembly(), shape) is None
-    assert layout.pieces().max() == 0
-
-
 def test_storeys_with_other_openings_are_bays_although_there_are_no_rows() -> None:
     kit, layout = models.tower()
     assert not [row for row in rows_of_kit(kit) if not (row.is_mirrored or row.is_modular)]
@@ -66,7 +56,7 @@ def test_an_inserted_storey_is_the_same_storey_again_and_touches_its_neighbours(
     kit, layout = models.tower()
     bay = storeys_of(layout)[0]
     higher = with_modular_bays(layout, stated(bay, times))
-    check(kit, higher)
+    assert_sound(kit, higher)
     copied = Counter(kit.types[kind].label for kind in layout.types[bay.parts].tolist())
     added = Counter({label: times * count for label, count in copied.items()})
     assert counts(kit, higher) == counts(kit, layout) + added
@@ -78,7 +68,7 @@ def test_a_storey_is_removed_unless_it_holds_the_last_of_a_type() -> None:
     bay = storeys_of(layout)[0]
     assert bay.may_remove
     lower = with_modular_bays(layout, stated(bay, -1))
-    check(kit, lower)
+    assert_sound(kit, lower)
     assert len(lower) == len(layout) - 8
     types = layout.types.copy()
     types[[storey.parts[0] for storey in storeys_of(layout)]] = [types.max() + 1, types.max() + 2]
@@ -100,7 +90,7 @@ def test_modules_of_one_size_with_other_sections_are_not_interchangeable() -> No
     found = find_modular_bays(layout)
     assert {round(bay.end - bay.start, 3) for bay in found} == {2.0}, "a rise and a fall together, not one of them"
     for bay in found:
-        check(kit, with_modular_bays(layout, stated(bay, 1)))
+        assert_sound(kit, with_modular_bays(layout, stated(bay, 1)))
 
 
 def test_a_beam_that_no_module_stands_in_for_ends_no_bay_inside_it() -> None:
@@ -124,7 +114,7 @@ def test_a_part_in_two_pieces_fills_nothing_between_them() -> None:
     kit, layout = models.layout(meshes, [*stones, ("pair", pose(1.0, 0.0, 0.0))])
     found = find_modular_bays(layout)
     assert [(bay.axis, round(bay.end, 3)) for bay in found] == [(UP_AXIS, 0.5)]
-    check(kit, with_modular_bays(layout, stated(found[0], 1)))
+    assert_sound(kit, with_modular_bays(layout, stated(found[0], 1)))
 
 
 def test_draws_are_deterministic_keep_to_their_limits_and_json_keeps_them() -> None:

@@ -1,7 +1,8 @@
-"""Scattered parts: others number and places of like parts, each held as an old one is; legs and knobs stay."""
+"""Scattered parts: like parts in other numbers and places, each held as an old one is; legs and knobs stay."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
@@ -9,31 +10,37 @@ import pytest
 import trimesh
 
 from stages.proportions.text import ProportionError, ProportionShapes
-from stages.proportions.warp_check import warp_fault
 from stages.rows.changes import change_json, changed, read_change
 from stages.rows.draws import LayoutDraws
 from stages.rows.kit_rows import rows_of_kit
 from stages.rows.layout import Layout
-from stages.rows.scattered import Copy, ScatteredParts, Scattering, find_scattered_parts, rescattered
+from stages.rows.likeness import have_like_shapes, have_like_sizes, principal_axes
+from stages.rows.scattered import ScatteredParts, Scattering, TurnedCopy, find_scattered_parts, rescattered
 from stages.rows.settings import RowsConfig
 from stages.rows.slabs import SlabError
 from stages.shape.arrays import FloatArray
-from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Kit
 from tests.stages.rows import models
+from tests.stages.rows.soundness import assert_sound
+from tests.stages.shape.geometry.bodies import random_rotation
 from tests.toy_kits.chains_and_rings import Placed, box, pose
 
 UP_AXIS = 1
 PLATE_TOP, STONE_HEIGHT = 0.1, 0.2
 PLACES = ((0.5, 10.0, 20.0), (0.62, 75.0, 47.0), (0.45, 170.0, 5.0), (0.6, 250.0, 71.0))
 """Distance of each stone from the middle of the plate, and the angles of its place and of its own turn, in degrees."""
+TURNS = (20.0, 47.0, 5.0, 71.0)
+BAR, FLAT_BAR = box(0.24, 0.2, 0.12), box(0.24, 0.03, 0.12)
+EGG = trimesh.creation.icosphere(3).apply_scale([0.16, 0.14, 0.085])
 
 
-def plate(sides: int = 60) -> trimesh.Trimesh:
-    """A disc of radius 1 on the ground, or a polygon."""
-    disc = trimesh.creation.cylinder(1.0, PLATE_TOP, sections=sides)
-    disc.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
-    return disc.apply_translation([0.0, PLATE_TOP / 2, 0.0])
+def finely_divided_bar() -> trimesh.Trimesh:
+    return BAR.subdivide().subdivide()
+
+
+def plate() -> trimesh.Trimesh:
+    """A disc of radius 1 on the ground."""
+    return models.round_plate(1.0).apply_translation([0.0, PLATE_TOP / 2, 0.0])
 
 
 def placed(radius: float, degrees: float, turn: float, height: float = PLATE_TOP + STONE_HEIGHT / 2) -> FloatArray:
@@ -45,19 +52,18 @@ def placed(radius: float, degrees: float, turn: float, height: float = PLATE_TOP
 
 
 @cache
-def stones(more: tuple[str, ...] = (), sides: int = 60) -> tuple[Kit, Layout]:
+def stones(more: str = "") -> tuple[Kit, Layout]:
     """Four stones that lie about on a plate.
 
-    more: `moss` on the first stone, a `twig` across the first two, `bead` on the third and on a bead of the plate
-    sides: of the plate
+    more: `moss` on the first stone, or a `twig` across the first two
     """
-    meshes = {"plate": plate(sides), "stone": box(0.24, STONE_HEIGHT, 0.12)}
+    meshes = {"plate": plate(), "stone": box(0.24, STONE_HEIGHT, 0.12)}
     parts: list[Placed] = [("plate", np.eye(4)), *(("stone", placed(*place)) for place in PLACES)]
     top = PLATE_TOP + STONE_HEIGHT
-    if "moss" in more:
+    if more == "moss":
         meshes["moss"] = box(0.06, 0.02, 0.06)
         parts.append(("moss", placed(0.5, 10.0, 20.0, top + 0.01)))
-    if "twig" in more:
+    if more == "twig":
         first, second = (placed(*place)[:3, 3] for place in PLACES[:2])
         twig = trimesh.creation.box((float(np.linalg.norm(second - first)), 0.02, 0.02))
         meshes["twig"] = twig
@@ -79,15 +85,6 @@ def only_scattered(layout: Layout) -> ScatteredParts:
     return scattered
 
 
-def assert_sound(kit: Kit, made: Layout) -> None:
-    """Assert that the contacts of a layout are those of its meshes, and that its parts hang together."""
-    shape = made.shape(kit)
-    found = ContactTest(shape.meshes, kit.contact_tolerance).contacts(shape.assembly.types, shape.assembly.poses)
-    np.testing.assert_array_equal(found, made.edges)
-    assert warp_fault(kit, made.assembly(), shape) is None
-    assert made.pieces().max() == 0
-
-
 def test_stones_on_a_plate_are_scattered() -> None:
     kit, layout = stones()
     scattered = only_scattered(layout)
@@ -98,21 +95,20 @@ def test_stones_on_a_plate_are_scattered() -> None:
 
 def test_a_copy_is_an_old_stone_turned_about_the_middle_of_the_plate() -> None:
     kit, layout = stones()
-    made = rescattered(layout, Scattering((1, 2, 3, 4), UP_AXIS, (), (Copy(1, 120),)))
+    made = rescattered(layout, Scattering((1, 2, 3, 4), UP_AXIS, (), (TurnedCopy(1, 120),)))
     assert len(made) == len(layout) + 1
-    expected = trimesh.transformations.rotation_matrix(np.deg2rad(-120), [0, 1, 0]) @ layout.poses[1]
-    both = (expected, trimesh.transformations.rotation_matrix(np.deg2rad(120), [0, 1, 0]) @ layout.poses[1])
-    assert min(np.abs(made.poses[-1] - pose).max() for pose in both) < 1e-9
+    expected = trimesh.transformations.rotation_matrix(np.deg2rad(120), [0, -1, 0]) @ layout.poses[1]
+    np.testing.assert_allclose(made.poses[-1], expected, atol=1e-9)
     assert made.edges[-1].tolist() == [0, 5]
     assert_sound(kit, made)
 
 
 def test_what_lies_on_a_stone_goes_with_it() -> None:
-    kit, layout = stones(("moss",))
+    kit, layout = stones("moss")
     scattered = only_scattered(layout)
     assert scattered.members[0] == (1, 5)
     assert {len(member) for member in scattered.members[1:]} == {1}
-    with_copy = rescattered(layout, Scattering(scattered.parts, UP_AXIS, (), (Copy(1, 120),)))
+    with_copy = rescattered(layout, Scattering(scattered.parts, UP_AXIS, (), (TurnedCopy(1, 120),)))
     assert len(with_copy) == len(layout) + 2
     assert_sound(kit, with_copy)
     without = rescattered(layout, Scattering(scattered.parts, UP_AXIS, (1,)))
@@ -121,7 +117,7 @@ def test_what_lies_on_a_stone_goes_with_it() -> None:
 
 
 def test_a_stone_that_carries_part_of_something_stays() -> None:
-    _, layout = stones(("twig",))
+    _, layout = stones("twig")
     assert not find_scattered_parts(layout, UP_AXIS, free(layout)), "two stones alone are free"
 
 
@@ -131,44 +127,58 @@ def test_a_copy_that_overlaps_a_stone_needs_its_place() -> None:
     clash = next(degrees for degrees in range(15, 360, 15) if not _is_valid(layout, parts, (), degrees))
     taken = [part for part in parts if _is_valid(layout, parts, (part,), clash)]
     assert len(taken) == 1
-    made = rescattered(layout, Scattering(parts, UP_AXIS, tuple(taken), (Copy(1, clash),)))
+    made = rescattered(layout, Scattering(parts, UP_AXIS, tuple(taken), (TurnedCopy(1, clash),)))
     assert len(made) == len(layout)
     assert_sound(kit, made)
 
 
-def _is_valid(layout: Layout, parts: tuple[int, ...], removed: tuple[int, ...], degrees: int) -> bool:
+def _is_valid(layout: Layout, parts: tuple[int, ...], removed: tuple[int, ...], degrees: int, part: int = 1) -> bool:
     try:
-        rescattered(layout, Scattering(parts, UP_AXIS, removed, (Copy(1, degrees),)))
+        rescattered(layout, Scattering(parts, UP_AXIS, removed, (TurnedCopy(part, degrees),)))
     except SlabError:
         return False
     return True
 
 
 def test_a_copy_stays_on_what_holds_the_old_part() -> None:
-    """On a square plate a stone in a corner has no place but in other corners."""
+    """On an oblong plate a stone near one end has its only other place near the other end."""
     meshes = {"plate": box(2.0, PLATE_TOP, 1.0), "stone": box(0.24, STONE_HEIGHT, 0.12)}
     parts: list[Placed] = [("plate", pose(0.0, PLATE_TOP / 2, 0.0))]
-    parts += [("stone", placed(*place)) for place in ((0.85, 5.0, 20.0), (0.8, 165.0, 47.0), (0.4, 60.0, 71.0))]
+    parts += [("stone", placed(*place)) for place in ((0.85, 5.0, 20.0), (0.8, 165.0, 47.0), (0.45, 8.0, 0.0))]
     kit, layout = models.layout(meshes, parts)
-    for degrees, is_on_it in ((90, False), (45, False), (180, True)):
+    for degrees, is_on_it in ((90, False), (30, False), (180, True)):
         assert _is_valid(layout, (1, 2, 3), (), degrees) == is_on_it, degrees
-    assert_sound(kit, rescattered(layout, Scattering((1, 2, 3), UP_AXIS, (), (Copy(1, 180),))))
+    for degrees, is_on_it in ((90, False), (180, True)):
+        assert _is_valid(layout, (1, 2, 3), (), degrees, 3) == is_on_it, "half of it would stand over the edge"
+    assert_sound(kit, rescattered(layout, Scattering((1, 2, 3), UP_AXIS, (), (TurnedCopy(1, 180),))))
+
+
+def test_a_copy_touches_what_holds_the_old_part() -> None:
+    """Between the arms of a cross there is nothing to stand on."""
+    cross = trimesh.util.concatenate([box(2.0, PLATE_TOP, 0.4), box(0.4, PLATE_TOP, 2.0)])
+    meshes = {"cross": cross.apply_translation([0.0, PLATE_TOP / 2, 0.0]), "stone": box(0.24, STONE_HEIGHT, 0.12)}
+    parts: list[Placed] = [("cross", np.eye(4))]
+    parts += [("stone", placed(*place)) for place in ((0.7, 8.0, 20.0), (0.8, 98.0, 47.0), (0.5, 191.0, 71.0))]
+    _, layout = models.layout(meshes, parts)
+    for degrees in (90, 180, 270):
+        assert _is_valid(layout, (1, 2, 3), (2, 3), degrees)
+        assert not _is_valid(layout, (1, 2, 3), (2, 3), degrees - 45)
 
 
 def table_with_legs() -> tuple[Kit, Layout]:
-    legs = [("leg", pose(x, 0.5, z)) for x in (-0.4, 0.4) for z in (-0.4, 0.4)]
-    return models.layout({"top": box(1.0, 0.1, 1.0), "leg": box(0.08, 1.0, 0.08)}, [("top", pose(0, 1.05, 0)), *legs])
+    legs = [("leg", pose(x, 0.15, z)) for x in (-0.4, 0.4) for z in (-0.4, 0.4)]
+    return models.layout({"top": box(1.0, 0.1, 1.0), "leg": box(0.1, 0.3, 0.1)}, [("top", pose(0, 0.35, 0)), *legs])
 
 
 def leaning_legs() -> tuple[Kit, Layout]:
-    """Four legs that lean outwards, each turned another way."""
-    meshes, parts = {"top": box(1.0, 0.1, 1.0)}, [("top", pose(0.0, 1.0, 0.0))]
+    """Four legs that lean outwards, each turned another way, and each the mirror image of two others."""
+    meshes, parts = {"top": box(1.0, 0.1, 1.0)}, [("top", pose(0.0, 0.3, 0.0))]
     for number, (x, z) in enumerate([(-1, -1), (-1, 1), (1, -1), (1, 1)]):
-        leg = box(0.08, 1.0, 0.08)
+        leg = box(0.1, 0.4, 0.1)
         leg.apply_transform(trimesh.transformations.rotation_matrix(0.2 * x, [0, 0, 1]))
         leg.apply_transform(trimesh.transformations.rotation_matrix(-0.2 * z, [1, 0, 0]))
         meshes[f"leg{number}"] = leg
-        parts.append((f"leg{number}", pose(0.4 * x, 0.5, 0.4 * z)))
+        parts.append((f"leg{number}", pose(0.4 * x, 0.1, 0.4 * z)))
     return models.layout(meshes, parts)
 
 
@@ -180,11 +190,72 @@ def panel_with_knobs() -> tuple[Kit, Layout]:
     )
 
 
-@pytest.mark.parametrize("make", [table_with_legs, leaning_legs, panel_with_knobs])
-def test_legs_and_knobs_are_not_scattered(make: object) -> None:
-    assert callable(make)
+def hanging(turns: Sequence[float], bars: Sequence[trimesh.Trimesh] = (BAR,)) -> tuple[Kit, Layout]:
+    """Four bars that hang under a round plate, each with its own turn in degrees.
+
+    bars: their meshes, the last one for all that are left
+    """
+    meshes = {"plate": plate(), **{f"bar{number}": bar for number, bar in enumerate(bars)}}
+    parts: list[Placed] = [("plate", np.eye(4))]
+    for number, (place, turn) in enumerate(zip(PLACES, turns, strict=True)):
+        name = f"bar{min(number, len(bars) - 1)}"
+        parts.append((name, placed(*place[:2], turn, -float(meshes[name].bounds[1, 1]))))
+    return models.layout(meshes, parts)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        table_with_legs,
+        leaning_legs,
+        panel_with_knobs,
+        lambda: hanging((0, 0, 0, 0)),
+        lambda: hanging(TURNS, [FLAT_BAR]),
+    ],
+)
+def test_legs_and_knobs_are_not_scattered(make: Callable[[], tuple[Kit, Layout]]) -> None:
     _, layout = make()
     assert not find_scattered_parts(layout, UP_AXIS, free(layout))
+
+
+def test_parts_that_hang_are_scattered_if_they_are_turned_in_many_ways() -> None:
+    _, layout = hanging(TURNS)
+    assert only_scattered(layout).parts == (1, 2, 3, 4)
+
+
+@pytest.mark.parametrize(
+    ("bars", "found"),
+    [
+        ([BAR, EGG, EGG, BAR], []),
+        ([BAR, EGG, BAR, BAR], [(1, 3, 4)]),
+        ([BAR, finely_divided_bar(), BAR, BAR], [(1, 2, 3, 4)]),
+    ],
+)
+def test_parts_that_hang_have_one_shape(bars: list[trimesh.Trimesh], found: list[tuple[int, ...]]) -> None:
+    """Eggs have the size of bars. Only the shape counts, not the mesh."""
+    _, layout = hanging(TURNS, bars)
+    sizes = [principal_axes(points)[0] for points in layout.points[1:]]
+    assert all(have_like_sizes(sizes[0], size) for size in sizes)
+    assert [scattered.parts for scattered in find_scattered_parts(layout, UP_AXIS, free(layout))] == found
+
+
+def test_mirror_images_have_no_like_shape() -> None:
+    hand = trimesh.util.concatenate([box(1.0, 0.3, 0.2), box(0.2, 1.0, 0.2), box(0.2, 0.3, 1.2)])
+    hand.vertices[8:16] += [0.4, 0.4, 0.0]
+    hand.vertices[16:24] += [-0.4, 0.0, 0.5]
+    points = np.asarray(hand.subdivide().subdivide().vertices)
+    rng = np.random.default_rng(1)
+    for _ in range(8):
+        turned = points @ random_rotation(rng)[:3, :3].T * 1.2 + 3.0
+        assert have_like_shapes(points, turned)
+        assert not have_like_shapes(points, turned * [1.0, 1.0, -1.0])
+
+
+def test_parts_that_stand_are_scattered_although_they_are_turned_alike() -> None:
+    meshes = {"plate": plate(), "stone": box(0.24, STONE_HEIGHT, 0.12)}
+    alike = [("stone", placed(*place[:2], 0.0)) for place in PLACES]
+    _, layout = models.layout(meshes, [("plate", np.eye(4)), *alike])
+    assert only_scattered(layout).parts == (1, 2, 3, 4)
 
 
 @pytest.mark.parametrize(("length", "is_found"), [(0.24, True), (0.1, False)])
@@ -223,7 +294,7 @@ def test_a_stone_on_two_others_goes_before_them_and_is_not_copied() -> None:
     with pytest.raises(SlabError, match="no longer be held"):
         rescattered(layout, Scattering((1, 2, 3, 4, 5), UP_AXIS, (1, 2)))
     with pytest.raises(SlabError, match="lies on others"):
-        rescattered(layout, Scattering((1, 2, 3, 4, 5), UP_AXIS, (), (Copy(5, 90),)))
+        rescattered(layout, Scattering((1, 2, 3, 4, 5), UP_AXIS, (), (TurnedCopy(5, 90),)))
 
 
 def test_a_stone_that_lies_on_one_other_goes_with_it() -> None:
@@ -258,7 +329,7 @@ def test_draws_have_other_numbers_and_places_and_can_be_made_again() -> None:
 
 def test_its_json_says_what_is_changed_and_makes_it_again() -> None:
     kit, layout = stones()
-    change = Scattering((1, 2, 3, 4), UP_AXIS, (2,), (Copy(1, 120), Copy(3, 30)))
+    change = Scattering((1, 2, 3, 4), UP_AXIS, (2,), (TurnedCopy(1, 120), TurnedCopy(3, 30)))
     stated = change_json(change)
     assert stated == {"scattered": [1, 2, 3, 4], "axis": "y", "removed": [2], "copies": [[1, 120], [3, 30]]}
     assert read_change(stated) == change
@@ -276,8 +347,8 @@ def test_its_json_says_what_is_changed_and_makes_it_again() -> None:
         Scattering((1, 2, 3), UP_AXIS, (4,)),
         Scattering((1, 1, 2, 3), UP_AXIS, (1,)),
         Scattering((1, 2, 3, 4), UP_AXIS, (1, 1)),
-        Scattering((1, 2, 3), UP_AXIS, (), (Copy(4, 30),)),
-        Scattering((1, 2, 3, 4), UP_AXIS, (), (Copy(1, 120), Copy(1, 120))),
+        Scattering((1, 2, 3), UP_AXIS, (), (TurnedCopy(4, 30),)),
+        Scattering((1, 2, 3, 4), UP_AXIS, (), (TurnedCopy(1, 120), TurnedCopy(1, 120))),
     ],
 )
 def test_what_is_not_scattered_is_refused(change: Scattering) -> None:

@@ -80,7 +80,7 @@ class TestDenseMeshes:
     def test_they_have_the_kind_that_all_pairs_give(
         self, pose: FloatArray, kind: ContactKind | None, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        """With a tolerance of several triangles each of these has hundreds of others near it."""
+        """There are more pairs of near triangles than are looked at first."""
         tolerance, dense = 4e-3, part(finely_divided(box(), 7))
         test = ContactTest([dense], tolerance)
         pairs = near_pairs(dense.box_tree, dense.box_tree, pose, tolerance)
@@ -91,21 +91,29 @@ class TestDenseMeshes:
         monkeypatch.setattr(contact, "PAIRS_LOOKED_AT", ())
         assert test.kind(0, 0, pose) == kind
 
+    def test_some_pairs_of_a_wide_contact_decide(self) -> None:
+        dense = part(finely_divided(box(), 7))
+        points = ContactTest([dense], 4e-3).area(0, 0, placed(1, 0.1, 0.2))
+        some = points[: len(points) // 8]
+        length, width, _ = np.sort(np.ptp(some, axis=0))[::-1]
+        assert contact.is_surely_wide(some, 0.5 * length, 0.5 * width)
+        assert not contact.is_surely_wide(some, 0.5 * length, 1.5 * width)
+        assert not contact.is_surely_wide(some, 2.0 * length, 0.5 * width)
+
     @pytest.mark.parametrize("count", [0, 1, 2])
     def test_fewer_than_three_points_are_not_surely_wide(self, count: int) -> None:
         assert not contact.is_surely_wide(np.eye(3)[:count], 0.0, 0.0)
 
-    @given(st.integers(0, 2**32 - 1), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+    @given(st.integers(0, 2**32 - 1), st.floats(0.0, 2.0), st.floats(0.0, 2.0))
     @settings(max_examples=200, deadline=None)
-    def test_points_are_surely_wide_only_if_their_extents_are(self, seed: int, width: float, length: float) -> None:
+    def test_points_are_surely_wide_only_if_their_extents_are(self, seed: int, length: float, width: float) -> None:
+        """Along any axes. length, width: as multiples of the largest and the second extent"""
         rng = np.random.default_rng(seed)
         every = rng.normal(size=(40, 3)) * np.sort(rng.exponential(size=3))
         some = every[rng.permutation(40)[:8]]
-        if contact.is_surely_wide(some, length, width):
-            axes = random_rotation(rng)[:3, :3]
-            extents = np.sort(np.ptp(every @ axes, axis=0))
-            assert extents[2] >= length
-            assert extents[1] >= width
+        extents = np.sort(np.ptp(every @ random_rotation(rng)[:3, :3], axis=0))
+        if length > 1.0 or width > 1.0:
+            assert not contact.is_surely_wide(some, length * extents[2], width * extents[1])
 
 
 class TestBoxes:
